@@ -1,0 +1,41 @@
+//! What can be wrong with a coefficient file.
+
+use std::io;
+
+/// Why a file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The storage failed.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// Not a coefficient file at all.
+    #[error("not a wavesplat coefficient file: {0}")]
+    Foreign(String),
+    /// Bytes that cannot be right: damaged, cut, or forged.
+    #[error("damaged at byte {offset} ({place}): {what}")]
+    Corrupt {
+        /// Where in the file.
+        offset: u64,
+        /// The structure there, as "footer" or "window 3 block 7 level 2".
+        place: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// Written by a newer version, or with a feature that this reader lacks.
+    #[error("not supported: {0}")]
+    Unsupported(String),
+    /// A size beyond the limits of the format.
+    #[error("{what}: {size} is over the limit of {limit}")]
+    TooLarge {
+        /// What is too large.
+        what: String,
+        /// Its size.
+        size: u64,
+        /// The largest that the format allows.
+        limit: u64,
+    },
+}
+
+/// The package's result.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,127 @@
+//! Samples as numbers: little-endian bytes of any [`SampleType`] to `f64` and back.
+//!
+//! Every type but `f64` fits in `f64` exactly, so arithmetic on `f64` loses nothing of the input.
+
+pub use wavesplat_format::SampleType;
+
+use half::f16;
+
+macro_rules! for_type {
+    ($ty:expr, $run:ident, $($arg:expr),*) => {
+        match $ty {
+            SampleType::U8 => $run!(u8, $($arg),*),
+            SampleType::I8 => $run!(i8, $($arg),*),
+            SampleType::U16 => $run!(u16, $($arg),*),
+            SampleType::I16 => $run!(i16, $($arg),*),
+            SampleType::U32 => $run!(u32, $($arg),*),
+            SampleType::I32 => $run!(i32, $($arg),*),
+            SampleType::F16 => $run!(f16, $($arg),*),
+            SampleType::F32 => $run!(f32, $($arg),*),
+            SampleType::F64 => $run!(f64, $($arg),*),
+        }
+    };
+}
+
+/// Fills `out` with the numbers whose little-endian bytes are `bytes` (`out.len() * ty.size()` of them).
+pub fn load(ty: SampleType, bytes: &[u8], out: &mut [f64]) {
+    assert_eq!(bytes.len(), out.len() * ty.size(), "bytes of {} samples", out.len());
+    macro_rules! run {
+        ($t:ty, $bytes:expr, $out:expr) => {
+            for (o, b) in $out.iter_mut().zip($bytes.as_chunks::<{ size_of::<$t>() }>().0) {
+                *o = f64::from(<$t>::from_le_bytes(*b));
+            }
+        };
+    }
+    for_type!(ty, run, bytes, out);
+}
+
+/// The number that storing `value` as `ty` leaves: rounded to nearest, integers clamped to their range.
+pub fn round_to(ty: SampleType, value: f64) -> f64 {
+    macro_rules! as_int {
+        ($t:ty) => {
+            value.round().clamp(f64::from(<$t>::MIN), f64::from(<$t>::MAX))
+        };
+    }
+    match ty {
+        SampleType::U8 => as_int!(u8),
+        SampleType::I8 => as_int!(i8),
+        SampleType::U16 => as_int!(u16),
+        SampleType::I16 => as_int!(i16),
+        SampleType::U32 => as_int!(u32),
+        SampleType::I32 => as_int!(i32),
+        SampleType::F16 => f64::from(f16::from_f64(value)),
+        SampleType::F32 => f64::from(value as f32),
+        SampleType::F64 => value,
+    }
+}
+
+/// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
+pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
+    assert_eq!(out.len(), values.len() * ty.size(), "bytes of {} samples", values.len());
+    macro_rules! run {
+        ($t:ident, $values:expr, $out:expr) => {
+            for (b, v) in $out.as_chunks_mut::<{ size_of::<$t>() }>().0.iter_mut().zip($values) {
+                *b = cast!($t, round_to(ty, *v)).to_le_bytes();
+            }
+        };
+    }
+    macro_rules! cast {
+        (f16, $v:expr) => {
+            f16::from_f64($v)
+        };
+        ($t:ident, $v:expr) => {
+            $v as $t
+        };
+    }
+    for_type!(ty, run, values, out);
+}
+
+/// Reverses the bytes of every sample: big-endian to little-endian and back.
+pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
+    if ty.size() > 1 {
+        bytes.chunks_exact_mut(ty.size()).for_each(<[u8]>::reverse);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_type_keeps_its_extremes() {
+        let cases = [
+            (SampleType::U8, 0.0, 255.0),
+            (SampleType::I8, -128.0, 127.0),
+            (SampleType::U16, 0.0, 65535.0),
+            (SampleType::I16, -32768.0, 32767.0),
+            (SampleType::U32, 0.0, 4294967295.0),
+            (SampleType::I32, -2147483648.0, 2147483647.0),
+            (SampleType::F16, -65504.0, 65504.0),
+            (SampleType::F32, f64::from(f32::MIN), f64::from(f32::MAX)),
+            (SampleType::F64, f64::MIN, f64::MAX),
+        ];
+        for (ty, lo, hi) in cases {
+            let mut bytes = vec![0; 2 * ty.size()];
+            store(ty, &[lo, hi], &mut bytes);
+            let mut back = [0.0; 2];
+            load(ty, &bytes, &mut back);
+            assert_eq!(back, [lo, hi], "{ty}");
+        }
+    }
+
+    #[test]
+    fn integers_round_to_nearest_and_clamp() {
+        assert_eq!(round_to(SampleType::U8, 2.5), 3.0);
+        assert_eq!(round_to(SampleType::U8, -7.0), 0.0);
+        assert_eq!(round_to(SampleType::I16, 1e9), 32767.0);
+    }
+
+    #[test]
+    fn swapping_twice_changes_nothing() {
+        let mut bytes = [1, 2, 3, 4, 5, 6, 7, 8];
+        swap_endian(SampleType::F32, &mut bytes);
+        assert_eq!(bytes, [4, 3, 2, 1, 8, 7, 6, 5]);
+        swap_endian(SampleType::F32, &mut bytes);
+        assert_eq!(bytes, [1, 2, 3, 4, 5, 6, 7, 8]);
+    }
+}

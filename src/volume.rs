@@ -1,0 +1,205 @@
+//! Index arithmetic on lattices of voxels: regions, rows, blocks, windows. No I/O, no samples.
+//!
+//! Triples are in the order x, y, z; arrays have x fastest, then y, z, and time slowest.
+
+use std::ops::Range;
+
+/// A lattice of voxels in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Number of voxels along x, y, z; none is 0.
+    pub dims: [usize; 3],
+    /// World units between neighbours along x, y, z.
+    pub spacing: [f64; 3],
+    /// World position of voxel (0, 0, 0).
+    pub origin: [f64; 3],
+}
+
+impl Grid {
+    /// A grid of unit spacing at the world's origin.
+    pub fn unit(dims: [usize; 3]) -> Self {
+        Self { dims, spacing: [1.0; 3], origin: [0.0; 3] }
+    }
+
+    /// The region of all voxels.
+    pub fn whole(&self) -> Region {
+        Region { start: [0; 3], end: self.dims }
+    }
+
+    /// World position of a voxel.
+    pub fn position(&self, voxel: [usize; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| self.origin[a] + self.spacing[a] * voxel[a] as f64)
+    }
+
+    /// The grid of a region of this one, at the same place in the world.
+    pub fn crop(&self, region: &Region) -> Self {
+        Self { dims: region.dims(), spacing: self.spacing, origin: self.position(region.start) }
+    }
+}
+
+/// A box of voxels, `start` included and `end` excluded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Region {
+    /// First voxel along x, y, z.
+    pub start: [usize; 3],
+    /// One past the last voxel along x, y, z.
+    pub end: [usize; 3],
+}
+
+impl Region {
+    /// Number of voxels along x, y, z.
+    pub fn dims(&self) -> [usize; 3] {
+        std::array::from_fn(|a| self.end[a].saturating_sub(self.start[a]))
+    }
+
+    /// Number of voxels.
+    pub fn voxels(&self) -> usize {
+        self.dims().iter().product()
+    }
+
+    /// Whether there is no voxel inside.
+    pub fn is_empty(&self) -> bool {
+        self.voxels() == 0
+    }
+
+    /// The voxels that both regions hold.
+    pub fn intersect(&self, other: &Self) -> Self {
+        Self {
+            start: std::array::from_fn(|a| self.start[a].max(other.start[a])),
+            end: std::array::from_fn(|a| self.end[a].min(other.end[a])),
+        }
+    }
+
+    /// Whether every voxel of `other` is inside.
+    pub fn contains(&self, other: &Self) -> bool {
+        (0..3).all(|a| self.start[a] <= other.start[a] && other.end[a] <= self.end[a])
+    }
+
+    /// The same box with its coordinates counted from `origin`.
+    pub fn relative_to(&self, origin: [usize; 3]) -> Self {
+        Self {
+            start: std::array::from_fn(|a| self.start[a] - origin[a]),
+            end: std::array::from_fn(|a| self.end[a] - origin[a]),
+        }
+    }
+
+    /// The same box moved by `offset`.
+    pub fn moved_by(&self, offset: [usize; 3]) -> Self {
+        Self {
+            start: std::array::from_fn(|a| self.start[a] + offset[a]),
+            end: std::array::from_fn(|a| self.end[a] + offset[a]),
+        }
+    }
+
+    /// The (y, z) of every x-row, in array order.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (y, z) = (self.start[1]..self.end[1], self.start[2]..self.end[2]);
+        z.flat_map(move |z| y.clone().map(move |y| (y, z)))
+    }
+
+    /// Every voxel (x, y, z), in array order.
+    pub fn iter(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let x = self.start[0]..self.end[0];
+        self.rows().flat_map(move |(y, z)| x.clone().map(move |x| [x, y, z]))
+    }
+
+    /// Where a voxel of this region stands in the region's own array.
+    pub fn index(&self, voxel: [usize; 3]) -> usize {
+        let d = self.dims();
+        let [x, y, z] = std::array::from_fn(|a| voxel[a] - self.start[a]);
+        (z * d[1] + y) * d[0] + x
+    }
+}
+
+/// A volume cut into boxes of `edge` voxels a side; those at the upper faces may be smaller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlockGrid {
+    /// Voxels of the volume along x, y, z.
+    pub dims: [usize; 3],
+    /// Voxels a side of a whole block.
+    pub edge: usize,
+}
+
+impl BlockGrid {
+    /// Number of blocks along x, y, z.
+    pub fn counts(&self) -> [usize; 3] {
+        self.dims.map(|n| n.div_ceil(self.edge))
+    }
+
+    /// Number of blocks.
+    pub fn len(&self) -> usize {
+        self.counts().iter().product()
+    }
+
+    /// Whether there is no block.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The voxels of a block; blocks are numbered x fastest, then y, z.
+    pub fn region(&self, block: usize) -> Region {
+        let [cx, cy, _] = self.counts();
+        let at = [block % cx, block / cx % cy, block / (cx * cy)];
+        Region {
+            start: at.map(|i| i * self.edge),
+            end: std::array::from_fn(|a| ((at[a] + 1) * self.edge).min(self.dims[a])),
+        }
+    }
+
+    /// The numbers of the blocks that touch `region`, ascending.
+    pub fn touching(&self, region: &Region) -> impl Iterator<Item = usize> + use<> {
+        let [cx, cy, _] = self.counts();
+        let blocks = Region {
+            start: region.start.map(|i| i / self.edge),
+            end: if region.is_empty() {
+                region.start.map(|i| i / self.edge)
+            } else {
+                region.end.map(|i| i.div_ceil(self.edge))
+            },
+        };
+        blocks.iter().map(move |[x, y, z]| (z * cy + y) * cx + x)
+    }
+}
+
+/// The frames of window `index` when `frames` are cut into windows of `len`; the last may be shorter.
+pub fn window_frames(index: usize, len: usize, frames: usize) -> Range<usize> {
+    let first = index * len;
+    first..(first + len).min(frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_tile_the_volume_without_overlap() {
+        let grid = BlockGrid { dims: [7, 5, 3], edge: 4 };
+        let mut seen = vec![0; 7 * 5 * 3];
+        let whole = Grid::unit(grid.dims).whole();
+        for block in 0..grid.len() {
+            for v in grid.region(block).iter() {
+                seen[whole.index(v)] += 1;
+            }
+        }
+        assert!(seen.iter().all(|n| *n == 1));
+    }
+
+    #[test]
+    fn touching_agrees_with_testing_every_block() {
+        let grid = BlockGrid { dims: [9, 10, 11], edge: 4 };
+        for region in [
+            Region { start: [0, 0, 0], end: [9, 10, 11] },
+            Region { start: [3, 4, 7], end: [5, 5, 9] },
+            Region { start: [4, 4, 4], end: [4, 8, 8] },
+        ] {
+            let slow: Vec<_> = (0..grid.len()).filter(|b| !grid.region(*b).intersect(&region).is_empty()).collect();
+            assert_eq!(grid.touching(&region).collect::<Vec<_>>(), slow, "{region:?}");
+        }
+    }
+
+    #[test]
+    fn windows_cover_all_frames() {
+        let all: Vec<_> = (0..3).flat_map(|w| window_frames(w, 4, 10)).collect();
+        assert_eq!(all, (0..10).collect::<Vec<_>>());
+    }
+}
