@@ -1,1 +1,6 @@
 //! Tests.
+#![allow(missing_docs, reason = "tests are read through their names")]
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+#![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
+
+mod reference;

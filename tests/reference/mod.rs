@@ -1,0 +1,8 @@
+//! The slow, obvious truth against which the library is tested.
+//!
+//! Written from `shared/method.md` alone: nothing here calls the library, and only `std` arithmetic is used.
+
+pub(crate) mod camera;
+pub(crate) mod splat;
+pub(crate) mod transform;
+pub(crate) mod truncate;
