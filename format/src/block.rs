@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn a_reused_compressor_gives_the_bytes_of_a_fresh_one() {
         let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
-        let raw: Vec<u8> = (0..40_000u32).map(|i| (i * i >> 7) as u8).collect();
+        let raw: Vec<u8> = (0..40_000u32).map(|i| ((i * i) >> 7) as u8).collect();
         let mut reused = Compressor::new(3).expect("level 3");
         let first = reused.part(PartKind::Exact, stats, &raw).expect("fits");
         reused.part(PartKind::Outliers, stats, &raw[9..]).expect("fits");

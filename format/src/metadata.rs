@@ -108,6 +108,7 @@ impl Metadata {
         if size > limit {
             return Err(Error::TooLarge { what: "bytes of metadata".into(), size, limit });
         }
+        Self::parse(&bytes).map_err(Error::Invalid)?; // a record near the limit must also fit in memory under it
         Ok(bytes)
     }
 

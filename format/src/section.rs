@@ -145,6 +145,7 @@ pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
 pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> Check<Vec<u8>> {
     let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
     ensure(whole, || "not one whole zstd frame".into())?;
+    ensure(stored.get(4).is_some_and(|descriptor| descriptor & 4 != 0), || "the zstd frame has no checksum".into())?;
     let declared = zstd_safe::get_frame_content_size(stored).ok().flatten();
     ensure(declared == Some(u64::from(raw_len)), || format!("the zstd frame does not declare {raw_len} bytes"))?;
     let raw = zstd::bulk::decompress(stored, raw_len as usize).map_err(|e| format!("zstd: {e}"))?;

@@ -78,8 +78,8 @@ impl<W: Write> Writer<W> {
     pub fn finish(mut self, metadata: &Metadata) -> Result<(W, Summary)> {
         self.begin()?;
         self.flush_leaf()?;
-        check_leaves(metadata, &self.leaves).map_err(Error::Invalid)?;
         let record = metadata.encode()?;
+        check_leaves(metadata, &self.leaves).map_err(Error::Invalid)?;
         let metadata = self.section(Owner::Metadata, &record, record.len())?;
         let root = self.write_root()?;
         self.pad()?;

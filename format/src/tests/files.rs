@@ -16,7 +16,9 @@ fn files_round_trip() {
         let entry = reader.entry(block.id).expect("present");
         assert_eq!((entry.id, entry.stats, entry.parts.len()), (block.id, block.stats, block.parts.len()));
         assert_eq!(entry.stored_len(), block.parts.iter().map(|part| part.stored.len() as u64).sum());
-        assert!(entry.parts.first().is_none_or(|part| (part.offset - entry.header_len()) % limits::ALIGN == 0));
+        assert!(
+            entry.parts.first().is_none_or(|part| (part.offset - entry.header_len()).is_multiple_of(limits::ALIGN))
+        );
     }
     assert!(reader.leaves(2).is_empty());
     assert!(reader.entry(BlockId { window: 0, block: 12, channel: 0 }).is_err());
@@ -57,8 +59,8 @@ fn writers_refuse_wrong_orders_and_stay_refused() {
     }
     for skipped in [3, 11, 23, 47] {
         let mut writer = Writer::new(Vec::new(), ID).expect("memory");
-        let others = blocks.iter().enumerate().filter(|&(number, _)| number != skipped);
-        let appended = others.map(|(_, (block, _))| writer.append(block)).collect::<Result<()>>();
+        let mut others = blocks.iter().enumerate().filter(|&(number, _)| number != skipped);
+        let appended = others.try_for_each(|(_, (block, _))| writer.append(block));
         assert!(appended.and_then(|()| writer.finish(&metadata)).is_err(), "block {skipped} is missing");
     }
 }
