@@ -35,6 +35,9 @@ pub enum Error {
         /// The largest that the format allows.
         limit: u64,
     },
+    /// What was asked for or given cannot be in a file.
+    #[error("not valid: {0}")]
+    Invalid(String),
 }
 
 /// The package's result.

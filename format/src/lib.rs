@@ -4,11 +4,42 @@
 //! and maps no memory; it reads through [`Storage`] and writes to any `std::io::Write` without a seek.
 #![forbid(unsafe_code)]
 
+mod block;
+mod bytes;
+mod directory;
 mod error;
+mod footer;
+mod geometry;
+mod header;
+mod leaf;
+pub mod limits;
+mod metadata;
+pub mod payload;
+mod planes;
+mod reader;
 mod sample;
+mod section;
+mod structure;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod writer;
 
+pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
+pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
+pub use geometry::BlockGeometry;
+pub use header::FileId;
+pub use leaf::LeafEntry;
+pub use metadata::{Basis, Bound, Metadata, Window};
+pub use payload::{
+    Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,
+    unpack_outliers,
+};
+pub use reader::Reader;
 pub use sample::SampleType;
+pub use writer::{Summary, Writer};
 
 use std::io;
 
@@ -36,5 +67,25 @@ impl Storage for [u8] {
         let Some(bytes) = bytes else { return Err(io::ErrorKind::UnexpectedEof.into()) };
         out.copy_from_slice(bytes);
         Ok(())
+    }
+}
+
+impl Storage for Vec<u8> {
+    fn len(&self) -> u64 {
+        Storage::len(self.as_slice())
+    }
+
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        self.as_slice().read_at(offset, out)
+    }
+}
+
+impl<S: Storage + ?Sized> Storage for &S {
+    fn len(&self) -> u64 {
+        S::len(self)
+    }
+
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        S::read_at(self, offset, out)
     }
 }

@@ -1,0 +1,189 @@
+//! One block: its name, its parts, and the compressor that makes a part.
+
+use crate::limits::MAX_PART_RAW;
+use crate::{Error, Result};
+use std::cmp::Ordering;
+use std::fmt;
+
+/// One window x one box of voxels x one channel. Ordered as in a file: by window, then channel, then block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct BlockId {
+    /// Number of the window, from 0.
+    pub window: u32,
+    /// Number of the box: `bx + nx * (by + ny * bz)`.
+    pub block: u32,
+    /// Number of the channel, from 0.
+    pub channel: u16,
+}
+
+impl Ord for BlockId {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let key = |id: &Self| (id.window, id.channel, id.block);
+        key(self).cmp(&key(other))
+    }
+}
+
+impl PartialOrd for BlockId {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl fmt::Display for BlockId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "window {} block {} channel {}", self.window, self.block, self.channel)
+    }
+}
+
+/// What a part of a block holds. Ordered as in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum PartKind {
+    /// Quantised coefficients of one group of temporal levels, 0 the coarsest.
+    Level(u8),
+    /// Samples that are stored exactly because the coefficients miss them by more than the bound.
+    Outliers,
+    /// Which samples are missing, and their bytes.
+    Missing,
+    /// Every sample, exactly; instead of levels and outliers.
+    Exact,
+}
+
+impl PartKind {
+    /// Kind and level as bytes in a file.
+    pub(crate) fn code(self) -> [u8; 2] {
+        match self {
+            Self::Level(level) => [0, level],
+            Self::Outliers => [1, 0],
+            Self::Missing => [2, 0],
+            Self::Exact => [3, 0],
+        }
+    }
+
+    /// The kind of these bytes in a file.
+    pub(crate) fn from_code(code: [u8; 2]) -> Option<Self> {
+        match code {
+            [0, level] => Some(Self::Level(level)),
+            [1, 0] => Some(Self::Outliers),
+            [2, 0] => Some(Self::Missing),
+            [3, 0] => Some(Self::Exact),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for PartKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Level(level) => write!(f, "level {level}"),
+            Self::Outliers => f.write_str("outliers"),
+            Self::Missing => f.write_str("missing samples"),
+            Self::Exact => f.write_str("exact samples"),
+        }
+    }
+}
+
+/// What skipping needs to know about a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartStats {
+    /// Nonzero coefficients, outliers, missing samples, or samples; at least 1.
+    pub count: u64,
+    /// Sum of squares of the coefficients in the part; 0 without coefficients; may overflow to infinity.
+    pub energy: f64,
+    /// Largest |coefficient| in the part, finite; 0 without coefficients.
+    pub largest: f64,
+}
+
+/// A part ready to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedPart {
+    /// What it holds.
+    pub kind: PartKind,
+    /// What skipping needs to know.
+    pub stats: PartStats,
+    /// Bytes before compression.
+    pub raw_len: u32,
+    /// One zstd frame.
+    pub stored: Vec<u8>,
+}
+
+/// What skipping and reports need to know about a block, in the units of the samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlockStats {
+    /// Quantisation step: a coefficient is its code times this; finite, not negative.
+    pub step: f64,
+    /// Smallest decoded finite sample; infinity when there is none.
+    pub min: f64,
+    /// Largest decoded finite sample; minus infinity when there is none.
+    pub max: f64,
+    /// Largest error of a sample, rounded up.
+    pub reached: f64,
+    /// Sum of the squared errors of the samples; may overflow to infinity.
+    pub squared_error: f64,
+    /// Energy dropped or lost by quantisation, in coefficients; may overflow to infinity.
+    pub dropped: f64,
+}
+
+/// A block ready to be written; parts ascend by kind, and a part that would hold only zeros is absent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncodedBlock {
+    /// Which block.
+    pub id: BlockId,
+    /// What skipping needs to know.
+    pub stats: BlockStats,
+    /// Its parts in order.
+    pub parts: Vec<EncodedPart>,
+}
+
+/// Compresses parts; one per worker, reused. The bytes depend on the input and the level alone.
+pub struct Compressor {
+    inner: zstd::bulk::Compressor<'static>,
+}
+
+impl fmt::Debug for Compressor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Compressor")
+    }
+}
+
+impl Compressor {
+    /// A compressor at a zstd level; an error if zstd refuses it.
+    pub fn new(level: i32) -> Result<Self> {
+        let mut inner = zstd::bulk::Compressor::new(level)?;
+        inner.include_checksum(true)?;
+        inner.include_contentsize(true)?;
+        Ok(Self { inner })
+    }
+
+    /// Compresses the payload `raw` of a part; [`Error::TooLarge`] over the limit of a part.
+    pub fn part(&mut self, kind: PartKind, stats: PartStats, raw: &[u8]) -> Result<EncodedPart> {
+        let size = raw.len() as u64;
+        let raw_len = u32::try_from(size).ok().filter(|_| size <= MAX_PART_RAW);
+        let too_large = || Error::TooLarge { what: format!("bytes of {kind}"), size, limit: MAX_PART_RAW };
+        let raw_len = raw_len.ok_or_else(too_large)?;
+        let mut stored = self.inner.compress(raw)?;
+        stored.shrink_to_fit();
+        Ok(EncodedPart { kind, stats, raw_len, stored })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reused_compressor_gives_the_bytes_of_a_fresh_one() {
+        let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
+        let raw: Vec<u8> = (0..40_000u32).map(|i| ((i * i) >> 7) as u8).collect();
+        let mut reused = Compressor::new(3).expect("level 3");
+        let first = reused.part(PartKind::Exact, stats, &raw).expect("fits");
+        reused.part(PartKind::Outliers, stats, &raw[9..]).expect("fits");
+        assert_eq!(reused.part(PartKind::Exact, stats, &raw).expect("fits"), first);
+    }
+
+    #[test]
+    fn files_order_by_window_then_channel_then_block() {
+        let id = |window, channel, block| BlockId { window, block, channel };
+        assert!(id(0, 0, 9) < id(0, 1, 0) && id(0, 9, 9) < id(1, 0, 0));
+        assert_eq!(id(3, 0, 7).to_string(), "window 3 block 7 channel 0");
+    }
+}

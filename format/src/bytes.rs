@@ -1,0 +1,84 @@
+//! Little-endian fields, read with bounds and written in order.
+
+/// What a check or a parser of bytes says: the reason in words; the caller adds the place.
+pub(crate) type Check<T = ()> = std::result::Result<T, String>;
+
+/// Fails with `what()` unless `ok`.
+pub(crate) fn ensure(ok: bool, what: impl FnOnce() -> String) -> Check {
+    if ok { Ok(()) } else { Err(what()) }
+}
+
+/// The fields of a record, taken one after another.
+pub(crate) struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    pub(crate) fn remaining(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(crate) fn array<const N: usize>(&mut self) -> Check<[u8; N]> {
+        let Some((head, tail)) = self.0.split_first_chunk::<N>() else {
+            return Err(format!("ends {} bytes early", N - self.0.len()));
+        };
+        self.0 = tail;
+        Ok(*head)
+    }
+
+    pub(crate) fn u16(&mut self) -> Check<u16> {
+        Ok(u16::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn u32(&mut self) -> Check<u32> {
+        Ok(u32::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn u64(&mut self) -> Check<u64> {
+        Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn f64(&mut self) -> Check<f64> {
+        Ok(f64::from_le_bytes(self.array()?))
+    }
+
+    /// `N` bytes that must be zero.
+    pub(crate) fn reserved<const N: usize>(&mut self) -> Check {
+        let bytes = self.array::<N>()?;
+        ensure(bytes.iter().all(|&b| b == 0), || "reserved bytes are not zero".into())
+    }
+
+    /// Fails if anything is left.
+    pub(crate) fn end(&self) -> Check {
+        ensure(self.0.is_empty(), || format!("{} bytes too many", self.0.len()))
+    }
+}
+
+/// Appends fields to a record.
+pub(crate) trait Put {
+    fn put(&mut self, bytes: &[u8]);
+
+    fn put_u16(&mut self, value: u16) {
+        self.put(&value.to_le_bytes());
+    }
+
+    fn put_u32(&mut self, value: u32) {
+        self.put(&value.to_le_bytes());
+    }
+
+    fn put_u64(&mut self, value: u64) {
+        self.put(&value.to_le_bytes());
+    }
+
+    fn put_f64(&mut self, value: f64) {
+        self.put(&value.to_le_bytes());
+    }
+}
+
+impl Put for Vec<u8> {
+    fn put(&mut self, bytes: &[u8]) {
+        self.extend_from_slice(bytes);
+    }
+}

@@ -1,0 +1,164 @@
+//! The directory's entries of blocks and parts: their bytes, and what must be true of them.
+
+use crate::block::{BlockId, BlockStats, PartKind, PartStats};
+use crate::bytes::{Check, Fields, Put, ensure};
+use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
+use crate::section::FRAME;
+
+/// Bytes of a block's entry without its parts.
+pub(crate) const BLOCK_ENTRY: usize = 64;
+
+/// Bytes of a part's entry.
+pub(crate) const PART_ENTRY: usize = 56;
+
+/// Where a part is and what skipping needs to know about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartEntry {
+    /// What it holds.
+    pub kind: PartKind,
+    /// What skipping needs to know.
+    pub stats: PartStats,
+    /// Of its zstd frame, absolute.
+    pub offset: u64,
+    /// Bytes of its zstd frame.
+    pub stored_len: u32,
+    /// Bytes once decompressed.
+    pub raw_len: u32,
+    /// xxh3-64 of the stored bytes, seeded by file, block and kind.
+    pub checksum: u64,
+}
+
+/// A block's line in the directory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlockEntry {
+    /// Which block.
+    pub id: BlockId,
+    /// What skipping needs to know.
+    pub stats: BlockStats,
+    /// Its parts, ascending by kind.
+    pub parts: Vec<PartEntry>,
+}
+
+impl BlockEntry {
+    /// The part of a kind, if the block has it.
+    pub fn part(&self, kind: PartKind) -> Option<&PartEntry> {
+        self.parts.iter().find(|part| part.kind == kind)
+    }
+
+    /// Whether every sample is stored as it was.
+    pub fn is_exact(&self) -> bool {
+        self.part(PartKind::Exact).is_some()
+    }
+
+    /// Bytes of its parts in the file, without the block's header and padding.
+    pub fn stored_len(&self) -> u64 {
+        self.parts.iter().map(|part| u64::from(part.stored_len)).sum()
+    }
+
+    /// Bytes of its header in the file, frame included.
+    pub(crate) fn header_len(&self) -> u64 {
+        (FRAME + BLOCK_ENTRY + PART_ENTRY * self.parts.len()) as u64
+    }
+
+    pub(crate) fn encode(&self, out: &mut Vec<u8>) {
+        out.put_u32(self.id.window);
+        out.put_u32(self.id.block);
+        out.put_u16(self.id.channel);
+        out.put_u16(self.parts.len() as u16);
+        out.put_u32(0);
+        let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
+        [step, min, max, reached, squared_error, dropped].into_iter().for_each(|value| out.put_f64(value));
+        self.parts.iter().for_each(|part| part.encode(out));
+    }
+
+    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+        let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
+        let count = usize::from(fields.u16()?);
+        fields.reserved::<4>()?;
+        let stats = BlockStats {
+            step: fields.f64()?,
+            min: fields.f64()?,
+            max: fields.f64()?,
+            reached: fields.f64()?,
+            squared_error: fields.f64()?,
+            dropped: fields.f64()?,
+        };
+        ensure(count <= MAX_PARTS && count * PART_ENTRY <= fields.remaining(), || format!("{count} parts"))?;
+        let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<Check<_>>()?;
+        Ok(Self { id, stats, parts })
+    }
+
+    /// What must be true of any block, whatever the metadata.
+    pub(crate) fn check(&self) -> Check {
+        let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
+        ensure(finite_amount(step) && finite_amount(reached), || "a step or an error out of range".into())?;
+        ensure(is_amount(squared_error) && is_amount(dropped), || "an energy out of range".into())?;
+        ensure(is_range(min, max), || format!("values from {min} to {max}"))?;
+        ensure(self.parts.len() <= MAX_PARTS, || format!("{} parts", self.parts.len()))?;
+        let ascend = self.parts.is_sorted_by(|a, b| a.kind < b.kind);
+        ensure(ascend, || "parts out of order".into())?;
+        let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers);
+        let both = self.is_exact() && self.parts.iter().any(lossy);
+        ensure(!both, || "exact samples beside coefficients or outliers".into())?;
+        self.parts.iter().try_for_each(PartEntry::check)
+    }
+
+    /// Whether the block starts at `start` and its parts follow its header without a gap; its aligned end.
+    pub(crate) fn check_place(&self, start: u64) -> Check<u64> {
+        let mut at = start.saturating_add(self.header_len());
+        for part in &self.parts {
+            ensure(part.offset == at, || format!("{} at byte {} instead of {at}", part.kind, part.offset))?;
+            at = at.saturating_add(part.stored_len.into());
+        }
+        Ok(align(at))
+    }
+}
+
+impl PartEntry {
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.put(&self.kind.code());
+        out.put_u16(0);
+        out.put_u32(self.stored_len);
+        out.put_u32(self.raw_len);
+        out.put_u32(0);
+        out.put_u64(self.offset);
+        out.put_u64(self.checksum);
+        out.put_u64(self.stats.count);
+        out.put_f64(self.stats.energy);
+        out.put_f64(self.stats.largest);
+    }
+
+    fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+        let code = fields.array()?;
+        let kind = PartKind::from_code(code).ok_or_else(|| format!("an unknown kind of part, {code:?}"))?;
+        fields.reserved::<2>()?;
+        let (stored_len, raw_len) = (fields.u32()?, fields.u32()?);
+        fields.reserved::<4>()?;
+        let (offset, checksum) = (fields.u64()?, fields.u64()?);
+        let stats = PartStats { count: fields.u64()?, energy: fields.f64()?, largest: fields.f64()? };
+        Ok(Self { kind, stats, offset, stored_len, raw_len, checksum })
+    }
+
+    fn check(&self) -> Check {
+        let PartStats { count, energy, largest } = self.stats;
+        let sane = count > 0 && is_amount(energy) && finite_amount(largest);
+        ensure(sane, || format!("{}: count, energy or largest coefficient out of range", self.kind))?;
+        let sized = self.stored_len > 0 && self.raw_len > 0 && u64::from(self.raw_len) <= MAX_PART_RAW;
+        ensure(sized, || format!("{}: a length out of range", self.kind))
+    }
+}
+
+/// Not negative and not NaN: a sum of squares, which may overflow.
+pub(crate) fn is_amount(value: f64) -> bool {
+    value >= 0.0
+}
+
+/// Finite and not negative.
+pub(crate) fn finite_amount(value: f64) -> bool {
+    value >= 0.0 && value.is_finite()
+}
+
+/// Finite and in order, or the empty range: infinity to minus infinity.
+pub(crate) fn is_range(min: f64, max: f64) -> bool {
+    min.is_finite() && max.is_finite() && min <= max || min == f64::INFINITY && max == f64::NEG_INFINITY
+}

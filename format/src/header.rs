@@ -1,0 +1,151 @@
+//! The fixed header: what the file is, which version and features it needs, and whose parts belong to it.
+
+use crate::bytes::{Check, Fields, Put};
+use crate::{Error, Result};
+use std::fmt;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// Bytes of the header.
+pub(crate) const HEADER: usize = 128;
+
+/// The first bytes of every file: a high bit, a name, both line ends and an end-of-file sign, as in PNG.
+pub(crate) const MAGIC: [u8; 8] = [0x89, b'W', b'S', b'P', 0x0D, 0x0A, 0x1A, 0x0A];
+
+/// The version that this package writes.
+pub(crate) const VERSION: (u16, u16) = (1, 0);
+
+/// The features that a reader must know, by bit; none yet.
+const REQUIRED: [&str; 0] = [];
+
+/// A file's identity, derived from settings and data by whoever writes it; every checksum is tied to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FileId(pub [u8; 16]);
+
+impl fmt::Display for FileId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// The fields of a header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Header {
+    pub(crate) version: (u16, u16),
+    pub(crate) required: u64,
+    pub(crate) optional: u64,
+    pub(crate) id: FileId,
+}
+
+impl Header {
+    /// The header of a new file.
+    pub(crate) fn new(id: FileId) -> Self {
+        Self { version: VERSION, required: 0, optional: 0, id }
+    }
+
+    pub(crate) fn encode(&self) -> Vec<u8> {
+        let mut out = Vec::with_capacity(HEADER);
+        out.put(&MAGIC);
+        out.put_u16(self.version.0);
+        out.put_u16(self.version.1);
+        out.put_u32(0);
+        out.put_u64(self.required);
+        out.put_u64(self.optional);
+        out.put(&self.id.0);
+        out.put(&[0; 72]);
+        out.put_u64(xxh3_64(&out));
+        out
+    }
+
+    /// Trusts nothing: magic, checksum, version, features, reserved bytes, in this order.
+    pub(crate) fn decode(bytes: &[u8; HEADER]) -> Result<Self> {
+        check_magic(bytes)?;
+        let (header, reserved) = Self::parse(bytes).map_err(damaged)?;
+        header.check_supported()?;
+        reserved.map_err(damaged)?;
+        Ok(header)
+    }
+
+    fn parse(bytes: &[u8; HEADER]) -> Check<(Self, Check)> {
+        let (fields, checksum) = bytes.split_at(HEADER - 8);
+        if Fields::new(checksum).u64()? != xxh3_64(fields) {
+            return Err("the checksum does not match".into());
+        }
+        let mut fields = Fields::new(fields);
+        fields.array::<8>()?;
+        let version = (fields.u16()?, fields.u16()?);
+        let first = fields.reserved::<4>();
+        let (required, optional) = (fields.u64()?, fields.u64()?);
+        let header = Self { version, required, optional, id: FileId(fields.array()?) };
+        Ok((header, first.and(fields.reserved::<72>())))
+    }
+
+    fn check_supported(&self) -> Result<()> {
+        let (major, minor) = self.version;
+        if major != VERSION.0 {
+            return Err(Error::Unsupported(format!("format version {major}.{minor}; this reader knows 1.x")));
+        }
+        match (0..64).find(|bit| self.required >> bit & 1 == 1 && REQUIRED.get(*bit).is_none()) {
+            Some(bit) => Err(Error::Unsupported(format!("required feature bit {bit}, unknown to this reader"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Names the usual reasons for a wrong magic.
+pub(crate) fn check_magic(start: &[u8]) -> Result<()> {
+    let start = &start[..start.len().min(8)];
+    if start == MAGIC {
+        return Ok(());
+    }
+    let why = match start {
+        [] => "it is empty",
+        [0x09, b'W', b'S', b'P', ..] => "the high bits of its bytes were stripped by a transfer",
+        [0x89, b'W', b'S', b'P', 0x0A, ..] | [0x89, b'W', b'S', b'P', 0x0D, 0x0D, ..] => {
+            "its line ends were changed by a transfer as text"
+        }
+        _ if MAGIC.starts_with(start) => "it is cut within its first 8 bytes",
+        _ => "its first 8 bytes are another's",
+    };
+    Err(Error::Foreign(why.into()))
+}
+
+fn damaged(what: String) -> Error {
+    Error::Corrupt { offset: 0, place: "header".into(), what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decode(header: &Header) -> Result<Header> {
+        let bytes: [u8; HEADER] = header.encode().try_into().expect("128 bytes");
+        Header::decode(&bytes)
+    }
+
+    #[test]
+    fn versions_and_features_are_refused_by_name() {
+        let good = Header::new(FileId([7; 16]));
+        assert_eq!(decode(&good).expect("valid"), good);
+        let newer = decode(&Header { version: (2, 3), ..good.clone() });
+        assert!(matches!(newer, Err(Error::Unsupported(what)) if what.contains("2.3")));
+        let feature = decode(&Header { required: 1 << 41, ..good.clone() });
+        assert!(matches!(feature, Err(Error::Unsupported(what)) if what.contains("41")));
+        assert!(decode(&Header { version: (1, 9), optional: u64::MAX, ..good }).is_ok());
+    }
+
+    #[test]
+    fn reserved_bytes_must_be_zero() {
+        let mut bytes: [u8; HEADER] = Header::new(FileId([7; 16])).encode().try_into().expect("128 bytes");
+        bytes[60] = 1;
+        let checksum = xxh3_64(&bytes[..120]).to_le_bytes();
+        bytes[120..].copy_from_slice(&checksum);
+        assert!(matches!(Header::decode(&bytes), Err(Error::Corrupt { .. })));
+    }
+
+    #[test]
+    fn foreign_files_are_explained() {
+        for (start, word) in [(&b"\x09WSP"[..], "stripped"), (b"\x89WSP\n", "line ends"), (b"CDF\x01....", "another")] {
+            assert!(matches!(check_magic(start), Err(Error::Foreign(why)) if why.contains(word)));
+        }
+    }
+}

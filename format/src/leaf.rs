@@ -1,0 +1,200 @@
+//! The directory's two levels: leaves of up to 512 blocks, and the root that lists the leaves.
+
+use crate::block::{BlockId, PartKind};
+use crate::bytes::{Check, Fields, Put, ensure};
+use crate::directory::{BlockEntry, finite_amount, is_amount, is_range};
+use crate::header::HEADER;
+use crate::limits::{BLOCKS_PER_LEAF, align};
+use crate::metadata::Metadata;
+use crate::section::Extent;
+
+/// Bytes of a leaf's entry in the root.
+pub(crate) const LEAF_ENTRY: usize = 128;
+
+/// The fewest bytes of a block in a file, header and padding included.
+pub(crate) const MIN_BLOCK: u64 = 128;
+
+/// A leaf's line in the root: a run of consecutive blocks of one window and channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeafEntry {
+    /// Window of its blocks.
+    pub window: u32,
+    /// Its first block; a multiple of 512.
+    pub first_block: u32,
+    /// Channel of its blocks.
+    pub channel: u16,
+    /// Its blocks, 1 to 512.
+    pub count: u16,
+    /// Bytes of the compressed leaf after its frame.
+    pub stored_len: u32,
+    /// Bytes of the leaf once decompressed.
+    pub raw_len: u32,
+    /// Where its first block starts, absolute.
+    pub data_offset: u64,
+    /// Where the leaf's own frame starts, absolute, right after its blocks.
+    pub offset: u64,
+    /// Of the compressed leaf.
+    pub checksum: u64,
+    /// Smallest decoded finite sample; infinity when there is none.
+    pub min: f64,
+    /// Largest decoded finite sample; minus infinity when there is none.
+    pub max: f64,
+    /// Largest error of a sample.
+    pub reached: f64,
+    /// Sum of the squared errors of the samples.
+    pub squared_error: f64,
+    /// Energy of the stored coefficients.
+    pub energy: f64,
+    /// Energy dropped or lost by quantisation, in coefficients.
+    pub dropped: f64,
+    /// Nonzero coefficients.
+    pub coded: u64,
+    /// Samples stored as outliers.
+    pub outliers: u64,
+    /// Samples stored as missing.
+    pub missing: u64,
+    /// Blocks stored exactly.
+    pub exact: u32,
+}
+
+impl LeafEntry {
+    /// A leaf without blocks, whose first will be `id` at `data_offset`.
+    pub(crate) fn new(id: BlockId, data_offset: u64) -> Self {
+        let BlockId { window, block: first_block, channel } = id;
+        let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (count, stored_len, raw_len, offset, checksum) = (0, 0, 0, 0, 0);
+        let (reached, squared_error, energy, dropped) = (0.0, 0.0, 0.0, 0.0);
+        let (coded, outliers, missing, exact) = (0, 0, 0, 0);
+        #[rustfmt::skip]
+        let leaf = Self {
+            window, first_block, channel, count, stored_len, raw_len, data_offset, offset, checksum,
+            min, max, reached, squared_error, energy, dropped, coded, outliers, missing, exact,
+        };
+        leaf
+    }
+
+    /// Its first block.
+    pub fn first(&self) -> BlockId {
+        BlockId { window: self.window, block: self.first_block, channel: self.channel }
+    }
+
+    /// Adds a block's numbers. Sums run in the order of the blocks, so writer and reader get the same bits.
+    pub(crate) fn add(&mut self, block: &BlockEntry) {
+        self.count = self.count.saturating_add(1);
+        self.min = self.min.min(block.stats.min);
+        self.max = self.max.max(block.stats.max);
+        self.reached = self.reached.max(block.stats.reached);
+        self.squared_error += block.stats.squared_error;
+        self.dropped += block.stats.dropped;
+        self.exact += u32::from(block.is_exact());
+        for part in &block.parts {
+            let sum = match part.kind {
+                PartKind::Level(_) => &mut self.coded,
+                PartKind::Outliers => &mut self.outliers,
+                PartKind::Missing => &mut self.missing,
+                PartKind::Exact => continue,
+            };
+            *sum = sum.saturating_add(part.stats.count);
+            self.energy += if matches!(part.kind, PartKind::Level(_)) { part.stats.energy } else { 0.0 };
+        }
+    }
+
+    pub(crate) fn extent(&self) -> Extent {
+        let Self { offset, stored_len, raw_len, checksum, .. } = *self;
+        Extent { offset, stored_len, raw_len, checksum }
+    }
+
+    pub(crate) fn set_extent(&mut self, extent: &Extent) {
+        (self.offset, self.checksum) = (extent.offset, extent.checksum);
+        (self.stored_len, self.raw_len) = (extent.stored_len, extent.raw_len);
+    }
+
+    pub(crate) fn encode(&self, out: &mut Vec<u8>) {
+        out.put_u32(self.window);
+        out.put_u32(self.first_block);
+        out.put_u16(self.channel);
+        out.put_u16(self.count);
+        out.put_u32(self.stored_len);
+        out.put_u32(self.raw_len);
+        out.put_u32(self.exact);
+        out.put_u64(self.data_offset);
+        out.put_u64(self.offset);
+        out.put_u64(self.checksum);
+        let floats = [self.min, self.max, self.reached, self.squared_error, self.energy, self.dropped];
+        floats.into_iter().for_each(|value| out.put_f64(value));
+        [self.coded, self.outliers, self.missing, 0].into_iter().for_each(|value| out.put_u64(value));
+    }
+
+    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+        let leaf = Self {
+            window: fields.u32()?,
+            first_block: fields.u32()?,
+            channel: fields.u16()?,
+            count: fields.u16()?,
+            stored_len: fields.u32()?,
+            raw_len: fields.u32()?,
+            exact: fields.u32()?,
+            data_offset: fields.u64()?,
+            offset: fields.u64()?,
+            checksum: fields.u64()?,
+            min: fields.f64()?,
+            max: fields.f64()?,
+            reached: fields.f64()?,
+            squared_error: fields.f64()?,
+            energy: fields.f64()?,
+            dropped: fields.f64()?,
+            coded: fields.u64()?,
+            outliers: fields.u64()?,
+            missing: fields.u64()?,
+        };
+        fields.reserved::<8>()?;
+        Ok(leaf)
+    }
+
+    /// What must be true of any leaf that follows the byte `end`; the first byte after it.
+    fn check(&self, end: u64) -> Check<u64> {
+        let first = self.first();
+        let place = |what: &str| format!("leaf of {first}: {what}");
+        ensure(self.data_offset == align(end), || place("its blocks do not follow what is before"))?;
+        let least = self.data_offset.saturating_add(MIN_BLOCK * u64::from(self.count));
+        ensure(self.offset == align(self.offset) && self.offset >= least, || place("a misplaced offset"))?;
+        let sums = [self.squared_error, self.energy, self.dropped].into_iter().all(is_amount);
+        ensure(sums && finite_amount(self.reached), || place("an error or energy out of range"))?;
+        ensure(is_range(self.min, self.max), || place("a value range out of order"))?;
+        Ok(self.extent().end())
+    }
+}
+
+/// The blocks of every leaf that the metadata calls for, in order: the first and how many.
+fn expected(metadata: &Metadata) -> impl Iterator<Item = (BlockId, u32)> {
+    let (windows, channels) = (metadata.windows.len() as u32, metadata.channels);
+    let blocks = metadata.blocks_per_channel();
+    let runs = move || (0..blocks).step_by(BLOCKS_PER_LEAF as usize);
+    (0..windows)
+        .flat_map(move |window| (0..channels).map(move |channel| (window, channel)))
+        .flat_map(move |(window, channel)| runs().map(move |block| BlockId { window, block, channel }))
+        .map(move |id| (id, BLOCKS_PER_LEAF.min(blocks - id.block)))
+}
+
+/// Whether these are all leaves of the metadata, one after another from the header on; where the last one ends.
+pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u64> {
+    let count = metadata.leaves_per_window() * metadata.windows.len() as u64;
+    ensure(leaves.len() as u64 == count, || format!("{} leaves instead of {count}", leaves.len()))?;
+    let mut end = HEADER as u64;
+    for ((id, count), leaf) in expected(metadata).zip(leaves) {
+        let same = leaf.first() == id && u32::from(leaf.count) == count;
+        ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;
+        end = leaf.check(end)?;
+    }
+    let per_window = leaves.chunks((metadata.leaves_per_window() as usize).max(1));
+    metadata.windows.iter().zip(per_window).enumerate().try_for_each(|(number, (window, leaves))| {
+        let sum = |of: fn(&LeafEntry) -> u64| leaves.iter().fold(0u64, |sum, leaf| sum.saturating_add(of(leaf)));
+        let same = sum(|l| l.coded) == window.coded && sum(|l| l.outliers) == window.outliers;
+        ensure(same, || format!("window {number}: coefficients or outliers differ from the metadata"))?;
+        let reached = leaves.iter().all(|leaf| leaf.reached <= window.reached);
+        ensure(reached && sum(|l| l.missing) <= window.missing, || {
+            format!("window {number}: error or missing samples differ from the metadata")
+        })
+    })?;
+    Ok(end)
+}

@@ -1,0 +1,42 @@
+//! Every maximum of the format, with its reason. A reader refuses what is over them; a writer never writes it.
+
+/// Every block and section starts at a multiple of this many bytes: a cache line.
+pub const ALIGN: u64 = 64;
+
+/// Blocks in one leaf of the directory: a leaf stays near 200 KiB raw, and a million blocks have 2 000 leaves.
+pub const BLOCKS_PER_LEAF: u32 = 512;
+
+/// Samples, and also coefficients, of one block (64^3 voxels by 32 frames): bounds the memory of a decoder.
+pub const MAX_BLOCK_SAMPLES: u64 = 1 << 23;
+
+/// Bytes of one part before compression: every sample of the largest block an outlier of 4 + 8 bytes.
+pub const MAX_PART_RAW: u64 = 12 * MAX_BLOCK_SAMPLES;
+
+/// Groups of temporal levels in a window: more would be smaller than their directory entries.
+pub const MAX_LEVELS: usize = 32;
+
+/// Parts of one block: every level, outliers, missing samples, exact samples.
+pub const MAX_PARTS: usize = MAX_LEVELS + 3;
+
+/// Frames in one window: a block of one voxel row still fits [`MAX_BLOCK_SAMPLES`].
+pub const MAX_WINDOW_FRAMES: u32 = 4096;
+
+/// Coefficients of one voxel in one window: a redundant basis has at most a few per frame.
+pub const MAX_COEFFICIENTS: u32 = 4 * MAX_WINDOW_FRAMES;
+
+/// Voxels along one axis: positions fit 32 bits with room to add.
+pub const MAX_DIM: u64 = 1 << 31;
+
+/// Frames of an archive: a frame number is exact as a 64-bit float.
+pub const MAX_FRAMES: u64 = 1 << 53;
+
+/// Bytes of the metadata record: room for two million time values, small enough to hold several times.
+pub const MAX_METADATA: usize = 16 << 20;
+
+/// Bytes of the root of the directory before compression: 8 million leaves.
+pub const MAX_ROOT_RAW: u64 = 1 << 30;
+
+/// Next multiple of [`ALIGN`], or the largest number where there is none.
+pub(crate) fn align(position: u64) -> u64 {
+    position.checked_next_multiple_of(ALIGN).unwrap_or(u64::MAX)
+}

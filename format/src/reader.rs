@@ -1,0 +1,265 @@
+//! Reads a file: opens it, finds blocks, copies out and decompresses parts. Nothing is trusted before it is checked:
+//! length, bounds, checksum, parse, decompress into the declared and capped size, exact length, meaning.
+
+use crate::block::{BlockId, PartKind};
+use crate::bytes::{Check, Fields, ensure};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
+use crate::footer::{FOOTER, Footer};
+use crate::geometry::BlockGeometry;
+use crate::header::{FileId, HEADER, Header, check_magic};
+use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_ROOT_RAW, align};
+use crate::metadata::Metadata;
+use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
+use crate::section::{FRAME, Owner, decompress, read, read_section};
+use crate::{Error, Result, Storage};
+
+/// An open file. Every method works from `&self`; threads may share it if the storage allows.
+#[derive(Debug)]
+pub struct Reader<S: Storage> {
+    storage: S,
+    pub(crate) footer: Footer,
+    metadata: Metadata,
+    leaves: Vec<LeafEntry>,
+}
+
+impl<S: Storage> Reader<S> {
+    /// Opens a file: checks and reads header, footer, metadata and the directory's root; no leaf and no block.
+    pub fn open(storage: S) -> Result<Self> {
+        let id = read_header(&storage)?.id;
+        let footer = read_footer(&storage, id)?;
+        let metadata = read_metadata(&storage, &footer)?;
+        let leaves = read_root(&storage, &footer, &metadata)?;
+        Ok(Self { storage, footer, metadata, leaves })
+    }
+
+    /// Everything about the archive but its samples.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// The file's identity.
+    pub fn id(&self) -> FileId {
+        self.footer.id
+    }
+
+    /// Where the bytes are.
+    pub fn storage(&self) -> &S {
+        &self.storage
+    }
+
+    /// The directory's leaves of a window, by channel and block; empty for a window that the archive lacks.
+    pub fn leaves(&self, window: u32) -> &[LeafEntry] {
+        let count = self.metadata.leaves_per_window() as usize;
+        let start = count.saturating_mul(window as usize);
+        start.checked_add(count).and_then(|end| self.leaves.get(start..end)).unwrap_or(&[])
+    }
+
+    /// The entries of a leaf's blocks, in order.
+    pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
+        let owner = Owner::Leaf(leaf.first());
+        let most = usize::from(leaf.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS);
+        if leaf.raw_len as usize > most {
+            return Err(owner.corrupt(leaf.offset, format!("{} bytes, at most {most}", leaf.raw_len)));
+        }
+        let stored = read_section(&self.storage, self.id(), owner, &leaf.extent())?;
+        let entries = decompress(&stored, leaf.raw_len).and_then(|raw| self.parse_leaf(leaf, &raw));
+        entries.map_err(|what| owner.corrupt(leaf.offset, what))
+    }
+
+    fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> Check<Vec<BlockEntry>> {
+        let mut fields = Fields::new(raw);
+        let mut entries = Vec::with_capacity(usize::from(leaf.count).min(raw.len() / BLOCK_ENTRY));
+        let (mut sums, mut at) = (LeafEntry::new(leaf.first(), leaf.data_offset), leaf.data_offset);
+        for block in (leaf.first_block..).take(leaf.count.into()) {
+            let entry = BlockEntry::decode(&mut fields)?;
+            let id = BlockId { block, ..leaf.first() };
+            ensure(entry.id == id, || format!("{} where {id} belongs", entry.id))?;
+            at = self
+                .check_entry(&entry)
+                .and_then(|()| entry.check_place(at))
+                .map_err(|what| format!("{id}: {what}"))?;
+            sums.add(&entry);
+            entries.push(entry);
+        }
+        fields.end()?;
+        ensure(at == leaf.offset, || format!("blocks end at byte {at}"))?;
+        sums.set_extent(&leaf.extent());
+        ensure(sums == *leaf, || "its sums differ from the directory's root".into())?;
+        Ok(entries)
+    }
+
+    fn check_entry(&self, entry: &BlockEntry) -> Check {
+        let geometry = self.metadata.geometry(entry.id).ok_or("no such block")?;
+        entry.check()?;
+        entry.parts.iter().try_for_each(|part| geometry.check(part))
+    }
+
+    /// A block's entry; reads one leaf. [`Error::Invalid`] for a block that the archive lacks.
+    pub fn entry(&self, id: BlockId) -> Result<BlockEntry> {
+        self.geometry(id)?;
+        let per_channel = self.metadata.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF) as usize;
+        let number = per_channel * usize::from(id.channel) + (id.block / BLOCKS_PER_LEAF) as usize;
+        let found = self.leaves(id.window).get(number).map(|leaf| self.leaf(leaf)).transpose()?;
+        let entry = found.and_then(|entries| entries.into_iter().nth((id.block % BLOCKS_PER_LEAF) as usize));
+        entry.ok_or_else(|| no_block(id))
+    }
+
+    /// The sizes of a block. [`Error::Invalid`] for a block that the archive lacks.
+    pub fn geometry(&self, id: BlockId) -> Result<BlockGeometry<'_>> {
+        self.metadata.geometry(id).ok_or_else(|| no_block(id))
+    }
+
+    /// The payload of a block's part: copied out, its checksum checked, then decompressed to exactly the length that
+    /// the entry declares and the geometry allows.
+    pub fn part(&self, block: &BlockEntry, part: &PartEntry) -> Result<Vec<u8>> {
+        let owner = Owner::Part(block.id, part.kind);
+        self.geometry(block.id)?.check(part).map_err(|what| owner.corrupt(part.offset, what))?;
+        let stored = read(&self.storage, owner, part.offset, part.stored_len.into())?;
+        if owner.checksum(self.id(), &stored) != part.checksum {
+            return Err(owner.corrupt(part.offset, "the checksum does not match"));
+        }
+        decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
+    }
+
+    /// The codes of a level, `codes[k * voxels + voxel]`, resized to fit; all zero where the block lacks the part.
+    /// [`Error::Invalid`] for a level that the window lacks.
+    pub fn codes(&self, block: &BlockEntry, level: u8, codes: &mut Vec<i32>) -> Result<()> {
+        let count = self.geometry(block.id)?.codes(level);
+        codes.clear();
+        codes.resize(count.ok_or_else(|| Error::Invalid(format!("{}: no level {level}", block.id)))?, 0);
+        let Some(part) = block.part(PartKind::Level(level)) else { return Ok(()) };
+        let raw = self.part(block, part)?;
+        unpacked(block, part, unpack_codes(&raw, codes), |&count| count).map(|_| ())
+    }
+
+    /// The outliers of a block; empty where it has none.
+    pub fn outliers(&self, block: &BlockEntry) -> Result<Outliers> {
+        let Some(part) = block.part(PartKind::Outliers) else { return Ok(Outliers::default()) };
+        let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
+        let outliers = unpack_outliers(&raw, geometry.sample_size, geometry.samples());
+        unpacked(block, part, outliers, |outliers| outliers.positions.len())
+    }
+
+    /// The mask of a block's missing samples (`frame * voxels + voxel`) and their bytes; none where it has none.
+    pub fn missing(&self, block: &BlockEntry) -> Result<Option<(Vec<bool>, Vec<u8>)>> {
+        let Some(part) = block.part(PartKind::Missing) else { return Ok(None) };
+        let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
+        let missing = unpack_missing(&raw, geometry.sample_size, geometry.samples());
+        unpacked(block, part, missing, |(_, bytes)| bytes.len() / geometry.sample_size).map(Some)
+    }
+
+    /// The little-endian bytes of every sample of a block (`frame * voxels + voxel`); none where it is not exact.
+    pub fn exact(&self, block: &BlockEntry) -> Result<Option<Vec<u8>>> {
+        let Some(part) = block.part(PartKind::Exact) else { return Ok(None) };
+        let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
+        let samples = unpack_exact(&raw, geometry.sample_size, geometry.samples());
+        unpacked(block, part, samples, |bytes| bytes.len() / geometry.sample_size).map(Some)
+    }
+
+    /// Reads and unpacks every part of a block, for its errors alone.
+    pub fn check_parts(&self, block: &BlockEntry) -> Result<()> {
+        let mut codes = Vec::new();
+        for part in &block.parts {
+            match part.kind {
+                PartKind::Level(level) => self.codes(block, level, &mut codes)?,
+                PartKind::Outliers => self.outliers(block).map(drop)?,
+                PartKind::Missing => self.missing(block).map(drop)?,
+                PartKind::Exact => self.exact(block).map(drop)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a payload held, if it could be unpacked and holds as many things as its entry says.
+fn unpacked<T>(block: &BlockEntry, part: &PartEntry, payload: Check<T>, count: impl Fn(&T) -> usize) -> Result<T> {
+    let checked = payload.and_then(|payload| {
+        let (held, said) = (count(&payload) as u64, part.stats.count);
+        ensure(held == said, || format!("holds {held}, its entry says {said}")).map(|()| payload)
+    });
+    checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+}
+
+fn no_block(id: BlockId) -> Error {
+    Error::Invalid(format!("{id}: the archive has no such block"))
+}
+
+fn read_header(storage: &impl Storage) -> Result<Header> {
+    let mut bytes = [0; HEADER];
+    let present = storage.len().min(HEADER as u64) as usize;
+    storage.read_at(0, &mut bytes[..present])?;
+    check_magic(&bytes[..present])?;
+    if present < HEADER {
+        let what = format!("cut short: {} bytes of it are missing, and all that follows", HEADER - present);
+        return Err(Error::Corrupt { offset: present as u64, place: "header".into(), what });
+    }
+    Header::decode(&bytes)
+}
+
+fn read_footer(storage: &impl Storage, id: FileId) -> Result<Footer> {
+    let (len, size) = (storage.len(), FOOTER as u64);
+    let corrupt = |what: String| Error::Corrupt { offset: len.saturating_sub(size), place: "footer".into(), what };
+    let offset = len.checked_sub(size).filter(|&offset| offset >= HEADER as u64);
+    let offset = offset.ok_or_else(|| corrupt("missing: the file is cut short, or was never finished".into()))?;
+    let footer = footer_at(storage, offset)?.map_err(|what| corrupt(explain(storage, what)))?;
+    ensure(footer.id == id, || "belongs to another file".into()).map_err(corrupt)?;
+    let total = footer.total;
+    ensure(total <= len, || format!("the file is {} bytes too short: {len} of {total}", total - len))
+        .map_err(corrupt)?;
+    ensure(total == len, || format!("the file is {} bytes too long: {len} not {total}", len - total))
+        .map_err(corrupt)?;
+    Ok(footer)
+}
+
+fn footer_at(storage: &impl Storage, offset: u64) -> Result<Check<Footer>> {
+    let mut bytes = [0; FOOTER];
+    storage.read_at(offset, &mut bytes)?;
+    Ok(Footer::decode(&bytes))
+}
+
+/// Adds to the reason why there is no footer that one is there a little earlier, if so.
+fn explain(storage: &impl Storage, what: String) -> String {
+    let len = storage.len();
+    let earlier = (1..=4096).map_while(|extra| len.checked_sub(extra)).filter(|end| end.is_multiple_of(64));
+    let ends = |end: &u64| {
+        let footer = end.checked_sub(FOOTER as u64).and_then(|offset| footer_at(storage, offset).ok()?.ok());
+        footer.is_some_and(|footer| footer.total == *end)
+    };
+    match earlier.into_iter().find(ends) {
+        Some(end) => format!("the file is {} bytes too long: {len} not {end}", len - end),
+        None => what,
+    }
+}
+
+fn read_metadata(storage: &impl Storage, footer: &Footer) -> Result<Metadata> {
+    let (extent, owner) = (footer.metadata, Owner::Metadata);
+    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let sized = extent.stored_len == extent.raw_len && extent.raw_len as usize <= MAX_METADATA;
+    ensure(sized, || format!("{} bytes, at most {MAX_METADATA}", extent.raw_len)).map_err(corrupt)?;
+    let placed = align(extent.end()) == footer.root.offset
+        && align(footer.root.end()).checked_add(FOOTER as u64) == Some(footer.total);
+    ensure(placed, || "metadata, root and footer do not follow each other".into()).map_err(corrupt)?;
+    let record = read_section(storage, footer.id, owner, &extent)?;
+    Metadata::parse(&record).map_err(|what| owner.corrupt(extent.offset + FRAME as u64, what))
+}
+
+fn read_root(storage: &impl Storage, footer: &Footer, metadata: &Metadata) -> Result<Vec<LeafEntry>> {
+    let (extent, owner) = (footer.root, Owner::Root);
+    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let blocks = metadata.blocks();
+    let counted = footer.blocks == blocks && blocks.checked_mul(MIN_BLOCK).is_some_and(|bytes| bytes <= footer.total);
+    ensure(counted, || format!("{blocks} blocks by the metadata, {} in the footer", footer.blocks)).map_err(corrupt)?;
+    let size = footer.leaves.checked_mul(LEAF_ENTRY as u64).filter(|&size| size <= MAX_ROOT_RAW);
+    let sized = size == Some(extent.raw_len.into()) && footer.leaves <= blocks;
+    ensure(sized, || format!("{} bytes for {} leaves", extent.raw_len, footer.leaves)).map_err(corrupt)?;
+    let stored = read_section(storage, footer.id, owner, &extent)?;
+    let raw = decompress(&stored, extent.raw_len).map_err(corrupt)?;
+    let leaves: Check<Vec<_>> =
+        raw.chunks(LEAF_ENTRY).map(|entry| LeafEntry::decode(&mut Fields::new(entry))).collect();
+    let leaves = leaves.map_err(corrupt)?;
+    let end = check_leaves(metadata, &leaves).map_err(corrupt)?;
+    let follows = align(end) == footer.metadata.offset;
+    ensure(follows, || format!("leaves end at byte {end}, the metadata is elsewhere")).map_err(corrupt)?;
+    Ok(leaves)
+}

@@ -1,0 +1,154 @@
+//! Framed sections and checksums: every structure but the parts' payloads is a frame of 24 bytes and its content.
+
+use crate::block::{BlockId, PartKind};
+use crate::bytes::{Check, Put, ensure};
+use crate::header::FileId;
+use crate::{Error, Result, Storage};
+use std::fmt;
+use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
+use zstd::zstd_safe;
+
+/// Bytes of a section's frame.
+pub(crate) const FRAME: usize = 24;
+
+/// The zstd level of the directory: fast, and the directory is small.
+const DIRECTORY_LEVEL: i32 = 3;
+
+/// Where a section is and what its stored bytes must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Extent {
+    /// Of the frame, absolute.
+    pub(crate) offset: u64,
+    /// Bytes after the frame.
+    pub(crate) stored_len: u32,
+    /// Bytes of the content once decompressed.
+    pub(crate) raw_len: u32,
+    /// Over the stored bytes.
+    pub(crate) checksum: u64,
+}
+
+impl Extent {
+    /// The first byte after the section, or the largest number where it would be beyond.
+    pub(crate) fn end(&self) -> u64 {
+        self.offset.saturating_add(FRAME as u64 + u64::from(self.stored_len))
+    }
+}
+
+/// Whose bytes are checksummed: seeds the checksum, so that bytes of another owner fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Owner {
+    Part(BlockId, PartKind),
+    Block(BlockId),
+    Leaf(BlockId),
+    Metadata,
+    Root,
+}
+
+impl Owner {
+    /// Block, kind and level in the seed.
+    fn identity(self) -> (BlockId, [u8; 2]) {
+        let none = BlockId { window: 0, block: 0, channel: 0 };
+        match self {
+            Self::Part(id, kind) => (id, kind.code()),
+            Self::Block(id) => (id, [16, 0]),
+            Self::Leaf(id) => (id, [17, 0]),
+            Self::Metadata => (none, [18, 0]),
+            Self::Root => (none, [19, 0]),
+        }
+    }
+
+    /// The first bytes of the section; a part has none.
+    fn tag(self) -> [u8; 4] {
+        match self {
+            Self::Part(..) => [0; 4],
+            Self::Block(_) => *b"BLCK",
+            Self::Leaf(_) => *b"LEAF",
+            Self::Metadata => *b"META",
+            Self::Root => *b"ROOT",
+        }
+    }
+
+    /// The checksum of this owner's stored bytes in the file `file`.
+    pub(crate) fn checksum(self, file: FileId, stored: &[u8]) -> u64 {
+        let (id, kind) = self.identity();
+        let mut seed = Vec::with_capacity(28);
+        seed.put(&file.0);
+        seed.put_u32(id.window);
+        seed.put_u32(id.block);
+        seed.put_u16(id.channel);
+        seed.put(&kind);
+        xxh3_64_with_seed(stored, xxh3_64(&seed))
+    }
+
+    /// An error at `offset` in this owner's bytes.
+    pub(crate) fn corrupt(self, offset: u64, what: impl Into<String>) -> Error {
+        Error::Corrupt { offset, place: self.to_string(), what: what.into() }
+    }
+}
+
+impl fmt::Display for Owner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Part(id, kind) => write!(f, "{id} {kind}"),
+            Self::Block(id) => write!(f, "{id} header"),
+            Self::Leaf(id) => write!(f, "directory leaf of {id}"),
+            Self::Metadata => f.write_str("metadata"),
+            Self::Root => f.write_str("directory root"),
+        }
+    }
+}
+
+/// The frame of `owner`'s section.
+pub(crate) fn frame(owner: Owner, extent: &Extent) -> Vec<u8> {
+    let mut out = Vec::with_capacity(FRAME);
+    out.put(&owner.tag());
+    out.put_u32(extent.stored_len);
+    out.put_u32(extent.raw_len);
+    out.put_u32(0);
+    out.put_u64(extent.checksum);
+    out
+}
+
+/// Copies out `len` bytes at `offset`, after checking that they are there.
+pub(crate) fn read(storage: &impl Storage, owner: Owner, offset: u64, len: u64) -> Result<Vec<u8>> {
+    let inside = offset.checked_add(len).is_some_and(|end| end <= storage.len());
+    let size = usize::try_from(len).ok().filter(|_| inside);
+    let Some(size) = size else {
+        return Err(owner.corrupt(offset, format!("{len} bytes reach beyond the file's {}", storage.len())));
+    };
+    let mut out = vec![0; size];
+    storage.read_at(offset, &mut out)?;
+    Ok(out)
+}
+
+/// The stored bytes of a section whose frame and checksum are right.
+pub(crate) fn read_section(storage: &impl Storage, file: FileId, owner: Owner, extent: &Extent) -> Result<Vec<u8>> {
+    let mut bytes = read(storage, owner, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
+    if !bytes.starts_with(&frame(owner, extent)) {
+        return Err(owner.corrupt(extent.offset, "the section's frame differs from what points to it"));
+    }
+    bytes.drain(..FRAME);
+    if owner.checksum(file, &bytes) != extent.checksum {
+        return Err(owner.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
+    }
+    Ok(bytes)
+}
+
+/// One zstd frame of the directory's `raw` bytes.
+pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
+    let mut compressor = zstd::bulk::Compressor::new(DIRECTORY_LEVEL)?;
+    compressor.include_checksum(true)?;
+    Ok(compressor.compress(raw)?)
+}
+
+/// Exactly `raw_len` bytes from exactly one zstd frame that declares them. The caller has capped `raw_len`.
+pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> Check<Vec<u8>> {
+    let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
+    ensure(whole, || "not one whole zstd frame".into())?;
+    ensure(stored.get(4).is_some_and(|descriptor| descriptor & 4 != 0), || "the zstd frame has no checksum".into())?;
+    let declared = zstd_safe::get_frame_content_size(stored).ok().flatten();
+    ensure(declared == Some(u64::from(raw_len)), || format!("the zstd frame does not declare {raw_len} bytes"))?;
+    let raw = zstd::bulk::decompress(stored, raw_len as usize).map_err(|e| format!("zstd: {e}"))?;
+    ensure(raw.len() == raw_len as usize, || format!("{} bytes decompressed instead of {raw_len}", raw.len()))?;
+    Ok(raw)
+}

@@ -1,0 +1,194 @@
+//! Small files for the tests, from seeded pseudo-random blocks.
+
+use crate::*;
+
+/// xorshift64.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+pub(crate) const ID: FileId = FileId([0xA5; 16]);
+
+/// 5 x 4 x 3 voxels in blocks of 2^3 (12 boxes, some clipped), 2 channels, windows of 4 and 3 frames.
+pub(crate) fn metadata() -> Metadata {
+    let window = |first_frame, frames, basis, levels: &[u32]| Window {
+        first_frame,
+        frames,
+        basis,
+        coefficients: levels.iter().sum(),
+        levels: levels.to_vec(),
+        delta: 0.5,
+        reached: 0.25,
+        squared_error: 1.5,
+        min: -4.0,
+        max: 9.0,
+        missing: 0,
+        coded: 0,
+        outliers: 0,
+    };
+    Metadata {
+        dims: [5, 4, 3],
+        spacing: [1.0, 0.5, 2.0],
+        origin: [0.0, -1.0, 10.0],
+        sample: SampleType::I16,
+        block_edge: 2,
+        channels: 2,
+        frames: 7,
+        times: Vec::new(),
+        variable: Some("density".into()),
+        bound: Bound::Pointwise,
+        tolerance: 0.01,
+        range: (-4.0, 9.0),
+        missing_value: Some(-999.0),
+        windows: vec![window(0, 4, Basis::Haar, &[1, 1, 2]), window(4, 3, Basis::Multi, &[2, 3])],
+        settings: vec![("basis".into(), "haar".into())],
+        program: "wavesplat 0.1.0".into(),
+    }
+}
+
+/// A file of one channel, one window and one box of 2 x 1 x 1 voxels.
+pub(crate) fn tiny() -> Metadata {
+    let mut metadata = Metadata { dims: [2, 1, 1], channels: 1, frames: 4, ..metadata() };
+    metadata.windows.truncate(1);
+    metadata
+}
+
+/// What a block holds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Content {
+    pub(crate) levels: Vec<Vec<i32>>,
+    pub(crate) outliers: Outliers,
+    pub(crate) missing: Option<(Vec<bool>, Vec<u8>)>,
+    pub(crate) exact: Option<Vec<u8>>,
+}
+
+fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
+    let (total, size) = (geometry.samples(), geometry.sample_size);
+    let mut bytes = Random(random.below(u64::MAX) | 1);
+    let mut bytes = |count: usize| -> Vec<u8> { (0..count * size).map(|_| bytes.below(256) as u8).collect() };
+    let mut found = Content::default();
+    if random.below(4) == 0 {
+        found.missing = Some((0..total).map(|i| i % 3 == 0).collect()).map(|mask| (mask, bytes(total.div_ceil(3))));
+    }
+    let exact = random.below(5) == 0;
+    let scale = if exact { 1 } else { [1, 5, 9_000, 100_000_000][random.below(4) as usize] };
+    let mut code = || (random.below(scale) as i32).wrapping_sub(scale as i32 / 2);
+    let codes = |level: u8| (0..geometry.codes(level).unwrap_or(0)).map(|_| code()).collect();
+    found.levels = (0..geometry.levels.len() as u8).map(codes).collect();
+    if exact {
+        found.exact = Some(bytes(total));
+    } else if random.below(2) == 0 {
+        let positions: Vec<u32> = (0..total as u32).step_by(3).collect();
+        found.outliers = Outliers { samples: bytes(positions.len()), positions };
+    }
+    found
+}
+
+/// Packs and compresses a block's content.
+pub(crate) fn encode(id: BlockId, content: &Content, size: usize, compressor: &mut Compressor) -> EncodedBlock {
+    let mut parts = Vec::new();
+    let mut part = |kind, count: usize, energy: f64, largest: f64, raw: &[u8]| {
+        let stats = PartStats { count: count as u64, energy, largest };
+        parts.push(compressor.part(kind, stats, raw).expect("fits"));
+    };
+    for (level, codes) in (0..).zip(&content.levels) {
+        let square = |&code: &i32| f64::from(code).powi(2);
+        let largest = codes.iter().map(|&code| f64::from(code).abs()).fold(0.0, f64::max);
+        let mut raw = Vec::new();
+        pack_codes(codes, &mut raw);
+        let count = codes.iter().filter(|&&code| code != 0).count();
+        if count > 0 {
+            part(PartKind::Level(level), count, codes.iter().map(square).sum(), largest, &raw);
+        }
+    }
+    if !content.outliers.positions.is_empty() {
+        let mut raw = Vec::new();
+        pack_outliers(&content.outliers, size, &mut raw);
+        part(PartKind::Outliers, content.outliers.positions.len(), 0.0, 0.0, &raw);
+    }
+    if let Some((mask, samples)) = &content.missing {
+        let mut raw = Vec::new();
+        pack_missing(mask, samples, size, &mut raw);
+        part(PartKind::Missing, samples.len() / size, 0.0, 0.0, &raw);
+    }
+    if let Some(samples) = &content.exact {
+        let mut raw = Vec::new();
+        pack_exact(samples, size, &mut raw);
+        part(PartKind::Exact, samples.len() / size, 0.0, 0.0, &raw);
+    }
+    let stats = BlockStats { step: 0.5, min: -1.0, max: 2.0, reached: 0.125, squared_error: 0.5, dropped: 0.25 };
+    EncodedBlock { id, stats, parts }
+}
+
+/// Every block of an archive with its content; the windows' counts in the metadata are set to fit.
+pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, Content)> {
+    let (mut random, mut compressor) = (Random(seed), Compressor::new(3).expect("level 3"));
+    let mut found = Vec::new();
+    for window in 0..metadata.windows.len() as u32 {
+        for channel in 0..metadata.channels {
+            for block in 0..metadata.blocks_per_channel() {
+                let id = BlockId { window, block, channel };
+                let content = content(&metadata.geometry(id).expect("in the archive"), &mut random);
+                found.push((encode(id, &content, metadata.sample.size(), &mut compressor), content));
+            }
+        }
+    }
+    count(metadata, &found);
+    found
+}
+
+fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)]) {
+    for (block, _) in blocks {
+        let window = &mut metadata.windows[block.id.window as usize];
+        for part in &block.parts {
+            match part.kind {
+                PartKind::Level(_) => window.coded += part.stats.count,
+                PartKind::Outliers => window.outliers += part.stats.count,
+                PartKind::Missing => window.missing += part.stats.count,
+                PartKind::Exact => {}
+            }
+        }
+    }
+}
+
+/// The file of these blocks.
+pub(crate) fn file(metadata: &Metadata, blocks: &[(EncodedBlock, Content)]) -> Vec<u8> {
+    let mut writer = Writer::new(Vec::new(), ID).expect("memory");
+    blocks.iter().for_each(|(block, _)| writer.append(block).expect("in order"));
+    let (file, summary) = writer.finish(metadata).expect("complete");
+    assert_eq!((summary.bytes, summary.blocks), (file.len() as u64, blocks.len() as u64));
+    file
+}
+
+/// Opens a file and reads everything in it.
+pub(crate) fn verify(file: &[u8]) -> Result<Vec<(BlockId, Content)>> {
+    let reader = Reader::open(file)?;
+    reader.check_structure()?;
+    let mut found = Vec::new();
+    for window in 0..reader.metadata().windows.len() as u32 {
+        for leaf in reader.leaves(window) {
+            for block in reader.leaf(leaf)? {
+                reader.check_parts(&block)?;
+                found.push((block.id, read_content(&reader, &block)?));
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Content> {
+    let level = |level| {
+        let mut codes = Vec::new();
+        reader.codes(block, level, &mut codes).map(|()| codes)
+    };
+    let levels = (0..reader.geometry(block.id)?.levels.len() as u8).map(level).collect::<Result<_>>()?;
+    let (outliers, missing, exact) = (reader.outliers(block)?, reader.missing(block)?, reader.exact(block)?);
+    Ok(Content { levels, outliers, missing, exact })
+}

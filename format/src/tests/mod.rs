@@ -1,0 +1,6 @@
+//! Tests of whole files.
+
+mod exit;
+mod files;
+mod hostile;
+mod specification;
