@@ -1,0 +1,7 @@
+//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets.
+pub mod eddy;
+pub mod lattice;
+pub mod output;
+pub mod random;
+pub mod sheet;
+pub mod synth;

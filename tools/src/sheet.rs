@@ -1,0 +1,190 @@
+//! Pictures next to one another: contact sheets, a colour bar, differences, labels.
+
+use font8x8::legacy::BASIC_LEGACY;
+use std::io::Write;
+use wavesplat::error::{Error, Result};
+
+/// Red, green, blue.
+pub type Rgb = [u8; 3];
+
+/// Pixels of a letter's side at size 1.
+pub const LETTER: usize = 8;
+
+/// A picture; row 0 is at the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Row after row.
+    pub pixels: Vec<Rgb>,
+}
+
+impl Image {
+    /// A picture of what `colour(x, y)` says.
+    pub fn from_fn(width: usize, height: usize, colour: impl Fn(usize, usize) -> Rgb) -> Self {
+        let pixels = (0..width * height).map(|i| colour(i % width, i / width)).collect();
+        Self { width, height, pixels }
+    }
+
+    /// Sets a pixel; outside the picture nothing happens.
+    pub fn set(&mut self, x: usize, y: usize, colour: Rgb) {
+        if x < self.width && y < self.height {
+            self.pixels[y * self.width + x] = colour;
+        }
+    }
+
+    /// Copies a picture into this one with its upper left corner at (x, y); what does not fit is cut off.
+    pub fn paste(&mut self, picture: &Self, x: usize, y: usize) {
+        for (i, colour) in picture.pixels.iter().enumerate() {
+            self.set(x + i % picture.width, y + i / picture.width, *colour);
+        }
+    }
+
+    /// Writes ASCII text with its upper left corner at (x, y), a letter being `8 * size` pixels wide and high.
+    /// Other characters become question marks.
+    pub fn label(&mut self, text: &str, x: usize, y: usize, size: usize, colour: Rgb) {
+        for (i, letter) in text.chars().enumerate() {
+            self.letter(letter, x + i * LETTER * size, y, size, colour);
+        }
+    }
+
+    fn letter(&mut self, letter: char, x: usize, y: usize, size: usize, colour: Rgb) {
+        let rows = BASIC_LEGACY[if letter.is_ascii() { letter as usize } else { '?' as usize }];
+        for (v, u) in (0..LETTER * size).flat_map(|v| (0..LETTER * size).map(move |u| (v, u))) {
+            if rows[v / size] >> (u / size) & 1 == 1 {
+                self.set(x + u, y + v, colour);
+            }
+        }
+    }
+
+    /// Writes the picture as a PNG.
+    pub fn write_png(&self, to: impl Write) -> Result<()> {
+        let side = |n| u32::try_from(n).map_err(|_| Error::usage(format!("{n} pixels are too many for a PNG")));
+        let mut encoder = png::Encoder::new(to, side(self.width)?, side(self.height)?);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder.write_header().and_then(|mut writer| {
+            writer.write_image_data(self.pixels.as_flattened())?;
+            writer.finish()
+        });
+        written.map_err(|e| Error::io("PNG", "writing", std::io::Error::other(e)))
+    }
+}
+
+/// Pictures in rows of `columns`, with `gap` pixels between and around them.
+///
+/// # Panics
+/// If the pictures have different sizes, or `columns` is 0.
+pub fn contact_sheet(pictures: &[Image], columns: usize, gap: usize, background: Rgb) -> Image {
+    let (w, h) = pictures.first().map_or((0, 0), |p| (p.width, p.height));
+    assert!(pictures.iter().all(|p| (p.width, p.height) == (w, h)), "pictures of one size");
+    let (columns_used, rows) = (columns.min(pictures.len()), pictures.len().div_ceil(columns));
+    let mut sheet = Image::from_fn(gap + columns_used * (w + gap), gap + rows * (h + gap), |_, _| background);
+    for (i, picture) in pictures.iter().enumerate() {
+        sheet.paste(picture, gap + i % columns * (w + gap), gap + i / columns * (h + gap));
+    }
+    sheet
+}
+
+/// An upright bar with `colour(0)` at the bottom and `colour(1)` at the top.
+pub fn colour_bar(width: usize, height: usize, colour: impl Fn(f64) -> Rgb) -> Image {
+    let last = height.saturating_sub(1);
+    Image::from_fn(width, height, |_, y| colour((last - y) as f64 / last.max(1) as f64))
+}
+
+/// Blue for 0 through cyan, green and yellow to red for 1 and more: hue 240 to 0 degrees, full saturation and value.
+pub fn difference_colour(value: f64) -> Rgb {
+    let hue = 4.0 * (1.0 - value.clamp(0.0, 1.0)); // in sixths of the circle
+    let channel = |at: f64| {
+        let away = (hue - at).rem_euclid(6.0);
+        ((2.0 - away.min(6.0 - away)).clamp(0.0, 1.0) * 255.0).round() as u8
+    };
+    [channel(0.0), channel(2.0), channel(4.0)]
+}
+
+/// |a - b| / scale in [`difference_colour`], as one picture of `width` pixels a row for each `height` rows.
+///
+/// Where both have the background, NaN, it is black; where only one has it, the difference counts as 1.
+///
+/// # Panics
+/// If `a` and `b` differ in length or do not consist of whole pictures.
+pub fn difference_images(a: &[f32], b: &[f32], [width, height]: [usize; 2], scale: f64) -> Vec<Image> {
+    assert!(a.len() == b.len() && a.len().is_multiple_of(width * height), "two stacks of whole pictures");
+    let colours: Vec<Rgb> = a.iter().zip(b).map(|(a, b)| pixel_difference(*a, *b, scale)).collect();
+    let picture = |pixels: &[Rgb]| Image { width, height, pixels: pixels.to_vec() };
+    colours.chunks_exact(width * height).map(picture).collect()
+}
+
+fn pixel_difference(a: f32, b: f32, scale: f64) -> Rgb {
+    match (a.is_nan(), b.is_nan()) {
+        (true, true) => [0; 3],
+        (false, false) if a == b => difference_colour(0.0),
+        (false, false) => difference_colour((f64::from(a) - f64::from(b)).abs() / scale),
+        _ => difference_colour(1.0),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const RED: Rgb = [255, 0, 0];
+    const BLUE: Rgb = [0, 0, 255];
+
+    fn plain(colour: Rgb) -> Image {
+        Image::from_fn(4, 3, |_, _| colour)
+    }
+
+    fn pixel(image: &Image, x: usize, y: usize) -> Rgb {
+        image.pixels[y * image.width + x]
+    }
+
+    #[test]
+    fn sheets_have_their_pictures_in_rows_and_columns() {
+        let sheet = contact_sheet(&[plain(RED), plain(BLUE), plain([9; 3])], 2, 1, [7; 3]);
+        assert_eq!((sheet.width, sheet.height), (11, 9));
+        assert_eq!((pixel(&sheet, 0, 0), pixel(&sheet, 5, 2)), ([7; 3], [7; 3]));
+        assert_eq!((pixel(&sheet, 1, 1), pixel(&sheet, 4, 3)), (RED, RED));
+        assert_eq!((pixel(&sheet, 6, 1), pixel(&sheet, 1, 5)), (BLUE, [9; 3]));
+        assert_eq!(pixel(&sheet, 6, 5), [7; 3]); // the place that stays free
+    }
+
+    #[test]
+    fn a_png_reads_back() {
+        let (image, mut bytes) = (Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]), Vec::new());
+        image.write_png(&mut bytes).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (5, 2));
+        assert_eq!(pixels, image.pixels.as_flattened());
+    }
+
+    #[test]
+    fn differences_run_from_blue_to_red() {
+        let colours = [0.0, 0.25, 0.5, 0.75, 1.0, 9.0].map(difference_colour);
+        assert_eq!(colours, [BLUE, [0, 255, 255], [0, 255, 0], [255, 255, 0], RED, RED]);
+        let bar = colour_bar(2, 5, difference_colour);
+        assert_eq!((pixel(&bar, 0, 0), pixel(&bar, 1, 2), pixel(&bar, 0, 4)), (RED, [0, 255, 0], BLUE));
+    }
+
+    #[test]
+    fn differences_know_the_background() {
+        let nan = f32::NAN;
+        let images = difference_images(&[1.0, nan, 2.0, nan], &[1.5, nan, 2.0, 0.0], [2, 1], 0.5);
+        assert_eq!(images.len(), 2);
+        assert_eq!(images[0].pixels, [RED, [0; 3]]);
+        assert_eq!(images[1].pixels, [BLUE, RED]);
+    }
+
+    #[test]
+    fn labels_draw_letters_and_stop_at_the_edge() {
+        let mut image = Image::from_fn(20, 16, |_, _| [0; 3]);
+        image.label("Ié|", 0, 0, 2, RED);
+        let column = |x| (0..16).filter(|y| pixel(&image, x, *y) == RED).count();
+        assert!(column(6) == 14 && column(0) == 0, "the stem of an I: {} {}", column(6), column(0));
+    }
+}
