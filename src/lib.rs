@@ -1,6 +1,20 @@
 //! wavesplat.
+pub mod bound;
+pub mod camera;
+pub mod codec;
+pub mod convert;
 pub mod error;
+pub mod extract;
+pub mod file;
+pub mod footprint;
 pub mod mapped;
+pub mod npy;
+pub mod output;
+pub mod progress;
+pub mod render;
 pub mod sample;
+mod scan;
 pub mod source;
+pub mod verify;
 pub mod volume;
+pub mod wavelet;

@@ -122,13 +122,16 @@ impl<S: Storage> Reader<S> {
         decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
     }
 
-    /// The codes of a level, `codes[k * voxels + voxel]`, resized to fit; all zero where the block lacks the part.
-    /// [`Error::Invalid`] for a level that the window lacks.
-    pub fn codes(&self, block: &BlockEntry, level: u8, codes: &mut Vec<i32>) -> Result<()> {
-        let count = self.geometry(block.id)?.codes(level);
-        codes.clear();
-        codes.resize(count.ok_or_else(|| Error::Invalid(format!("{}: no level {level}", block.id)))?, 0);
-        let Some(part) = block.part(PartKind::Level(level)) else { return Ok(()) };
+    /// Fills `codes[k * voxels + voxel]` with the codes of a level; all zero where the block lacks the part.
+    /// [`Error::Invalid`] for a level that the window lacks, or a slice of another length than its codes.
+    pub fn codes(&self, block: &BlockEntry, level: u8, codes: &mut [i32]) -> Result<()> {
+        if self.geometry(block.id)?.codes(level) != Some(codes.len()) {
+            return Err(Error::Invalid(format!("{}: no level {level} of {} codes", block.id, codes.len())));
+        }
+        let Some(part) = block.part(PartKind::Level(level)) else {
+            codes.fill(0);
+            return Ok(());
+        };
         let raw = self.part(block, part)?;
         unpacked(block, part, unpack_codes(&raw, codes), |&count| count).map(|_| ())
     }
@@ -162,7 +165,10 @@ impl<S: Storage> Reader<S> {
         let mut codes = Vec::new();
         for part in &block.parts {
             match part.kind {
-                PartKind::Level(level) => self.codes(block, level, &mut codes)?,
+                PartKind::Level(level) => {
+                    codes.resize(self.geometry(block.id)?.codes(level).unwrap_or(0), 0);
+                    self.codes(block, level, &mut codes)?;
+                }
                 PartKind::Outliers => self.outliers(block).map(drop)?,
                 PartKind::Missing => self.missing(block).map(drop)?,
                 PartKind::Exact => self.exact(block).map(drop)?,

@@ -1,6 +1,5 @@
 //! Where frames go: one file, a folder with a file per frame, or standard output. One frame is in memory at a time.
 
-use npyz::{DType, TypeStr, WriteOptions, WriterBuilder};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -46,18 +45,10 @@ impl Format {
     /// Writes what comes before the samples of an array whose last axis is the fastest.
     fn begin(self, writer: &mut impl Write, ty: SampleType, shape: &[usize]) -> io::Result<()> {
         if self == Self::Npy {
-            let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
-            WriteOptions::new_header_only().dtype(npy_type(ty)?).shape(&shape).writer(writer).write_header_only()?;
+            wavesplat::npy::write_header(ty, shape, writer)?;
         }
         Ok(())
     }
-}
-
-/// NumPy's name of a type, as `<f4`.
-fn npy_type(ty: SampleType) -> io::Result<DType> {
-    let order = if ty.size() == 1 { '|' } else { '<' };
-    let name = format!("{order}{}{}", &ty.name()[..1], ty.size());
-    name.parse::<TypeStr>().map(DType::Plain).map_err(|e| io::Error::other(e.to_string()))
 }
 
 /// Where frames go.

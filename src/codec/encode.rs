@@ -1,0 +1,320 @@
+//! Samples of one block to a coded block that keeps its promise.
+
+use super::truncate::Group;
+use super::{WindowCodec, lane_groups};
+use crate::bound::{self, difference_up};
+use crate::sample::{self, SampleType};
+use crate::wavelet::Lane;
+use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
+use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
+
+/// One worker's encoder: scratch that is reused from block to block.
+#[derive(Debug)]
+pub struct Encoder {
+    compressor: Compressor,
+    codes: Vec<i32>,
+    raw: Vec<u8>,
+}
+
+/// A coded block, and what the window's record adds up.
+#[derive(Debug)]
+pub struct Encoded {
+    /// What the file stores.
+    pub block: EncodedBlock,
+    /// Nonzero coefficients.
+    pub coded: u64,
+    /// Samples stored exactly because they missed the bound.
+    pub outliers: u64,
+    /// Missing samples.
+    pub missing: u64,
+}
+
+/// What is known about a block after its series have been coded.
+struct Coded {
+    step: f64,
+    dropped: f64,
+    outliers: wavesplat_format::Outliers,
+    tally: Tally,
+}
+
+/// Errors and range of what the decoder gives back.
+#[derive(Debug, Clone, Copy)]
+struct Tally {
+    min: f64,
+    max: f64,
+    reached: f64,
+    squared_error: f64,
+}
+
+impl Tally {
+    const NONE: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, reached: 0.0, squared_error: 0.0 };
+
+    fn add(&mut self, decoded: f64, error: f64) {
+        self.min = self.min.min(decoded);
+        self.max = self.max.max(decoded);
+        self.reached = self.reached.max(error);
+        self.squared_error += error * error;
+    }
+}
+
+impl Encoder {
+    /// With a zstd level.
+    pub fn new(level: i32) -> wavesplat_format::Result<Self> {
+        Ok(Self { compressor: Compressor::new(level)?, codes: Vec::new(), raw: Vec::new() })
+    }
+
+    /// Codes a block from its little-endian samples, frame by frame: `frames * voxels * sample size` bytes.
+    pub fn block(&mut self, codec: &WindowCodec, id: BlockId, samples: &[u8]) -> wavesplat_format::Result<Encoded> {
+        let missing = Missing::find(codec, samples);
+        let coded = self.series(codec, samples, &missing);
+        let coded = match coded {
+            Some(coded) => self.coded_parts(codec, coded)?,
+            None => self.exact_parts(codec, samples, &missing)?,
+        };
+        let (stats, mut parts) = self.smaller(codec, samples, &missing, coded)?;
+        if missing.count > 0 {
+            pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
+            let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
+            parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
+        }
+        Ok(Encoded::new(EncodedBlock { id, stats, parts }, missing.count))
+    }
+
+    /// Codes every series. None if the block must be stored exactly.
+    fn series(&mut self, codec: &WindowCodec, samples: &[u8], missing: &Missing) -> Option<Coded> {
+        let voxels = samples.len() / codec.sample.size() / codec.frames();
+        let error = bound::before_rounding(codec.sample, codec.delta, missing.magnitude);
+        let step = bound::step(codec.bound, error, codec.gain);
+        if !(error > 0.0 && step.is_normal()) {
+            return None;
+        }
+        clear(&mut self.codes).resize(codec.basis.coefficients() * voxels, 0);
+        let mut group = Group::new(codec);
+        let mut coded = Coded { step, dropped: 0.0, outliers: Default::default(), tally: Tally::NONE };
+        let mut places = Vec::new();
+        for (first, count) in lane_groups(voxels) {
+            load_group(codec, samples, missing, first, count, &mut group);
+            if !group.quantise(codec, step) {
+                return None;
+            }
+            group.truncate(codec, step, error);
+            coded.dropped += self.keep_codes(&group, step, voxels, first, count);
+            check_group(codec, &group, voxels, first, count, &mut coded.tally, &mut places);
+            if places.len() > samples.len() / codec.sample.size() / MOST_OUTLIERS {
+                return None;
+            }
+        }
+        coded.outliers = gather_outliers(codec, samples, places);
+        Some(coded)
+    }
+
+    /// Writes a group's kept codes, k-major, and returns the energy that dropping and rounding cost.
+    fn keep_codes(&mut self, group: &Group, step: f64, voxels: usize, first: usize, count: usize) -> f64 {
+        let mut lost = 0.0;
+        for (k, coefficients) in group.coefficients.iter().enumerate() {
+            for (lane, c) in coefficients.iter().enumerate().take(count) {
+                let code = group.code(k, lane);
+                self.codes[k * voxels + first + lane] = code;
+                let error = c - f64::from(code) * step;
+                lost += error * error;
+            }
+        }
+        lost
+    }
+
+    /// The parts of a block coded by coefficients.
+    fn coded_parts(&mut self, codec: &WindowCodec, coded: Coded) -> wavesplat_format::Result<Parts> {
+        let voxels = self.codes.len() / codec.basis.coefficients();
+        let mut parts = Vec::new();
+        for (level, range) in codec.parts.iter().enumerate() {
+            let codes = &self.codes[range.start * voxels..range.end * voxels];
+            let stats = code_stats(codes, coded.step);
+            if stats.count > 0 {
+                pack_codes(codes, clear(&mut self.raw));
+                parts.push(self.compressor.part(PartKind::Level(level as u8), stats, &self.raw)?);
+            }
+        }
+        let count = coded.outliers.positions.len() as u64;
+        if count > 0 {
+            pack_outliers(&coded.outliers, codec.sample.size(), clear(&mut self.raw));
+            let stats = PartStats { count, energy: 0.0, largest: 0.0 };
+            parts.push(self.compressor.part(PartKind::Outliers, stats, &self.raw)?);
+        }
+        Ok((block_stats(coded.tally, coded.step, coded.dropped), parts))
+    }
+
+    /// The parts of a block stored exactly.
+    fn exact_parts(&mut self, codec: &WindowCodec, samples: &[u8], missing: &Missing) -> wavesplat_format::Result<Parts> {
+        let mut tally = Tally::NONE;
+        for_each_sample(codec.sample, samples, |i, value| {
+            if !missing.mask[i] {
+                tally.add(value, 0.0);
+            }
+        });
+        pack_exact(samples, codec.sample.size(), clear(&mut self.raw));
+        let count = (samples.len() / codec.sample.size()) as u64;
+        let stats = PartStats { count, energy: 0.0, largest: 0.0 };
+        let part = self.compressor.part(PartKind::Exact, stats, &self.raw)?;
+        Ok((block_stats(tally, 0.0, 0.0), vec![part]))
+    }
+
+    /// The block as coded, or stored exactly if it hardly shrank and that is smaller.
+    fn smaller(
+        &mut self,
+        codec: &WindowCodec,
+        samples: &[u8],
+        missing: &Missing,
+        coded: Parts,
+    ) -> wavesplat_format::Result<Parts> {
+        let size = |parts: &Parts| parts.1.iter().map(|p| p.stored.len()).sum::<usize>();
+        if size(&coded) < samples.len() / 2 || coded.1.iter().any(|p| p.kind == PartKind::Exact) {
+            return Ok(coded);
+        }
+        let exact = self.exact_parts(codec, samples, missing)?;
+        Ok(if size(&exact) < size(&coded) { exact } else { coded })
+    }
+}
+
+type Parts = (BlockStats, Vec<EncodedPart>);
+
+/// A block in which more than one sample in this many misses the bound is stored exactly: an outlier costs more bytes.
+const MOST_OUTLIERS: usize = 8;
+
+impl Encoded {
+    fn new(block: EncodedBlock, missing: u64) -> Self {
+        let count = |wanted: fn(PartKind) -> bool| {
+            block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum()
+        };
+        let coded = count(|kind| matches!(kind, PartKind::Level(_)));
+        let outliers = count(|kind| kind == PartKind::Outliers);
+        Self { block, coded, outliers, missing }
+    }
+}
+
+fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
+    buffer.clear();
+    buffer
+}
+
+fn block_stats(tally: Tally, step: f64, dropped: f64) -> BlockStats {
+    let Tally { min, max, reached, squared_error } = tally;
+    BlockStats { step, min, max, reached, squared_error, dropped }
+}
+
+fn code_stats(codes: &[i32], step: f64) -> PartStats {
+    let mut stats = PartStats { count: 0, energy: 0.0, largest: 0.0 };
+    for code in codes.iter().filter(|c| **c != 0) {
+        let c = f64::from(*code) * step;
+        stats.count += 1;
+        stats.energy += c * c;
+        stats.largest = stats.largest.max(c.abs());
+    }
+    stats
+}
+
+/// Which samples of a block are missing, and the largest of the others.
+struct Missing {
+    mask: Vec<bool>,
+    count: u64,
+    magnitude: f64,
+}
+
+impl Missing {
+    fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
+        let mut found = Self { mask: vec![false; samples.len() / codec.sample.size()], count: 0, magnitude: 0.0 };
+        for_each_sample(codec.sample, samples, |i, value| {
+            if codec.is_missing(value) {
+                found.mask[i] = true;
+                found.count += 1;
+            } else {
+                found.magnitude = found.magnitude.max(value.abs());
+            }
+        });
+        found
+    }
+
+    /// The very bytes of the missing samples.
+    fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
+        let each = samples.chunks_exact(codec.sample.size());
+        each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
+    }
+}
+
+/// Calls `visit(index, value)` for every sample.
+fn for_each_sample(ty: SampleType, samples: &[u8], mut visit: impl FnMut(usize, f64)) {
+    const CHUNK: usize = 512;
+    let mut values = [0.0; CHUNK];
+    for (c, bytes) in samples.chunks(CHUNK * ty.size()).enumerate() {
+        let values = &mut values[..bytes.len() / ty.size()];
+        sample::load(ty, bytes, values);
+        values.iter().enumerate().for_each(|(i, v)| visit(c * CHUNK + i, *v));
+    }
+}
+
+/// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
+fn load_group(codec: &WindowCodec, samples: &[u8], missing: &Missing, first: usize, count: usize, group: &mut Group) {
+    let voxels = missing.mask.len() / codec.frames();
+    let size = codec.sample.size();
+    for (frame, (source, weight)) in group.source.iter_mut().zip(&mut group.weight).enumerate() {
+        let at = frame * voxels + first;
+        *source = Lane::default();
+        sample::load(codec.sample, &samples[at * size..(at + count) * size], &mut source[..count]);
+        *weight = std::array::from_fn(|l| f64::from(u8::from(l < count && !missing.mask[at + l])));
+    }
+    if missing.count > 0 {
+        (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));
+    }
+}
+
+fn fill(source: &mut [Lane], weight: &[Lane], lane: usize) {
+    let present = (0..source.len()).find(|t| weight[*t][lane] > 0.0);
+    let mut last = present.map_or(0.0, |t| source[t][lane]);
+    for (value, weight) in source.iter_mut().zip(weight) {
+        if weight[lane] > 0.0 {
+            last = value[lane];
+        } else {
+            value[lane] = last;
+        }
+    }
+}
+
+/// Compares what the decoder gives with the source, sample by sample, and notes the places of those that miss the bound.
+fn check_group(
+    codec: &WindowCodec,
+    group: &Group,
+    voxels: usize,
+    first: usize,
+    count: usize,
+    tally: &mut Tally,
+    places: &mut Vec<u32>,
+) {
+    let mut errors = vec![0.0; codec.frames()];
+    for lane in 0..count {
+        for (t, error) in errors.iter_mut().enumerate() {
+            *error = sample_error(codec.sample, group.decoded[t][lane], group.source[t][lane]) * group.weight[t][lane];
+        }
+        let holds = bound::holds(codec.bound, codec.delta, errors.iter().copied());
+        for (t, error) in errors.iter().enumerate().filter(|(t, _)| group.weight[*t][lane] > 0.0) {
+            if holds || *error <= codec.delta {
+                tally.add(sample::round_to(codec.sample, group.decoded[t][lane]), *error);
+            } else {
+                tally.add(group.source[t][lane], 0.0);
+                places.push((t * voxels + first + lane) as u32);
+            }
+        }
+    }
+}
+
+/// The larger error of a decoded value as it is splatted and as it is extracted, rounded to its type; rounded up.
+fn sample_error(ty: SampleType, decoded: f64, source: f64) -> f64 {
+    let (splatted, extracted) = (difference_up(decoded, source), difference_up(sample::round_to(ty, decoded), source));
+    if splatted.is_nan() || extracted.is_nan() { f64::INFINITY } else { splatted.max(extracted) }
+}
+
+fn gather_outliers(codec: &WindowCodec, samples: &[u8], mut positions: Vec<u32>) -> wavesplat_format::Outliers {
+    let size = codec.sample.size();
+    positions.sort_unstable();
+    let bytes = |p: &u32| &samples[*p as usize * size..(*p as usize + 1) * size];
+    let samples = positions.iter().flat_map(bytes).copied().collect();
+    wavesplat_format::Outliers { positions, samples }
+}

@@ -1,0 +1,147 @@
+//! The reader's stage: windows of frames in, batches of blocks out.
+
+use crate::scan::{Scan, join_ranges, scan};
+use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
+use crate::bound::{self, Bound};
+use crate::codec::WindowCodec;
+use crate::error::{Error, Result};
+use crate::source::{Archive, FrameSource, FrameWindow};
+use crate::volume::Grid;
+use crate::wavelet;
+use crossbeam::channel::Sender;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use wavesplat_format::{BlockId, FileId};
+use xxhash_rust::xxh3::xxh3_128;
+
+/// Some blocks of one window: their samples, frame by frame.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) window: Arc<WindowJob>,
+    pub(super) blocks: Vec<(BlockId, Vec<u8>)>,
+}
+
+/// Reads all windows in order until the frames end. Returns the time spent reading.
+pub(super) fn read(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    plan: &Plan,
+    out: Sender<Batch>,
+) -> Result<Duration> {
+    let mut reader = WindowReader { config, plan, archive: source.archive().clone(), range: None, id: None };
+    let mut busy = Duration::ZERO;
+    for index in 0.. {
+        let started = Instant::now();
+        let first = index * config.window;
+        let count = reader.archive.frames.map_or(config.window, |all| config.window.min(all.saturating_sub(first)));
+        if count == 0 {
+            break;
+        }
+        let window = source.window(first, count)?;
+        if window.frames() == 0 {
+            break;
+        }
+        let job = Arc::new(reader.prepare(window.as_ref(), index, first)?);
+        busy += started.elapsed();
+        if !reader.send_blocks(window.as_ref(), &job, &out, &mut busy)? {
+            break; // a later stage failed and says why
+        }
+        window.check_unchanged()?;
+        if window.frames() < config.window {
+            break;
+        }
+    }
+    Ok(busy)
+}
+
+struct WindowReader<'a> {
+    config: &'a ConvertConfig,
+    plan: &'a Plan,
+    archive: Archive,
+    /// Range of the frames so far.
+    range: Option<(f64, f64)>,
+    id: Option<FileId>,
+}
+
+impl WindowReader<'_> {
+    /// Looks at the window's samples and fixes its bound.
+    fn prepare(&mut self, window: &dyn FrameWindow, index: usize, first: usize) -> Result<WindowJob> {
+        let (config, sample) = (self.config, self.archive.sample);
+        let is_missing = |v: f64| !v.is_finite() || Some(v) == config.missing_value;
+        let seen = scan(window, &self.archive.grid, sample, is_missing)?;
+        self.refuse_missing(window, first, &seen)?;
+        let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
+        self.range = Some(range);
+        let delta = bound::voxel_bound(config.tolerance, config.range.unwrap_or(range));
+        let delta = if delta.is_finite() { delta.max(0.0) } else { 0.0 }; // nothing but missing samples so far
+        let basis = wavelet::basis(config.basis, window.frames());
+        let mut codec = WindowCodec::new(basis, sample, config.bound, delta, self.plan.blocks.edge);
+        codec.missing_value = config.missing_value;
+        let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
+        let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
+        Ok(WindowJob { index, first_frame: first as u64, id, codec, range })
+    }
+
+    fn refuse_missing(&self, window: &dyn FrameWindow, first: usize, seen: &Scan) -> Result<()> {
+        let (MissingPolicy::Error, Some((frame, voxel))) = (self.config.missing, seen.first_missing) else {
+            return Ok(());
+        };
+        let [nx, ny, _] = self.archive.grid.dims;
+        let [x, y, z] = [voxel % nx, voxel / nx % ny, voxel / (nx * ny)];
+        Err(Error::input(
+            window.name(frame),
+            format!(
+                "frame {} has a missing value (NaN, infinite or as declared) at x {x}, y {y}, z {z}, the first of {} in \
+                 frames {first}..{}; --missing mask keeps them as they are",
+                first + frame,
+                seen.missing,
+                first + window.frames()
+            ),
+        ))
+    }
+
+    /// Gathers and sends the window's blocks. False if nobody listens any more.
+    fn send_blocks(
+        &self,
+        window: &dyn FrameWindow,
+        job: &Arc<WindowJob>,
+        out: &Sender<Batch>,
+        busy: &mut Duration,
+    ) -> Result<bool> {
+        let all: Vec<usize> = (0..self.plan.blocks.len()).collect();
+        for numbers in all.chunks(self.plan.batch) {
+            let started = Instant::now();
+            let blocks: Result<_> = numbers.iter().map(|b| self.gather(window, job, *b)).collect();
+            let batch = Batch { window: job.clone(), blocks: blocks? };
+            *busy += started.elapsed();
+            if out.send(batch).is_err() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The samples of one block, frame by frame.
+    fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
+        let region = self.plan.blocks.region(block);
+        let frame_bytes = region.voxels() * self.archive.sample.size();
+        let mut samples = vec![0; frame_bytes * window.frames()];
+        for (frame, bytes) in samples.chunks_exact_mut(frame_bytes).enumerate() {
+            window.read_box(frame, &region, bytes)?;
+        }
+        Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
+    }
+}
+
+/// A name for the file that follows from settings and data: the same conversion has the same one everywhere.
+fn file_id(config: &ConvertConfig, archive: &Archive, plan: &Plan, digest: u64) -> FileId {
+    let Grid { dims, spacing, origin } = archive.grid;
+    let ConvertConfig { basis, window, tolerance, bound, range, missing, missing_value, level, settings, .. } = config;
+    let bound: &Bound = bound;
+    let all = format!(
+        "{dims:?} {spacing:?} {origin:?} {} {basis:?} {window} {tolerance:?} {bound:?} {range:?} {missing:?} \
+         {missing_value:?} {} {level} {settings:?} {digest}",
+        archive.sample, plan.blocks.edge
+    );
+    FileId(xxh3_128(all.as_bytes()).to_le_bytes())
+}

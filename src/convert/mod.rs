@@ -1,0 +1,241 @@
+//! Frames to a coefficient file: reader, workers and writer, with bounded channels between them.
+//!
+//! ```text
+//! reader thread            workers (rayon)           writer (the caller's thread)
+//! scan a window      ->    encode a batch       ->   append in order, directory, footer
+//! gather its blocks        of blocks                 window by window
+//! ```
+//!
+//! Batches keep their order, so the bytes do not depend on the number of threads; their size comes from the memory
+//! budget alone. The bound of a window follows from the value range of all frames up to its end, which never exceeds
+//! that of the archive: no first pass over the data is needed, and a pipe gives the same bytes as files.
+
+mod gather;
+mod record;
+
+use crate::bound::Bound;
+use crate::codec::WindowCodec;
+use crate::codec::encode::{Encoded, Encoder};
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::sample::SampleType;
+use crate::source::{Archive, FrameSource};
+use crate::volume::BlockGrid;
+use crate::wavelet::{self, Basis};
+use wavesplat_format::FileId;
+use crossbeam::channel::{Receiver, Sender, bounded};
+use gather::Batch;
+use rayon::prelude::*;
+use record::Recorder;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// What to do with NaN, infinities and the declared missing value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MissingPolicy {
+    /// Refuse, naming the first one and how many there are.
+    Error,
+    /// Keep them as they are; they are splatted as nothing.
+    Mask,
+}
+
+/// How to convert.
+#[derive(Debug, Clone)]
+pub struct ConvertConfig {
+    /// The temporal basis.
+    pub basis: Basis,
+    /// Frames in a window.
+    pub window: usize,
+    /// The voxel bound as a share of the value range; 0 keeps every bit.
+    pub tolerance: f64,
+    /// What is promised.
+    pub bound: Bound,
+    /// The value range; by default that of the frames so far.
+    pub range: Option<(f64, f64)>,
+    /// What to do with missing samples.
+    pub missing: MissingPolicy,
+    /// A value that means "missing", besides NaN and infinities.
+    pub missing_value: Option<f64>,
+    /// Voxels a side of a block; by default as many as suit the window.
+    pub block: Option<usize>,
+    /// zstd level.
+    pub level: i32,
+    /// Bytes that may be allocated.
+    pub memory: usize,
+    /// What was asked of the input (frames, region), kept as provenance.
+    pub settings: Vec<(String, String)>,
+}
+
+/// What a conversion did.
+#[derive(Debug, Clone, Serialize)]
+pub struct ConvertReport {
+    /// Frames converted.
+    pub frames: u64,
+    /// Windows written.
+    pub windows: usize,
+    /// Bytes of samples read.
+    pub input_bytes: u64,
+    /// Bytes of the coefficient file.
+    pub output_bytes: u64,
+    /// Nonzero coefficients kept.
+    pub coefficients: u64,
+    /// Nonzero coefficients per sample.
+    pub coefficients_per_sample: f64,
+    /// Samples stored exactly because coefficients missed the bound.
+    pub outliers: u64,
+    /// Missing samples.
+    pub missing: u64,
+    /// Value range that the tolerance refers to.
+    pub range: (f64, f64),
+    /// The largest voxel bound promised in any window.
+    pub delta: f64,
+    /// The largest error reached in any sample.
+    pub reached: f64,
+    /// Seconds spent scanning and gathering samples, on the reader's thread.
+    pub read_seconds: f64,
+    /// Seconds spent encoding, on all workers together as wall time.
+    pub encode_seconds: f64,
+    /// Seconds spent writing.
+    pub write_seconds: f64,
+    /// Seconds from beginning to end.
+    pub seconds: f64,
+}
+
+/// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without a seek.
+///
+/// `name` stands for `out` in messages.
+pub fn convert<W: Write>(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    name: &Path,
+    out: W,
+    progress: &dyn Progress,
+) -> Result<ConvertReport> {
+    let started = Instant::now();
+    let archive = source.archive().clone();
+    let plan = Plan::new(config, &archive)?;
+    progress.start(archive.frames.map(|f| (f.div_ceil(config.window) * plan.blocks.len()) as u64));
+    let mut recorder = Recorder::new(config, &archive, &plan, name, out);
+    let (to_workers, from_reader) = bounded(0);
+    let (to_writer, from_workers) = bounded(0);
+    let (read_time, encode_time) = std::thread::scope(|scope| {
+        let reader = scope.spawn(|| gather::read(source, config, &plan, to_workers));
+        let workers = scope.spawn(|| encode(config.level, from_reader, to_writer));
+        let written = recorder.write(from_workers, progress);
+        let (encoded, read) = (join(workers), join(reader));
+        Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
+    })?;
+    let report = recorder.finish(started, read_time, encode_time)?;
+    progress.finish();
+    Ok(report)
+}
+
+/// Passes a panic of a stage on; it is a bug, not an error.
+fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    stage.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// What follows from the configuration and the archive before any frame is read.
+#[derive(Debug)]
+struct Plan {
+    blocks: BlockGrid,
+    /// Blocks that are gathered, encoded and written together.
+    batch: usize,
+}
+
+/// Voxels a side of a block unless one is given: 32, less for long windows so that a block stays near 4 MiB.
+fn block_edge(window: usize) -> usize {
+    [32, 16, 8, 4, 2].into_iter().find(|e| e * e * e * window <= 33 * 32 * 32 * 32).unwrap_or(1)
+}
+
+impl Plan {
+    fn new(config: &ConvertConfig, archive: &Archive) -> Result<Self> {
+        wavelet::check_window(config.basis, config.window)?;
+        let edge = config.block.unwrap_or(block_edge(config.window));
+        let coefficients = wavelet::basis(config.basis, config.window).coefficients() as u64;
+        let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
+        if edge == 0 || (edge as u64).saturating_pow(3).saturating_mul(coefficients) > most {
+            return Err(Error::usage(format!("--block {edge}: a block holds 1 to {most} samples over a window")));
+        }
+        let blocks = BlockGrid { dims: archive.grid.dims, edge };
+        let batch = batch_len(config, blocks, archive.sample)?;
+        Ok(Self { blocks, batch })
+    }
+}
+
+/// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, and a worker's scratch.
+fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> Result<usize> {
+    let voxels = blocks.region(0).voxels();
+    let samples = voxels * config.window;
+    let raw = samples * sample.size();
+    let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
+    let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
+    let per_block = 4 * raw + scratch.min(scratch * rayon::current_num_threads());
+    match config.memory.saturating_sub(FIXED_MEMORY) / per_block {
+        0 => {
+            let least = (per_block + FIXED_MEMORY).div_ceil(1 << 20);
+            Err(Error::usage(format!(
+                "--memory: a window of {} frames in blocks of {} voxels a side needs at least {least}MiB",
+                config.window, blocks.edge
+            )))
+        }
+        fits => Ok(fits.min(MOST_BLOCKS_IN_FLIGHT)),
+    }
+}
+
+/// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.
+const ZSTD_SCRATCH: usize = 4 << 20;
+/// Program, stacks and directories.
+const FIXED_MEMORY: usize = 8 << 20;
+/// Enough to keep workers busy; more only delays the first output.
+const MOST_BLOCKS_IN_FLIGHT: usize = 64;
+
+/// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
+fn encode(level: i32, batches: Receiver<Batch>, out: Sender<EncodedBatch>) -> Result<Duration> {
+    let idle = Mutex::new(Vec::new());
+    let mut busy = Duration::ZERO;
+    for batch in batches {
+        let started = Instant::now();
+        let blocks: Result<Vec<Encoded>> = batch.blocks.par_iter().map(|(id, samples)| {
+            let reused = idle.lock().ok().and_then(|mut e| e.pop());
+            let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+            let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
+            if let Ok(mut idle) = idle.lock() {
+                idle.push(encoder);
+            }
+            encoded
+        }).collect();
+        busy += started.elapsed();
+        let encoded = EncodedBatch { window: batch.window, blocks: blocks? };
+        if out.send(encoded).is_err() {
+            break; // the writer failed and says why
+        }
+    }
+    Ok(busy)
+}
+
+/// Compressing fails only where a size escaped our own limits.
+fn bug(error: wavesplat_format::Error) -> Error {
+    Error::CoefficientFile { path: "encoding".into(), source: error }
+}
+
+/// Coded blocks on their way to the file, in order.
+#[derive(Debug)]
+struct EncodedBatch {
+    window: Arc<WindowJob>,
+    blocks: Vec<Encoded>,
+}
+
+/// A window as the reader found it.
+#[derive(Debug)]
+struct WindowJob {
+    index: u32,
+    first_frame: u64,
+    id: FileId,
+    codec: WindowCodec,
+    /// Range of the samples, of the frames up to the window's end.
+    range: (f64, f64),
+}

@@ -1,0 +1,155 @@
+//! A coefficient file back to samples: any frames, any region, without reading the rest.
+
+use crate::codec::WindowCodec;
+use crate::error::{Error, Result};
+use crate::file::CoefficientFile;
+use crate::progress::Progress;
+use crate::volume::Region;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::io::Write;
+use wavesplat_format::BlockEntry;
+
+/// What to extract.
+#[derive(Debug, Clone)]
+pub struct ExtractConfig {
+    /// Which frames, ascending.
+    pub frames: Vec<usize>,
+    /// Which voxels.
+    pub region: Region,
+    /// Bytes that may be allocated.
+    pub memory: usize,
+}
+
+/// What an extraction did.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct ExtractReport {
+    /// Frames written.
+    pub frames: usize,
+    /// Blocks that were decoded, each time counted.
+    pub blocks_read: u64,
+    /// Stored bytes that were read of blocks.
+    pub bytes_read: u64,
+    /// Bytes written.
+    pub bytes: u64,
+}
+
+/// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
+pub fn extract(
+    file: &CoefficientFile,
+    config: &ExtractConfig,
+    name: &std::path::Path,
+    out: &mut dyn Write,
+    progress: &dyn Progress,
+) -> Result<ExtractReport> {
+    progress.start(Some(config.frames.len() as u64));
+    let mut report = ExtractReport::default();
+    for piece in Pieces::new(file, config)?.list(file, config) {
+        let bytes = read_piece(file, &piece, &mut report)?;
+        out.write_all(&bytes).map_err(|e| Error::io(name, "writing", e))?;
+        report.bytes += bytes.len() as u64;
+        if piece.region.end[2] == config.region.end[2] {
+            report.frames += piece.frames.len();
+            progress.advance(piece.frames.len() as u64);
+        }
+    }
+    file.check_unchanged()?;
+    progress.finish();
+    Ok(report)
+}
+
+/// How much is decoded at a time: some frames of a window whole, or one frame by slabs of z.
+struct Pieces {
+    frames: usize,
+    slab: usize,
+}
+
+/// Frames (of one window) and voxels that are decoded together, in the order of the output.
+struct Piece {
+    window: u32,
+    frames: Vec<usize>,
+    region: Region,
+}
+
+/// Program, stacks, directories.
+const FIXED_MEMORY: usize = 8 << 20;
+
+impl Pieces {
+    fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
+        let plane = config.region.dims()[0] * config.region.dims()[1] * file.sample().size();
+        let frame = plane * config.region.dims()[2];
+        let available = config.memory.saturating_sub(FIXED_MEMORY + block_bytes(file)) / 2;
+        if available < plane {
+            let least = (2 * plane + FIXED_MEMORY + block_bytes(file)).div_ceil(1 << 20);
+            return Err(Error::usage(format!("--memory: extracting from this file needs at least {least}MiB")));
+        }
+        Ok(Self { frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })
+    }
+
+    fn list(&self, file: &CoefficientFile, config: &ExtractConfig) -> Vec<Piece> {
+        let same_window = |a: &usize, b: &usize| file.window_of(*a) == file.window_of(*b);
+        let groups = config.frames.chunk_by(same_window).flat_map(|g| g.chunks(self.frames));
+        let [z0, z1] = [config.region.start[2], config.region.end[2]];
+        groups
+            .flat_map(|frames| {
+                let window = file.window_of(frames[0]);
+                (z0..z1).step_by(self.slab).map(move |z| {
+                    let mut region = config.region;
+                    (region.start[2], region.end[2]) = (z, (z + self.slab).min(z1));
+                    Piece { window, frames: frames.to_vec(), region }
+                })
+            })
+            .collect()
+    }
+}
+
+/// Bytes that decoding one block on each worker takes.
+fn block_bytes(file: &CoefficientFile) -> usize {
+    let windows = &file.metadata().windows;
+    let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
+    file.blocks.region(0).voxels() * longest * (4 + 5 + 2 * file.sample().size()) * rayon::current_num_threads()
+}
+
+fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport) -> Result<Vec<u8>> {
+    let codec = file.codec(piece.window)?;
+    let first = file.window_range(piece.window).start;
+    let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
+    let wanted = crate::wavelet::needed(&codec.synthesis, frames.iter().copied());
+    let size = file.sample().size();
+    let mut out = vec![0; frames.len() * piece.region.voxels() * size];
+    for leaf in file.leaves(piece.window) {
+        let numbers = leaf.first_block as usize..leaf.first_block as usize + usize::from(leaf.count);
+        if !numbers.into_iter().any(|b| !file.blocks.region(b).intersect(&piece.region).is_empty()) {
+            continue;
+        }
+        let touches = |e: &BlockEntry| !file.blocks.region(e.id.block as usize).intersect(&piece.region).is_empty();
+        let entries: Vec<BlockEntry> = file.leaf(leaf)?.into_iter().filter(touches).collect();
+        for entries in entries.chunks(rayon::current_num_threads()) {
+            let decode = |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+            let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
+            for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
+                let region = file.blocks.region(entry.id.block as usize);
+                copy_block(&codec, &frames, &region, &samples, &piece.region, &mut out);
+                report.blocks_read += 1;
+                report.bytes_read += bytes_read;
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Copies the rows that a block and the piece share.
+fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], piece: &Region, out: &mut [u8]) {
+    let size = codec.sample.size();
+    let shared = block.intersect(piece);
+    let row = shared.dims()[0] * size;
+    for (to_frame, from_frame) in frames.iter().enumerate() {
+        for (y, z) in shared.rows() {
+            let voxel = [shared.start[0], y, z];
+            let from = (from_frame * block.voxels() + block.index(voxel)) * size;
+            let to = (to_frame * piece.voxels() + piece.index(voxel)) * size;
+            out[to..to + row].copy_from_slice(&samples[from..from + row]);
+        }
+    }
+}
+

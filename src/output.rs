@@ -1,0 +1,158 @@
+//! Results out: to standard output, or to a file whose final name exists only when it is complete.
+
+use crate::error::{Error, Result};
+use std::ffi::OsString;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::path::{Path, PathBuf};
+
+/// The name that stands for a standard stream.
+pub const STANDARD: &str = "-";
+
+/// Where a result goes. Dropped before [`Output::commit`], it leaves nothing behind under the final name.
+#[derive(Debug)]
+pub struct Output {
+    path: PathBuf,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    Stdout(BufWriter<Stdout>),
+    /// A device or a pipe, written as it is.
+    Special(BufWriter<File>),
+    File(BufWriter<File>, Part),
+}
+
+/// The unfinished file; removed when dropped.
+#[derive(Debug)]
+struct Part {
+    path: PathBuf,
+    replace: bool,
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.path); // gone already once committed
+    }
+}
+
+impl Output {
+    /// Opens `path`, or standard output for `-`. An existing file is an error unless `force` replaces it.
+    pub fn create(path: &Path, force: bool) -> Result<Self> {
+        let target = if path == Path::new(STANDARD) {
+            if io::stdout().is_terminal() {
+                return Err(Error::usage("-o -: binary data is not written to a terminal; redirect or pipe it"));
+            }
+            Target::Stdout(BufWriter::with_capacity(BUFFER, io::stdout()))
+        } else if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "opening", e))?;
+            Target::Special(BufWriter::with_capacity(BUFFER, file))
+        } else {
+            if path.exists() && !force {
+                return Err(Error::usage(format!("{}: exists already; --force replaces it", path.display())));
+            }
+            let (file, part) = Part::create(path, force)?;
+            Target::File(BufWriter::with_capacity(BUFFER, file), part)
+        };
+        Ok(Self { path: path.into(), target })
+    }
+
+    /// The name for messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Flushes everything and gives the file its final name.
+    pub fn commit(mut self) -> Result<()> {
+        self.flush().map_err(|e| Error::io(&self.path, "writing", e))?;
+        let Target::File(file, part) = &self.target else { return Ok(()) };
+        file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
+        part.rename(&self.path).map_err(|e| Error::io(&self.path, "giving the finished file its name", e))
+    }
+}
+
+/// Bytes that are collected before they are written.
+const BUFFER: usize = 256 << 10;
+
+impl Part {
+    /// Creates and locks `NAME.part`; one that nobody holds is left over from a run that died.
+    fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
+        let mut name = OsString::from(path);
+        name.push(".part");
+        let part_path = PathBuf::from(name);
+        let failed = |e| Error::io(path, "creating", e);
+        let file = File::options().write(true).create(true).truncate(false).open(&part_path).map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(Error::usage(format!("{}: another program is writing it", path.display())));
+            }
+            Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(e)) => return Err(failed(e)),
+        }
+        file.set_len(0).map_err(failed)?;
+        Ok((file, Self { path: part_path, replace }))
+    }
+
+    fn rename(&self, path: &Path) -> io::Result<()> {
+        if self.replace {
+            fs::rename(&self.path, path)?;
+        } else {
+            match fs::hard_link(&self.path, path) {
+                Err(e) if e.kind() != io::ErrorKind::AlreadyExists => fs::rename(&self.path, path)?, // no hard links here
+                linked => linked?,
+            }
+        }
+        match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => File::open(folder)?.sync_all(),
+            _ => File::open(".")?.sync_all(),
+        }
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.target {
+            Target::Stdout(out) => out.write(bytes),
+            Target::Special(out) | Target::File(out, _) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.target {
+            Target::Stdout(out) => out.flush(),
+            Target::Special(out) | Target::File(out, _) => out.flush(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dropped_output_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.bin");
+        let mut out = Output::create(&path, false).expect("created");
+        out.write_all(b"half").expect("written");
+        drop(out);
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 0);
+    }
+
+    #[test]
+    fn only_a_committed_output_has_its_name_and_is_not_replaced_unasked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.bin");
+        let mut out = Output::create(&path, false).expect("created");
+        out.write_all(b"whole").expect("written");
+        assert!(!path.exists());
+        assert!(Output::create(&path, false).is_err(), "someone is writing it");
+        out.commit().expect("committed");
+        assert_eq!(fs::read(&path).expect("read"), b"whole");
+        assert!(Output::create(&path, false).is_err(), "it exists");
+        Output::create(&path, true).expect("forced").commit().expect("committed");
+        assert_eq!(fs::read(&path).expect("read"), b"");
+    }
+}

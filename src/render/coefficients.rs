@@ -1,0 +1,255 @@
+//! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
+
+use super::scene::{Group, Layout, Scene, Terms};
+use crate::codec::WindowCodec;
+use crate::codec::decode::Block;
+use crate::error::Result;
+use crate::file::CoefficientFile;
+use crate::sample::SampleType;
+use crate::volume::{BlockGrid, Grid, Region};
+use crate::wavelet::{Lane, needed};
+use std::sync::{Arc, Mutex, PoisonError};
+use wavesplat_format::BlockEntry;
+
+/// What of a file is splatted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum What {
+    /// Coefficients.
+    Coefficients,
+    /// The decoded samples of every frame: the conventional method.
+    Samples,
+}
+
+/// A coefficient file as a scene.
+pub struct CoefficientScene {
+    file: CoefficientFile,
+    what: What,
+}
+
+impl CoefficientScene {
+    /// Of an open file.
+    pub fn new(file: CoefficientFile, what: What) -> Self {
+        Self { file, what }
+    }
+}
+
+impl Scene for CoefficientScene {
+    fn grid(&self) -> &Grid {
+        &self.file.grid
+    }
+
+    fn blocks(&self) -> BlockGrid {
+        self.file.blocks
+    }
+
+    fn frames(&self) -> Option<usize> {
+        Some(self.file.frames())
+    }
+
+    fn range(&mut self, _frames: &[usize]) -> Result<(f64, f64)> {
+        Ok(self.file.value_range())
+    }
+
+    fn group_end(&self, frame: usize) -> usize {
+        self.file.window_range(self.file.window_of(frame)).end
+    }
+
+    fn most_planes(&self, frames: usize) -> usize {
+        let coefficients = self.file.metadata().windows.iter().map(|w| w.coefficients as usize).max();
+        coefficients.unwrap_or(0) + 2 * frames + 1
+    }
+
+    fn block_bytes(&self) -> usize {
+        let windows = &self.file.metadata().windows;
+        let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
+        // Codes, payload and samples, and a term of ten bytes for each.
+        self.file.blocks.region(0).voxels() * longest * (4 + 5 + 8 + 10)
+    }
+
+    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>> {
+        let window = self.file.window_of(frames[0]);
+        let first = self.file.window_range(window).start;
+        let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
+        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames)?))
+    }
+}
+
+/// Some frames of one window of a file.
+struct CoefficientGroup<'a> {
+    file: &'a CoefficientFile,
+    what: What,
+    window: u32,
+    codec: WindowCodec,
+    /// Counted from the first frame of the window.
+    frames: Vec<usize>,
+    /// Which coefficients the frames need, and those in order: what the planes hold.
+    wanted: Vec<bool>,
+    kept: Vec<usize>,
+    layout: Layout,
+    /// The leaf that was read last: blocks come in order.
+    leaf: Mutex<Arc<Vec<BlockEntry>>>,
+}
+
+impl<'a> CoefficientGroup<'a> {
+    fn new(file: &'a CoefficientFile, what: What, window: u32, frames: Vec<usize>) -> Result<Self> {
+        let codec = file.codec(window)?;
+        let wanted = needed(&codec.synthesis, frames.iter().copied());
+        let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
+        let (mut coded, mut exact) = (0, 0);
+        for leaf in file.leaves(window) {
+            coded += leaf.coded;
+            exact += u64::from(leaf.exact);
+        }
+        let record = &file.metadata().windows[window as usize];
+        let samples = what == What::Samples;
+        let layout = Layout {
+            coefficients: if samples || coded == 0 { 0 } else { kept.len() },
+            frames: frames.len(),
+            values: samples || exact + record.outliers + record.missing > 0,
+            absent: record.missing > 0,
+        };
+        Ok(Self { file, what, window, codec, frames, wanted, kept, layout, leaf: Mutex::default() })
+    }
+
+    /// The entries of the directory's leaf that lists a block.
+    fn leaf_of(&self, block: u32) -> Result<Arc<Vec<BlockEntry>>> {
+        let mut last = self.leaf.lock().unwrap_or_else(PoisonError::into_inner);
+        if !last.iter().any(|entry| entry.id.block == block) {
+            let leaves = self.file.leaves(self.window);
+            let leaf = &leaves[leaves.partition_point(|l| l.first_block <= block) - 1];
+            *last = Arc::new(self.file.leaf(leaf)?);
+        }
+        Ok(last.clone())
+    }
+
+    /// The samples of the group's frames out of those of the whole window.
+    fn of_frames(&self, samples: &[u8]) -> Vec<u8> {
+        let frame_bytes = samples.len() / self.codec.frames();
+        self.frames.iter().flat_map(|f| &samples[f * frame_bytes..(f + 1) * frame_bytes]).copied().collect()
+    }
+
+    fn terms_of_samples(&self, block: &Block, samples: &[u8]) -> Terms {
+        let ty: SampleType = self.codec.sample;
+        let is_missing = |i: usize, _: f64| block.is_missing(self.frames[i / block.voxels] * block.voxels + i % block.voxels);
+        let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), is_missing);
+        terms.bytes_read = block.bytes_read;
+        terms
+    }
+
+    fn terms_of_codes(&self, block: &Block) -> Terms {
+        let mut terms = Terms::new(block.bytes_read);
+        let overrides = Overrides::of(block, &self.codec, &self.frames);
+        let mut next = overrides.values.iter().peekable();
+        for voxel in 0..block.voxels {
+            if !block.codes.is_empty() {
+                self.add_codes(block, voxel, &mut terms);
+            }
+            while let Some((_, frame, amount)) = next.next_if(|(v, _, _)| *v == voxel) {
+                terms.add(self.layout.value(*frame), *amount);
+            }
+            if self.layout.absent {
+                let missing = |f: usize| block.is_missing(self.frames[f] * block.voxels + voxel);
+                terms.add_absent(&self.layout, missing);
+            }
+            terms.end_voxel();
+        }
+        terms
+    }
+
+    fn add_codes(&self, block: &Block, voxel: usize, terms: &mut Terms) {
+        for (plane, k) in self.kept.iter().enumerate() {
+            let code = block.codes[k * block.voxels + voxel];
+            if code != 0 {
+                terms.add(plane, f64::from(code) * block.step);
+                terms.coefficients += 1;
+            }
+        }
+    }
+}
+
+impl Group for CoefficientGroup<'_> {
+    fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    fn blocks(&self, region: &Region) -> Result<Vec<usize>> {
+        let mut found = Vec::new();
+        for leaf in self.file.leaves(self.window) {
+            let numbers = leaf.first_block as usize..leaf.first_block as usize + usize::from(leaf.count);
+            let touching: Vec<usize> =
+                numbers.clone().filter(|b| !self.file.blocks.region(*b).intersect(region).is_empty()).collect();
+            if touching.is_empty() {
+                continue;
+            }
+            let entries = self.file.leaf(leaf)?;
+            found.extend(touching.into_iter().filter(|b| !entries[b - numbers.start].parts.is_empty()));
+        }
+        Ok(found)
+    }
+
+    fn terms(&self, block: usize) -> Result<Terms> {
+        let leaf = self.leaf_of(block as u32)?;
+        let entry = &leaf[block - leaf[0].id.block as usize];
+        let block = self.file.block(&self.codec, entry, &self.wanted)?;
+        Ok(match (&block.exact, self.what) {
+            (Some(exact), _) => self.terms_of_samples(&block, exact),
+            (None, What::Samples) => self.terms_of_samples(&block, &block.samples(&self.codec)),
+            (None, What::Coefficients) => self.terms_of_codes(&block),
+        })
+    }
+
+    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {
+        let mut series = vec![Lane::default(); self.codec.frames()];
+        if self.layout.coefficients > 0 {
+            let mut coefficients = vec![Lane::default(); self.codec.basis.coefficients()];
+            self.kept.iter().zip(planes.iter()).for_each(|(k, plane)| coefficients[*k] = *plane);
+            self.codec.basis.inverse(&mut coefficients, &mut series);
+        }
+        for (f, out) in frames.iter_mut().enumerate() {
+            *out = series[self.frames[f]];
+            if self.layout.values {
+                let value = planes[self.layout.value(f)];
+                out.iter_mut().zip(value).for_each(|(o, v)| *o += v);
+            }
+        }
+    }
+
+    fn finish(&self) -> Result<()> {
+        self.file.check_unchanged()
+    }
+}
+
+/// What must be added to single frames because coefficients don't give it: an outlier's sample less what they give,
+/// and for a missing sample minus what they give.
+struct Overrides {
+    /// (voxel, frame of the group, amount), ascending.
+    values: Vec<(usize, usize, f64)>,
+}
+
+impl Overrides {
+    fn of(block: &Block, codec: &WindowCodec, frames: &[usize]) -> Self {
+        let mut wanted = vec![None; codec.frames()];
+        frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
+        let place = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
+        let mut samples = vec![0.0; block.outliers.positions.len()];
+        crate::sample::load(codec.sample, &block.outliers.samples, &mut samples);
+        let outliers = block.outliers.positions.iter().map(|p| *p as usize).zip(samples);
+        let missing = block.missing.0.iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| (i, 0.0));
+        let mut targets: Vec<_> = outliers
+            .chain(missing)
+            .filter_map(|(index, sample)| place(index).map(|(voxel, f, t)| (voxel, f, t, sample)))
+            .collect();
+        targets.sort_unstable_by_key(|(voxel, f, _, _)| (*voxel, *f));
+        Self { values: subtract_series(block, codec, &targets) }
+    }
+}
+
+/// Turns (voxel, frame of the group, frame of the window, sample) into (voxel, frame, sample - what the codes give).
+fn subtract_series(block: &Block, codec: &WindowCodec, targets: &[(usize, usize, usize, f64)]) -> Vec<(usize, usize, f64)> {
+    let mut out = Vec::new();
+    for of_voxel in targets.chunk_by(|a, b| a.0 == b.0) {
+        let series = block.series(codec, of_voxel[0].0);
+        out.extend(of_voxel.iter().map(|(v, f, t, sample)| (*v, *f, sample - series[*t])).filter(|o| o.2 != 0.0));
+    }
+    out
+}

@@ -1,0 +1,123 @@
+//! The conventional method: the frames of an archive, each splatted as it is.
+
+use super::scene::{Group, Layout, Scene, Terms};
+use crate::error::Result;
+use crate::scan::{join_ranges, scan};
+use crate::source::{Archive, FrameSource, FrameWindow};
+use crate::volume::{BlockGrid, Grid, Region};
+use crate::wavelet::Lane;
+
+/// Frames that are splatted together, so that a footprint is computed once for all of them.
+const GROUP: usize = 32;
+/// Voxels a side of the boxes in which frames are read.
+const EDGE: usize = 32;
+
+/// An archive as a scene.
+pub struct FrameScene {
+    source: Box<dyn FrameSource>,
+    archive: Archive,
+    missing_value: Option<f64>,
+}
+
+impl FrameScene {
+    /// Of a source, with a value that means "missing" besides NaN and infinities.
+    pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
+        let archive = source.archive().clone();
+        Self { source, archive, missing_value }
+    }
+}
+
+fn is_missing(value: f64, declared: Option<f64>) -> bool {
+    !value.is_finite() || Some(value) == declared
+}
+
+impl Scene for FrameScene {
+    fn grid(&self) -> &Grid {
+        &self.archive.grid
+    }
+
+    fn blocks(&self) -> BlockGrid {
+        BlockGrid { dims: self.archive.grid.dims, edge: EDGE }
+    }
+
+    fn frames(&self) -> Option<usize> {
+        self.archive.frames
+    }
+
+    fn range(&mut self, frames: &[usize]) -> Result<(f64, f64)> {
+        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        let declared = self.missing_value;
+        for frame in frames {
+            let window = self.source.window(*frame, 1)?;
+            let seen = scan(window.as_ref(), &self.archive.grid, self.archive.sample, |v| is_missing(v, declared))?;
+            range = join_ranges(range, seen.range);
+        }
+        Ok(range)
+    }
+
+    fn group_end(&self, frame: usize) -> usize {
+        frame + GROUP
+    }
+
+    fn most_planes(&self, frames: usize) -> usize {
+        2 * frames + 1
+    }
+
+    fn block_bytes(&self) -> usize {
+        // Samples in their type and as f64, and a term of ten bytes for each.
+        self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
+    }
+
+    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>> {
+        let (first, last) = (frames[0], frames[frames.len() - 1]);
+        let window = self.source.window(first, last + 1 - first)?;
+        let (archive, declared) = (&self.archive, self.missing_value);
+        let can_miss = archive.sample.is_float() || declared.is_some();
+        let absent = can_miss
+            && scan(window.as_ref(), &archive.grid, archive.sample, |v| is_missing(v, declared))?.missing > 0;
+        let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent };
+        let frames = frames.iter().map(|f| f - first).collect();
+        let blocks = self.blocks();
+        Ok(Box::new(FrameGroup { archive, blocks, missing_value: declared, window, frames, layout }))
+    }
+}
+
+/// Some frames of an archive.
+struct FrameGroup<'a> {
+    archive: &'a Archive,
+    blocks: BlockGrid,
+    missing_value: Option<f64>,
+    window: Box<dyn FrameWindow>,
+    /// Counted from the first frame of the window.
+    frames: Vec<usize>,
+    layout: Layout,
+}
+
+impl Group for FrameGroup<'_> {
+    fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    fn blocks(&self, region: &Region) -> Result<Vec<usize>> {
+        Ok(self.blocks.touching(region).collect())
+    }
+
+    fn terms(&self, block: usize) -> Result<Terms> {
+        let (archive, region) = (self.archive, self.blocks.region(block));
+        let frame_bytes = region.voxels() * archive.sample.size();
+        let mut samples = vec![0; frame_bytes * self.frames.len()];
+        for (frame, bytes) in self.frames.iter().zip(samples.chunks_exact_mut(frame_bytes)) {
+            self.window.read_box(*frame, &region, bytes)?;
+        }
+        let declared = self.missing_value;
+        Ok(Terms::of_samples(&self.layout, archive.sample, &samples, |_, v| is_missing(v, declared)))
+    }
+
+    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {
+        frames.copy_from_slice(&planes[..frames.len()]);
+    }
+
+    fn finish(&self) -> Result<()> {
+        self.window.check_unchanged()
+    }
+}

@@ -1,0 +1,292 @@
+//! A scene to pictures (method.md section 6): splat the planes of a group of frames, then invert every pixel.
+//!
+//! ```text
+//! for each group of frames of a window         plan: as many as fit in memory
+//!   for each band of rows
+//!     for each batch of blocks                 scene: read, decode, terms     (workers)
+//!       every tile splats the batch            splat: terms x footprint       (one owner per tile)
+//!     every tile inverts its pixels            scene: planes -> frames, then / weights
+//!   give the finished frames to the sink
+//! ```
+
+mod coefficients;
+pub mod colour;
+mod frames;
+mod plan;
+mod scene;
+pub mod sink;
+mod splat;
+mod weights;
+
+pub use coefficients::{CoefficientScene, What};
+pub use frames::FrameScene;
+pub use scene::Scene;
+
+use crate::camera::{Camera, View};
+use crate::error::{Error, Result};
+use crate::footprint::{Footprint, Kernel, Method};
+use crate::progress::Progress;
+use crate::volume::{BlockGrid, Grid, Region};
+use crate::wavelet::{LANES, Lane};
+use plan::Budget;
+use rayon::prelude::*;
+use scene::{Group, Layout, Terms};
+use serde::Serialize;
+use splat::{Splats, Tile, overlap, rows_reached};
+use std::ops::Range;
+use std::time::Instant;
+use weights::Weights;
+
+/// What a pixel means (method.md section 2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// g, the weighted mean along the ray; NaN is background (eq 12).
+    Mean,
+    /// I, the emission: value times length (eq 4).
+    Emission,
+}
+
+/// How to render.
+#[derive(Debug, Clone)]
+pub struct RenderConfig {
+    /// From where.
+    pub view: View,
+    /// The kernel.
+    pub kernel: Kernel,
+    /// What a pixel means.
+    pub quantity: Quantity,
+    /// Which frames, ascending.
+    pub frames: Vec<usize>,
+    /// Which voxels; by default all.
+    pub region: Option<Region>,
+    /// What splatting may add to the error: of an emission relative to the image of the largest |v|, of a mean
+    /// relative to the value range. 0 asks for the exact method.
+    pub splat_error: f64,
+    /// Bytes that may be allocated.
+    pub memory: usize,
+}
+
+/// What a rendering did.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RenderReport {
+    /// Frames rendered.
+    pub frames: usize,
+    /// The splat method.
+    pub method: &'static str,
+    /// Its stated error, in the terms of the splat error that was asked for.
+    pub stated_splat_error: f64,
+    /// Pixels per world unit.
+    pub scale: f64,
+    /// Blocks that the scene holds, over all windows touched.
+    pub blocks: u64,
+    /// Blocks that were decoded, each time counted.
+    pub blocks_read: u64,
+    /// Blocks left out because they hold nothing in the region.
+    pub blocks_empty: u64,
+    /// Blocks left out because no pixel sees them.
+    pub blocks_outside: u64,
+    /// Stored bytes that were read of blocks.
+    pub bytes_read: u64,
+    /// Nonzero coefficients splatted, each time counted.
+    pub coefficients: u64,
+    /// Seconds spent on the sums of weights.
+    pub weight_seconds: f64,
+    /// Seconds spent reading and decoding.
+    pub decode_seconds: f64,
+    /// Seconds spent splatting.
+    pub splat_seconds: f64,
+    /// Seconds spent on the inverse transform and the division by weights.
+    pub inverse_seconds: f64,
+    /// Seconds from beginning to end, without the sink.
+    pub seconds: f64,
+}
+
+/// A finished picture: `width * height` numbers, row by row.
+pub type Picture<'a> = &'a [f32];
+
+/// Renders frames in order, giving each to `sink` with its number.
+pub fn render(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    progress: &dyn Progress,
+    sink: &mut dyn FnMut(usize, Picture<'_>) -> Result<()>,
+) -> Result<RenderReport> {
+    let budget = Budget::new(config.memory, config.view.size, scene)?;
+    let (eye, method) = Eye::new(scene, config)?;
+    progress.start(Some(config.frames.len() as u64));
+    let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
+    report.stated_splat_error = method.stated_error * mean_factor(config.quantity);
+    let mut clock = Instant::now();
+    let weights = Weights::new(&eye, config.kernel, &budget)?;
+    lap(&mut clock, &mut report.weight_seconds);
+    let mut rest = config.frames.as_slice();
+    while let Some(first) = rest.first() {
+        let end = scene.group_end(*first);
+        let most = rest.partition_point(|f| *f < end);
+        let (now, later) = rest.split_at(budget.frames(scene, most));
+        let pictures = render_group(scene.group(now)?.as_ref(), &eye, &weights, config.quantity, &budget, &mut report)?;
+        for (frame, picture) in now.iter().zip(pictures.chunks_exact(eye.pixels())) {
+            sink(*frame, picture)?;
+            progress.advance(1);
+        }
+        report.frames += now.len();
+        rest = later;
+    }
+    progress.finish();
+    report.seconds = report.weight_seconds + report.decode_seconds + report.splat_seconds + report.inverse_seconds;
+    Ok(report)
+}
+
+/// How much a splat error in the sums can grow in their quotient, where weights are down to 1 % of the largest.
+fn mean_factor(quantity: Quantity) -> f64 {
+    match quantity {
+        Quantity::Mean => 1.0 / weights::BACKGROUND,
+        Quantity::Emission => 1.0,
+    }
+}
+
+/// Adds the seconds since `clock` to a stage, and restarts it.
+fn lap(clock: &mut Instant, stage: &mut f64) {
+    *stage += clock.elapsed().as_secs_f64();
+    *clock = Instant::now();
+}
+
+/// Everything that is the same for all frames of a view.
+#[derive(Debug, Clone)]
+struct Eye {
+    camera: Camera,
+    footprint: Footprint,
+    grid: Grid,
+    blocks: BlockGrid,
+    /// The voxels that are splatted.
+    clip: Region,
+}
+
+impl Eye {
+    fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<(Self, Method)> {
+        let (grid, blocks) = (*scene.grid(), scene.blocks());
+        let clip = config.region.unwrap_or(grid.whole());
+        if !grid.whole().contains(&clip) || clip.is_empty() {
+            let d = grid.dims;
+            return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
+        }
+        let method = Method::within(config.splat_error / mean_factor(config.quantity));
+        let camera = Camera::new(&config.view, &grid)?;
+        let footprint = Footprint::new(config.kernel, &grid, camera.scale, method);
+        Ok((Self { camera, footprint, grid, blocks, clip }, method))
+    }
+
+    fn pixels(&self) -> usize {
+        self.camera.size[0] * self.camera.size[1]
+    }
+
+    fn tiles(&self, rows: Range<usize>, planes: usize) -> Vec<Tile> {
+        Tile::cover(self.camera.size[0], rows, planes)
+    }
+
+    /// Whether any voxel of a block can reach these rows of the picture.
+    fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
+        let region = self.blocks.region(block).intersect(&self.clip);
+        overlap(&rows_reached(&region, &self.grid, &self.camera, &self.footprint), rows)
+    }
+
+    /// Splats blocks in order into tiles, `batch` at a time.
+    fn splat(
+        &self,
+        tiles: &mut [Tile],
+        blocks: &[usize],
+        batch: usize,
+        terms: impl Fn(usize) -> Result<Terms> + Sync,
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let mut clock = Instant::now();
+        for blocks in blocks.chunks(batch) {
+            let project = |block: &usize| {
+                let region = self.blocks.region(*block);
+                Ok(Splats::new(terms(*block)?, &region, &self.clip, &self.grid, &self.camera, &self.footprint))
+            };
+            let splats = blocks.par_iter().map(project).collect::<Result<Vec<Splats>>>()?;
+            lap(&mut clock, &mut report.decode_seconds);
+            tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|s| tile.splat(s, &self.footprint)));
+            report.coefficients += splats.iter().map(Splats::coefficients).sum::<u64>();
+            report.bytes_read += splats.iter().map(Splats::bytes_read).sum::<u64>();
+            lap(&mut clock, &mut report.splat_seconds);
+        }
+        Ok(())
+    }
+}
+
+/// All pictures of a group, one after another.
+fn render_group(
+    group: &dyn Group,
+    eye: &Eye,
+    weights: &Weights,
+    quantity: Quantity,
+    budget: &Budget,
+    report: &mut RenderReport,
+) -> Result<Vec<f32>> {
+    let layout = group.layout();
+    let blocks = group.blocks(&eye.clip)?;
+    report.blocks += eye.blocks.len() as u64;
+    report.blocks_empty += (eye.blocks.len() - blocks.len()) as u64;
+    report.blocks_outside += blocks.iter().filter(|b| !eye.sees(**b, &(0..eye.camera.size[1]))).count() as u64;
+    let mut pictures = vec![f32::NAN; layout.frames * eye.pixels()];
+    for rows in budget.bands(&layout) {
+        let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
+        report.blocks_read += seen.len() as u64;
+        let mut tiles = eye.tiles(rows.clone(), layout.planes());
+        eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
+        let mut clock = Instant::now();
+        tiles.par_iter_mut().for_each(|tile| finish(tile, group, &layout, weights, quantity));
+        tiles.iter().for_each(|tile| paste(tile, layout.frames, eye, &mut pictures));
+        lap(&mut clock, &mut report.inverse_seconds);
+    }
+    group.finish()?;
+    Ok(pictures)
+}
+
+/// Turns the planes of a tile into its pixels: the first `layout.frames` planes become the frames.
+fn finish(tile: &mut Tile, group: &dyn Group, layout: &Layout, weights: &Weights, quantity: Quantity) {
+    let pixels = tile.pixels();
+    let mut planes = vec![Lane::default(); layout.planes()];
+    let mut frames = vec![Lane::default(); layout.frames];
+    let mut out = vec![0.0; layout.frames * pixels];
+    for first in (0..pixels).step_by(LANES) {
+        let count = LANES.min(pixels - first);
+        for (p, lane) in planes.iter_mut().enumerate() {
+            lane[..count].copy_from_slice(&tile.planes[p * pixels + first..][..count]);
+        }
+        let absent: Vec<Lane> = (0..layout.frames).map(|f| absent_weight(layout, &planes, f)).collect();
+        group.reconstruct(&mut planes, &mut frames);
+        for (f, emission) in frames.iter().enumerate() {
+            for l in 0..count {
+                let at = weights.at(tile, first + l);
+                out[f * pixels + first + l] = match quantity {
+                    Quantity::Mean => at.mean(emission[l], absent[f][l]),
+                    Quantity::Emission => emission[l],
+                };
+            }
+        }
+    }
+    tile.planes = out;
+}
+
+/// The weights that are missing in a frame.
+fn absent_weight(layout: &Layout, planes: &[Lane], frame: usize) -> Lane {
+    if !layout.absent {
+        return Lane::default();
+    }
+    let (one, all) = (planes[layout.absent(frame)], planes[layout.absent_in_all()]);
+    std::array::from_fn(|l| one[l] + all[l])
+}
+
+/// Copies the frames of a finished tile to their places in the pictures.
+fn paste(tile: &Tile, frames: usize, eye: &Eye, pictures: &mut [f32]) {
+    let width = tile.x.len();
+    for (f, pixels) in tile.planes.chunks_exact(tile.pixels()).take(frames).enumerate() {
+        for (y, line) in tile.y.clone().zip(pixels.chunks_exact(width)) {
+            let at = f * eye.pixels() + y * eye.camera.size[0] + tile.x.start;
+            pictures[at..at + width].iter_mut().zip(line).for_each(|(to, from)| *to = *from as f32);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! How much of a picture is worked on at a time, so that memory stays within its budget.
+//!
+//! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
+
+use super::scene::{Layout, Scene};
+use super::splat::TILE;
+use crate::error::{Error, Result};
+use std::ops::Range;
+
+/// What is allocated at once.
+#[derive(Debug, Clone, Copy)]
+pub struct Budget {
+    /// Bytes left for pictures, planes and blocks, besides weights.
+    available: usize,
+    size: [usize; 2],
+    block_bytes: usize,
+}
+
+/// Program, stacks, directories.
+const FIXED_MEMORY: usize = 8 << 20;
+/// The weights' sum, and that of uncut footprints, for every pixel.
+const WEIGHT_BYTES: usize = 16;
+
+impl Budget {
+    /// For pictures of `size` pixels of a scene.
+    pub fn new(memory: usize, size: [usize; 2], scene: &dyn Scene) -> Result<Self> {
+        let fixed = FIXED_MEMORY + size[0] * size[1] * WEIGHT_BYTES;
+        let budget = Self { available: memory.saturating_sub(fixed), size, block_bytes: scene.block_bytes() };
+        let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1)) + budget.block_bytes;
+        if least > budget.available {
+            let mib = (fixed + least).div_ceil(1 << 20);
+            let what = format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
+            return Err(Error::usage(what));
+        }
+        Ok(budget)
+    }
+
+    /// Finished pictures of a group, as f32.
+    fn picture_bytes(&self, frames: usize) -> usize {
+        frames * self.size[0] * self.size[1] * size_of::<f32>()
+    }
+
+    /// One row of tiles with all planes.
+    fn row_bytes(&self, planes: usize) -> usize {
+        planes * self.size[0] * TILE * size_of::<f64>()
+    }
+
+    /// How many of `most` frames to render together.
+    pub fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
+        let fits = |f: &usize| {
+            let planes = self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
+            self.picture_bytes(*f) <= self.available / 3 && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
+        };
+        (1..=most).rev().find(fits).unwrap_or(1)
+    }
+
+    /// The bands of rows to splat one after another, each as tall as fits.
+    pub fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
+        let left = self.available - self.picture_bytes(layout.frames) - self.block_bytes;
+        let rows = (left / self.row_bytes(layout.planes()).max(1)).max(1).saturating_mul(TILE);
+        (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
+    }
+
+    /// How many blocks to decode at a time while a band of `rows` is splatted.
+    pub fn batch(&self, layout: &Layout, rows: usize) -> usize {
+        let used = self.picture_bytes(layout.frames) + self.row_bytes(layout.planes()) * rows.div_ceil(TILE);
+        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, MOST_BLOCKS)
+    }
+}
+
+/// Enough blocks to keep workers busy.
+const MOST_BLOCKS: usize = 64;

@@ -1,0 +1,192 @@
+//! What is splatted: a scene gives the terms of its blocks, whatever they are made of.
+//!
+//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes, and a
+//! linear map from planes to frames. That is all the rest of the renderer knows of them.
+
+use crate::error::Result;
+use crate::sample::{self, SampleType};
+use crate::volume::{BlockGrid, Grid, Region};
+use crate::wavelet::Lane;
+
+/// Something to render.
+pub trait Scene {
+    /// The lattice.
+    fn grid(&self) -> &Grid;
+
+    /// How the lattice is cut into blocks.
+    fn blocks(&self) -> BlockGrid;
+
+    /// Number of frames, if it is known before they are read.
+    fn frames(&self) -> Option<usize>;
+
+    /// Range of the values of all frames asked for, as far as it is known without rendering.
+    fn range(&mut self, frames: &[usize]) -> Result<(f64, f64)>;
+
+    /// Where the frames end that can be rendered together with `frame`.
+    fn group_end(&self, frame: usize) -> usize;
+
+    /// An upper bound of the planes that `frames` frames of a group need.
+    fn most_planes(&self, frames: usize) -> usize;
+
+    /// An upper bound of the bytes that one block takes while its terms are made.
+    fn block_bytes(&self) -> usize;
+
+    /// Opens some frames of one group, ascending.
+    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>>;
+}
+
+/// Some frames that are rendered together.
+pub trait Group: Sync {
+    /// How the planes are used.
+    fn layout(&self) -> Layout;
+
+    /// The blocks that touch `region` and hold anything.
+    fn blocks(&self, region: &Region) -> Result<Vec<usize>>;
+
+    /// The terms of a block.
+    fn terms(&self, block: usize) -> Result<Terms>;
+
+    /// The frames at some pixels from their planes: the inverse transform (eq 8). Overwrites `planes`.
+    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]);
+
+    /// An error if what was read changed meanwhile.
+    fn finish(&self) -> Result<()>;
+}
+
+/// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
+/// missing in single frames, and last of what is missing in all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Planes of coefficients.
+    pub coefficients: usize,
+    /// Frames of the group.
+    pub frames: usize,
+    /// Whether values are splatted into single frames.
+    pub values: bool,
+    /// Whether anything is missing.
+    pub absent: bool,
+}
+
+impl Layout {
+    /// The plane of the values of a frame.
+    pub fn value(&self, frame: usize) -> usize {
+        self.coefficients + frame
+    }
+
+    /// Number of planes whose sums are values.
+    pub fn value_planes(&self) -> usize {
+        self.coefficients + if self.values { self.frames } else { 0 }
+    }
+
+    /// The plane of the weights that are missing in a frame.
+    pub fn absent(&self, frame: usize) -> usize {
+        self.value_planes() + frame
+    }
+
+    /// The plane of the weights that are missing in all frames.
+    pub fn absent_in_all(&self) -> usize {
+        self.value_planes() + self.frames
+    }
+
+    /// Number of planes.
+    pub fn planes(&self) -> usize {
+        self.value_planes() + if self.absent { self.frames + 1 } else { 0 }
+    }
+}
+
+/// What a block adds to the planes: for each voxel in array order, some (plane, amount).
+#[derive(Debug, Default)]
+pub struct Terms {
+    ends: Vec<u32>,
+    planes: Vec<u16>,
+    amounts: Vec<f64>,
+    /// Nonzero coefficients among them.
+    pub coefficients: u64,
+    /// Stored bytes that were read for them.
+    pub bytes_read: u64,
+}
+
+impl Terms {
+    /// Without a voxel yet.
+    pub fn new(bytes_read: u64) -> Self {
+        Self { bytes_read, ..Self::default() }
+    }
+
+    /// One term of 1 in plane 0 for every voxel: what the weights are made of.
+    pub fn ones(voxels: usize) -> Self {
+        let mut terms = Self::default();
+        for _ in 0..voxels {
+            terms.add(0, 1.0);
+            terms.end_voxel();
+        }
+        terms
+    }
+
+    /// Adds a term to the current voxel.
+    pub fn add(&mut self, plane: usize, amount: f64) {
+        self.planes.push(plane as u16);
+        self.amounts.push(amount);
+    }
+
+    /// Goes on to the next voxel.
+    pub fn end_voxel(&mut self) {
+        self.ends.push(self.planes.len() as u32);
+    }
+
+    /// The planes and amounts of a voxel.
+    pub fn of_voxel(&self, voxel: usize) -> (&[u16], &[f64]) {
+        let start = if voxel == 0 { 0 } else { self.ends[voxel - 1] as usize };
+        let range = start..self.ends[voxel] as usize;
+        (&self.planes[range.clone()], &self.amounts[range])
+    }
+
+    /// Weights that are missing: `absent(frame)` of the frames of the current voxel.
+    pub fn add_absent(&mut self, layout: &Layout, absent: impl Fn(usize) -> bool) {
+        if (0..layout.frames).all(&absent) {
+            self.add(layout.absent_in_all(), 1.0);
+        } else {
+            (0..layout.frames).filter(|f| absent(*f)).for_each(|f| self.add(layout.absent(f), 1.0));
+        }
+    }
+
+    /// The terms of samples that are splatted frame by frame: `samples` holds `layout.frames` frames of `voxels`.
+    pub fn of_samples(layout: &Layout, ty: SampleType, samples: &[u8], is_missing: impl Fn(usize, f64) -> bool) -> Self {
+        let mut values = vec![0.0; samples.len() / ty.size()];
+        sample::load(ty, samples, &mut values);
+        let voxels = values.len() / layout.frames;
+        let mut terms = Self::default();
+        for voxel in 0..voxels {
+            let missing = |f: usize| is_missing(f * voxels + voxel, values[f * voxels + voxel]);
+            for f in (0..layout.frames).filter(|f| !missing(*f) && values[f * voxels + voxel] != 0.0) {
+                terms.add(layout.value(f), values[f * voxels + voxel]);
+            }
+            if layout.absent {
+                terms.add_absent(layout, missing);
+            }
+            terms.end_voxel();
+        }
+        terms
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_follow_one_another() {
+        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true };
+        assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all(), layout.planes()), (5, 8, 11, 12));
+        let plain = Layout { values: false, absent: false, ..layout };
+        assert_eq!(plain.planes(), 5);
+    }
+
+    #[test]
+    fn a_voxel_missing_in_all_frames_takes_one_term() {
+        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true };
+        let samples: Vec<u8> = [f32::NAN, 1.0, f32::NAN, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let terms = Terms::of_samples(&layout, SampleType::F32, &samples, |_, v| v.is_nan());
+        assert_eq!(terms.of_voxel(0), (&[4u16][..], &[1.0][..]));
+        assert_eq!(terms.of_voxel(1), (&[0u16, 1][..], &[1.0, 2.0][..]));
+    }
+}

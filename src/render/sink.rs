@@ -1,0 +1,209 @@
+//! Finished pictures out: numbered PNG files, or one stream for another program.
+
+use super::Picture;
+use super::colour::ColourMap;
+use crate::error::{Error, Result};
+use crate::npy;
+use crate::output::Output;
+use crate::sample::SampleType;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// How pictures are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// One PNG for each, 8 bits a channel; in a stream one after the other.
+    Png,
+    /// One NumPy array for all: float32 (frames, H, W), or uint8 (frames, H, W, 3) if colours were asked for.
+    Npy,
+    /// YUV4MPEG2, 4:4:4, full range: for video encoders and players.
+    Y4m,
+    /// Three bytes a pixel, nothing else.
+    Rgb24,
+    /// Two little-endian bytes a pixel over the range, nothing else.
+    Gray16,
+}
+
+impl PictureFormat {
+    /// The formats by their names, which are also the endings of files.
+    pub const NAMES: [(&'static str, Self); 5] =
+        [("png", Self::Png), ("npy", Self::Npy), ("y4m", Self::Y4m), ("rgb24", Self::Rgb24), ("gray16", Self::Gray16)];
+}
+
+/// What all pictures have in common.
+#[derive(Debug, Clone)]
+pub struct SinkConfig {
+    /// How they are written.
+    pub format: PictureFormat,
+    /// Width and height.
+    pub size: [usize; 2],
+    /// How many there will be.
+    pub frames: usize,
+    /// Frames a second, where the format says it.
+    pub fps: u32,
+    /// Values to colours.
+    pub colours: ColourMap,
+    /// Whether an array holds colours instead of values.
+    pub coloured_array: bool,
+    /// Replace existing files.
+    pub force: bool,
+}
+
+/// Where pictures go.
+#[derive(Debug)]
+pub enum Sink {
+    /// To one file or stream.
+    One(Box<Output>, SinkConfig),
+    /// Each to a file of its own, named by [`Numbered`].
+    Many(Numbered, SinkConfig),
+}
+
+impl Sink {
+    /// Opens `path`: `-`, a file, or a pattern as `frame_%04d.png` that numbers PNG files.
+    pub fn open(path: &Path, config: SinkConfig) -> Result<Self> {
+        if config.format == PictureFormat::Png && path != Path::new(crate::output::STANDARD) {
+            return Ok(Self::Many(Numbered::new(path, config.frames)?, config));
+        }
+        let mut out = Output::create(path, config.force)?;
+        begin(&config, &mut out).map_err(|e| Error::io(path, "writing", e))?;
+        Ok(Self::One(Box::new(out), config))
+    }
+
+    /// Writes the picture of a frame.
+    pub fn picture(&mut self, frame: usize, picture: Picture<'_>) -> Result<()> {
+        match self {
+            Self::One(out, config) => {
+                write(config, picture, out).map_err(|e| Error::io(out.path(), format!("writing frame {frame}"), e))
+            }
+            Self::Many(names, config) => {
+                let path = names.of(frame);
+                let mut out = Output::create(&path, config.force)?;
+                write(config, picture, &mut out).map_err(|e| Error::io(&path, "writing", e))?;
+                out.commit()
+            }
+        }
+    }
+
+    /// Ends the stream and gives the file its final name.
+    pub fn finish(self) -> Result<()> {
+        match self {
+            Self::One(out, _) => out.commit(),
+            Self::Many(..) => Ok(()),
+        }
+    }
+}
+
+/// Names of numbered files.
+#[derive(Debug)]
+pub struct Numbered {
+    before: String,
+    after: String,
+    /// Digits of the number; none: there is but one file.
+    digits: Option<usize>,
+}
+
+impl Numbered {
+    /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one picture.
+    fn new(path: &Path, frames: usize) -> Result<Self> {
+        let name = path.to_string_lossy().into_owned();
+        let Some((before, rest)) = name.split_once('%') else {
+            if frames != 1 {
+                let what = format!("-o {name}: {frames} frames need a numbered name, as frame_%04d.png");
+                return Err(Error::usage(what));
+            }
+            return Ok(Self { before: name, after: String::new(), digits: None });
+        };
+        let place = rest.split_once('d').filter(|(digits, after)| digits.len() < 4 && !after.contains('%'));
+        let parsed = place.and_then(|(digits, after)| {
+            let number = if digits.is_empty() { Some(1) } else { digits.parse().ok() };
+            number.map(|n: usize| (n, after))
+        });
+        let Some((digits, after)) = parsed else {
+            return Err(Error::usage(format!("-o {name}: the number's place is %d or, with zeros, %04d")));
+        };
+        Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
+    }
+
+    fn of(&self, frame: usize) -> PathBuf {
+        match self.digits {
+            Some(digits) => format!("{}{frame:0digits$}{}", self.before, self.after).into(),
+            None => PathBuf::from(&self.before),
+        }
+    }
+}
+
+/// Writes what comes before the first picture of a stream.
+fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
+    let [width, height] = config.size;
+    match config.format {
+        PictureFormat::Npy if config.coloured_array => {
+            npy::write_header(SampleType::U8, &[config.frames, height, width, 3], out)
+        }
+        PictureFormat::Npy => npy::write_header(SampleType::F32, &[config.frames, height, width], out),
+        PictureFormat::Y4m => {
+            writeln!(out, "YUV4MPEG2 W{width} H{height} F{}:1 Ip A1:1 C444 XCOLORRANGE=FULL", config.fps)
+        }
+        PictureFormat::Png | PictureFormat::Rgb24 | PictureFormat::Gray16 => Ok(()),
+    }
+}
+
+/// Writes one picture.
+fn write(config: &SinkConfig, picture: Picture<'_>, out: &mut impl Write) -> io::Result<()> {
+    let rgb = || picture.iter().flat_map(|v| config.colours.colour(*v)).collect::<Vec<u8>>();
+    match config.format {
+        PictureFormat::Png => write_png(config.size, &rgb(), out),
+        PictureFormat::Npy if !config.coloured_array => {
+            out.write_all(&picture.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
+        }
+        PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(&rgb()),
+        PictureFormat::Y4m => {
+            writeln!(out, "FRAME")?;
+            let pixels: Vec<[u8; 3]> = picture.iter().map(|v| yuv(config.colours.colour(*v))).collect();
+            (0..3).try_for_each(|plane| out.write_all(&pixels.iter().map(|p| p[plane]).collect::<Vec<u8>>()))
+        }
+        PictureFormat::Gray16 => {
+            let level = |v: &f32| ((config.colours.share(*v) * 65535.0).round() as u16).to_le_bytes();
+            out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
+        }
+    }
+}
+
+fn write_png(size: [usize; 2], rgb: &[u8], out: &mut impl Write) -> io::Result<()> {
+    let mut encoder = png::Encoder::new(out, size[0] as u32, size[1] as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb)?;
+    Ok(writer.finish()?)
+}
+
+/// Full-range BT.601, what players assume of a stream that does not say more.
+fn yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
+    let [r, g, b] = [r, g, b].map(f64::from);
+    let y = 0.299 * r + 0.587 * g + 0.114 * b;
+    let byte = |v: f64| v.round().clamp(0.0, 255.0) as u8;
+    [byte(y), byte(128.0 + (b - y) / 1.772), byte(128.0 + (r - y) / 1.402)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_number_files() {
+        let name = |pattern: &str, frame| Numbered::new(Path::new(pattern), 2).map(|n| n.of(frame));
+        assert_eq!(name("a_%04d.png", 7).expect("a pattern"), Path::new("a_0007.png"));
+        assert_eq!(name("a_%d.png", 12).expect("a pattern"), Path::new("a_12.png"));
+        for bad in ["a.png", "a_%x.png", "a_%4d_%d.png", "a%"] {
+            assert!(name(bad, 0).is_err(), "{bad}");
+        }
+        assert_eq!(Numbered::new(Path::new("a.png"), 1).expect("one picture").of(5), Path::new("a.png"));
+    }
+
+    #[test]
+    fn grey_has_no_chroma() {
+        for level in [0, 1, 127, 255] {
+            assert_eq!(yuv([level; 3]), [level, 128, 128]);
+        }
+    }
+}

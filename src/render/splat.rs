@@ -1,0 +1,178 @@
+//! The splat: terms of voxels times footprints into the planes of one tile of the picture (eq 4 and 9).
+//!
+//! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
+//! is tiled or on the number of threads. Sums are in f64.
+
+use super::scene::Terms;
+use crate::camera::Camera;
+use crate::footprint::Footprint;
+use crate::volume::{Grid, Region};
+use std::ops::Range;
+
+/// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
+pub const TILE: usize = 64;
+
+/// A rectangle of pixels with its planes.
+#[derive(Debug)]
+pub struct Tile {
+    /// Columns of the picture.
+    pub x: Range<usize>,
+    /// Rows of the picture.
+    pub y: Range<usize>,
+    /// Plane by plane, row by row.
+    pub planes: Vec<f64>,
+}
+
+impl Tile {
+    /// The tiles of the rows `y` of a picture `width` pixels wide, with all planes at zero.
+    pub fn cover(width: usize, y: Range<usize>, planes: usize) -> Vec<Self> {
+        let pieces = |r: Range<usize>| r.clone().step_by(TILE).map(move |s| s..(s + TILE).min(r.end));
+        pieces(y)
+            .flat_map(|y| pieces(0..width).map(move |x| (x, y.clone())))
+            .map(|(x, y)| Self { planes: vec![0.0; planes * x.len() * y.len()], x, y })
+            .collect()
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.x.len() * self.y.len()
+    }
+
+    /// Adds a block's voxels.
+    pub fn splat(&mut self, voxels: &Splats, footprint: &Footprint) {
+        if !(overlap(&voxels.x, &self.x) && overlap(&voxels.y, &self.y)) {
+            return;
+        }
+        let (mut column, mut row) = (Vec::new(), Vec::new());
+        for voxel in &voxels.voxels {
+            let (full_x, full_y) = (footprint.span(voxel.x, voxels.size[0]), footprint.span(voxel.y, voxels.size[1]));
+            let (x, y) = (intersect(&full_x, &self.x), intersect(&full_y, &self.y));
+            if x.is_empty() || y.is_empty() {
+                continue;
+            }
+            // Weights begin at the footprint's own edge, so that a tile's edge cannot change their last bits.
+            footprint.weights(voxel.x, &full_x, &mut row);
+            footprint.weights(voxel.y, &full_y, &mut column);
+            let row = &row[x.start - full_x.start..x.end - full_x.start];
+            let column = &column[y.start - full_y.start..y.end - full_y.start];
+            let (planes, amounts) = voxels.terms.of_voxel(voxel.index);
+            for (plane, amount) in planes.iter().zip(amounts) {
+                self.add(usize::from(*plane), amount * voxel.weight, (x.start, row), (y.start, column));
+            }
+        }
+    }
+
+    /// Adds `amount` times the outer product of a row and a column of weights to a plane.
+    fn add(&mut self, plane: usize, amount: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+        let width = self.x.len();
+        let start = plane * self.pixels() + (y - self.y.start) * width + (x - self.x.start);
+        for (i, weight) in column.iter().enumerate() {
+            let factor = amount * weight;
+            let line = &mut self.planes[start + i * width..][..row.len()];
+            for (pixel, w) in line.iter_mut().zip(row) {
+                *pixel += factor * w;
+            }
+        }
+    }
+}
+
+/// A block's voxels as the camera sees them.
+#[derive(Debug)]
+pub struct Splats {
+    voxels: Vec<Splat>,
+    terms: Terms,
+    size: [usize; 2],
+    /// Columns and rows of the picture that they reach.
+    x: Range<usize>,
+    y: Range<usize>,
+}
+
+#[derive(Debug)]
+struct Splat {
+    /// The voxel's number in its block.
+    index: usize,
+    x: f64,
+    y: f64,
+    /// exp(-tau z) f(0, 0).
+    weight: f64,
+}
+
+impl Splats {
+    /// Projects the voxels of the block at `region` that lie in `clip` and have terms.
+    pub fn new(terms: Terms, region: &Region, clip: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Self {
+        let mut voxels = Vec::new();
+        let whole = region.relative_to(region.start);
+        for v in region.intersect(clip).iter() {
+            let index = whole.index(std::array::from_fn(|a| v[a] - region.start[a]));
+            if !terms.of_voxel(index).0.is_empty() {
+                let [x, y, z] = camera.project(grid.position(v));
+                voxels.push(Splat { index, x, y, weight: footprint.at_depth(z) });
+            }
+        }
+        let size = camera.size;
+        let x = reach(voxels.iter().map(|v| footprint.span(v.x, size[0])));
+        let y = reach(voxels.iter().map(|v| footprint.span(v.y, size[1])));
+        Self { voxels, terms, size, x, y }
+    }
+
+    /// Nonzero coefficients among the terms.
+    pub fn coefficients(&self) -> u64 {
+        self.terms.coefficients
+    }
+
+    /// Stored bytes that were read.
+    pub fn bytes_read(&self) -> u64 {
+        self.terms.bytes_read
+    }
+}
+
+/// The smallest range that holds all that are not empty.
+fn reach(spans: impl Iterator<Item = Range<usize>>) -> Range<usize> {
+    let all = spans.filter(|s| !s.is_empty()).reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
+    all.unwrap_or(0..0)
+}
+
+/// The rows of the picture that any voxel of a block can reach; a block that reaches no column reaches no row.
+pub fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
+    let ends: [[f64; 3]; 2] = [grid.position(region.start), grid.position(region.end.map(|e| e - 1))];
+    let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for corner in 0..8 {
+        let projected = camera.project(std::array::from_fn(|a| ends[corner >> a & 1][a]));
+        for a in 0..2 {
+            lo[a] = lo[a].min(projected[a]);
+            hi[a] = hi[a].max(projected[a]);
+        }
+    }
+    // A pixel more on each side than rounding could move an edge.
+    let span = |a: usize| {
+        let (from, to) = (lo[a] - footprint.reach - 1.0, hi[a] + footprint.reach + 1.0);
+        let end = to.clamp(0.0, camera.size[a] as f64).ceil() as usize;
+        from.clamp(0.0, end as f64).floor() as usize..end
+    };
+    if span(0).is_empty() { 0..0 } else { span(1) }
+}
+
+/// Whether two ranges share anything.
+pub fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+    !intersect(a, b).is_empty()
+}
+
+fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_each_pixel_once() {
+        let mut seen = vec![0; 150 * 100];
+        for tile in Tile::cover(150, 30..100, 1) {
+            for y in tile.y.clone() {
+                tile.x.clone().for_each(|x| seen[y * 150 + x] += 1);
+            }
+        }
+        assert!(seen[..30 * 150].iter().all(|n| *n == 0) && seen[30 * 150..].iter().all(|n| *n == 1));
+    }
+}

@@ -1,0 +1,77 @@
+//! Some frames and some voxels of an archive, as an archive of its own.
+
+use super::{Archive, FrameSource, FrameWindow};
+use crate::error::{Error, Result};
+use crate::volume::Region;
+
+/// Every `step`-th frame from `first`, `frames` of them (all that come, if unknown), and in them the voxels of `region`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Selection {
+    /// The first frame.
+    pub first: usize,
+    /// Frames from one to the next.
+    pub step: usize,
+    /// How many frames; of a stream none: until it ends.
+    pub frames: Option<usize>,
+    /// The voxels.
+    pub region: Region,
+}
+
+/// Narrows a source to a selection, which must lie within it.
+pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<dyn FrameSource>> {
+    let mut archive = source.archive().clone();
+    let whole = archive.grid.whole();
+    if !whole.contains(&selection.region) || selection.region.is_empty() {
+        let [x, y, z] = archive.grid.dims;
+        return Err(Error::usage(format!("--region: not within the volume of {x}x{y}x{z} voxels, or empty")));
+    }
+    archive.grid = archive.grid.crop(&selection.region);
+    archive.frames = selection.frames;
+    archive.times = archive.times.iter().skip(selection.first).step_by(selection.step).copied().collect();
+    archive.times.truncate(selection.frames.unwrap_or(usize::MAX));
+    Ok(Box::new(Selected { source, archive, selection }))
+}
+
+struct Selected {
+    source: Box<dyn FrameSource>,
+    archive: Archive,
+    selection: Selection,
+}
+
+impl FrameSource for Selected {
+    fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
+        let Selection { first: start, step, region, .. } = self.selection;
+        let window = self.source.window(start + first * step, (count.max(1) - 1) * step + 1)?;
+        let frames = window.frames().div_ceil(step).min(count);
+        Ok(Box::new(SelectedWindow { window, frames, step, region }))
+    }
+}
+
+struct SelectedWindow {
+    window: Box<dyn FrameWindow>,
+    frames: usize,
+    step: usize,
+    region: Region,
+}
+
+impl FrameWindow for SelectedWindow {
+    fn frames(&self) -> usize {
+        self.frames
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        self.window.read_box(frame * self.step, &region.moved_by(self.region.start), out)
+    }
+
+    fn name(&self, frame: usize) -> String {
+        self.window.name(frame * self.step)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        self.window.check_unchanged()
+    }
+}

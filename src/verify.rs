@@ -1,0 +1,177 @@
+//! Is a coefficient file whole, and does it keep its promise?
+
+use crate::bound::{self, difference_up};
+use crate::codec::WindowCodec;
+use crate::error::{Error, Result};
+use crate::file::CoefficientFile;
+use crate::progress::Progress;
+use crate::sample;
+use crate::source::{FrameSource, FrameWindow};
+use rayon::prelude::*;
+use serde::Serialize;
+use wavesplat_format::BlockEntry;
+
+/// What a check of the file alone found.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct VerifyReport {
+    /// Blocks that were read and decoded.
+    pub blocks: u64,
+    /// Bytes of the file, all of them checked.
+    pub bytes: u64,
+    /// What the comparison with the source found.
+    pub against: Option<Comparison>,
+}
+
+/// What a comparison with the source found.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Comparison {
+    /// Samples compared.
+    pub samples: u64,
+    /// Largest |decoded - source|, rounded up.
+    pub largest_error: f64,
+    /// Root of the mean squared error over all samples that are not missing.
+    pub rms_error: f64,
+    /// Missing samples, found missing and with the same bytes in both.
+    pub missing: u64,
+    /// The largest error in units of its window's bound; 0 where both are 0.
+    pub largest_share_of_bound: f64,
+    /// Series (of a voxel in a window) outside the bound.
+    pub series_outside: u64,
+    #[serde(skip)]
+    squares: f64,
+}
+
+impl Comparison {
+    fn join(self, other: Self) -> Self {
+        Self {
+            samples: self.samples + other.samples,
+            largest_error: self.largest_error.max(other.largest_error),
+            rms_error: 0.0,
+            missing: self.missing + other.missing,
+            largest_share_of_bound: self.largest_share_of_bound.max(other.largest_share_of_bound),
+            series_outside: self.series_outside + other.series_outside,
+            squares: self.squares + other.squares,
+        }
+    }
+}
+
+/// Checks every byte of the file, and with a source every sample; the source must give the frames and the region that
+/// were converted.
+pub fn verify(
+    file: &CoefficientFile,
+    mut source: Option<&mut dyn FrameSource>,
+    progress: &dyn Progress,
+) -> Result<VerifyReport> {
+    progress.start(Some(file.metadata().blocks()));
+    if let Some(source) = &source {
+        same_shape(file, *source)?;
+    }
+    file.check_structure()?;
+    let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
+    let mut all = Comparison::default();
+    for window in 0..file.metadata().windows.len() as u32 {
+        let codec = file.codec(window)?;
+        let range = file.window_range(window);
+        let frames = source.as_mut().map(|s| s.window(range.start, range.len())).transpose()?;
+        if let Some(frames) = frames.as_ref().filter(|f| f.frames() < range.len()) {
+            let what = format!("ends after {} frames, {} were converted", range.start + frames.frames(), file.frames());
+            return Err(Error::input(frames.name(0), what));
+        }
+        for leaf in file.leaves(window) {
+            let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
+            let entries = file.leaf(leaf)?;
+            let found = entries.par_iter().map(check).collect::<Result<Vec<_>>>()?;
+            all = found.into_iter().fold(all, Comparison::join);
+            report.blocks += entries.len() as u64;
+            progress.advance(entries.len() as u64);
+        }
+    }
+    file.check_unchanged()?;
+    progress.finish();
+    if source.is_some() {
+        all.rms_error = (all.squares / (all.samples - all.missing).max(1) as f64).sqrt();
+        report.against = Some(all);
+    }
+    Ok(report)
+}
+
+fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
+    let (a, b) = (source.archive(), file);
+    if a.grid.dims != b.grid.dims || a.sample != b.sample() || a.frames.is_some_and(|f| f != b.frames()) {
+        let [x, y, z] = a.grid.dims;
+        let [fx, fy, fz] = b.grid.dims;
+        let frames = a.frames.map_or("unknown".into(), |f| f.to_string());
+        return Err(Error::usage(format!(
+            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {}",
+            a.sample,
+            b.frames(),
+            b.sample()
+        )));
+    }
+    Ok(())
+}
+
+/// Decodes a block, whose parts are all checked by that, and compares it if there is a source.
+fn check_block(
+    file: &CoefficientFile,
+    codec: &WindowCodec,
+    entry: &BlockEntry,
+    source: Option<&dyn FrameWindow>,
+) -> Result<Comparison> {
+    let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
+    let Some(source) = source else { return Ok(Comparison::default()) };
+    let region = file.blocks.region(entry.id.block as usize);
+    let decoded = block.samples(codec);
+    let frame_bytes = region.voxels() * codec.sample.size();
+    let mut original = vec![0; decoded.len()];
+    for (frame, bytes) in original.chunks_exact_mut(frame_bytes).enumerate() {
+        source.read_box(frame, &region, bytes)?;
+    }
+    Ok(compare(codec, &original, &decoded))
+}
+
+/// Compares the samples of a block, `frame * voxels + voxel`.
+fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8]) -> Comparison {
+    let size = codec.sample.size();
+    let samples = original.len() / size;
+    let voxels = samples / codec.frames();
+    let (mut x, mut y) = (vec![0.0; samples], vec![0.0; samples]);
+    sample::load(codec.sample, original, &mut x);
+    sample::load(codec.sample, decoded, &mut y);
+    let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
+    for voxel in 0..voxels {
+        let errors: Vec<f64> = (voxel..samples)
+            .step_by(voxels)
+            .map(|i| {
+                let same = original[i * size..(i + 1) * size] == decoded[i * size..(i + 1) * size];
+                found.missing += u64::from(same && codec.is_missing(x[i]));
+                if same { 0.0 } else { error(x[i], y[i]) }
+            })
+            .collect();
+        add_series(codec, &errors, &mut found);
+    }
+    found
+}
+
+/// A difference that is not a number, as of a missing sample that was lost, is infinite.
+fn error(x: f64, y: f64) -> f64 {
+    let e = difference_up(y, x);
+    if e.is_nan() { f64::INFINITY } else { e }
+}
+
+fn add_series(codec: &WindowCodec, errors: &[f64], found: &mut Comparison) {
+    let largest = errors.iter().copied().fold(0.0, f64::max);
+    let squares: f64 = errors.iter().map(|e| e * e).sum();
+    let reached = match codec.bound {
+        bound::Bound::Pointwise => largest,
+        bound::Bound::Rms => (squares / errors.len() as f64).sqrt(),
+    };
+    found.largest_error = found.largest_error.max(largest);
+    found.squares += squares;
+    if reached > 0.0 {
+        found.largest_share_of_bound = found.largest_share_of_bound.max(reached / codec.delta);
+    }
+    if !bound::holds(codec.bound, codec.delta, errors.iter().copied()) && largest > 0.0 {
+        found.series_outside += 1;
+    }
+}

@@ -1,0 +1,100 @@
+//! The Haar basis, orthonormal on the samples of a window of any length.
+//!
+//! Each step turns two neighbours, means of m1 and m2 samples, into a sum and a difference by the rotation
+//!
+//! ```text
+//! s =  a x1 + b x2        a = sqrt(m1 / (m1 + m2))
+//! d =  b x1 - a x2        b = sqrt(m2 / (m1 + m2))
+//! ```
+//!
+//! which for m1 = m2 is Haar's own (x1 +- x2) / sqrt 2. An odd one at the end is carried up as it is; its smaller
+//! weight there keeps constants in one coefficient, so that a last, short window needs no invented frames.
+
+use super::{Lane, TimeBasis};
+
+/// Haar's basis for one window.
+#[derive(Debug)]
+pub struct Haar {
+    frames: usize,
+    /// The rotations (a, b) of each step, fine to coarse.
+    steps: Vec<Vec<(f64, f64)>>,
+}
+
+impl Haar {
+    /// For windows of `frames` frames, at least 1.
+    pub fn new(frames: usize) -> Self {
+        let mut weights = vec![1.0; frames];
+        let mut steps = Vec::new();
+        while weights.len() > 1 {
+            steps.push(weights.as_chunks().0.iter().map(|[m1, m2]| rotation(*m1, *m2)).collect());
+            weights = weights.chunks(2).map(|pair| pair.iter().sum()).collect();
+        }
+        Self { frames, steps }
+    }
+}
+
+fn rotation(m1: f64, m2: f64) -> (f64, f64) {
+    ((m1 / (m1 + m2)).sqrt(), (m2 / (m1 + m2)).sqrt())
+}
+
+impl TimeBasis for Haar {
+    fn frames(&self) -> usize {
+        self.frames
+    }
+
+    fn coefficients(&self) -> usize {
+        self.frames
+    }
+
+    fn levels(&self) -> Vec<usize> {
+        std::iter::once(1).chain(self.steps.iter().rev().map(Vec::len)).collect()
+    }
+
+    fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
+        let mut sums = series.to_vec();
+        let mut end = self.frames;
+        for step in &self.steps {
+            let details = &mut coefficients[end - step.len()..end];
+            for (i, ((a, b), detail)) in step.iter().zip(details).enumerate() {
+                let (x1, x2) = (sums[2 * i], sums[2 * i + 1]);
+                sums[i] = combine(*a, &x1, *b, &x2);
+                *detail = combine(*b, &x1, -*a, &x2);
+            }
+            carry_odd(&mut sums, step.len());
+            end -= step.len();
+        }
+        coefficients[..end].copy_from_slice(&sums);
+    }
+
+    fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
+        series[0] = coefficients[0];
+        let mut len = 1;
+        for step in self.steps.iter().rev() {
+            let details = &coefficients[len..len + step.len()];
+            if len > step.len() {
+                series[2 * step.len()] = series[step.len()];
+            }
+            for (i, ((a, b), detail)) in step.iter().zip(details).enumerate().rev() {
+                let sum = series[i];
+                series[2 * i] = combine(*a, &sum, *b, detail);
+                series[2 * i + 1] = combine(*b, &sum, -*a, detail);
+            }
+            len += step.len();
+        }
+    }
+}
+
+/// Shortens `sums` to its first `pairs` entries, and the odd one at its end where there is one.
+fn carry_odd(sums: &mut Vec<Lane>, pairs: usize) {
+    if sums.len() > 2 * pairs {
+        sums[pairs] = sums[2 * pairs];
+        sums.truncate(pairs + 1);
+    } else {
+        sums.truncate(pairs);
+    }
+}
+
+#[inline]
+fn combine(a: f64, x: &Lane, b: f64, y: &Lane) -> Lane {
+    std::array::from_fn(|l| a * x[l] + b * y[l])
+}

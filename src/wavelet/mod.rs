@@ -1,0 +1,157 @@
+//! Temporal bases (method.md section 3): the series of one window to coefficients and back.
+//!
+//! Everything downstream only sees [`TimeBasis`]: a linear pair of transforms whose coefficients are ordered from
+//! coarse to fine. Series are transformed [`LANES`] voxels at a time, so that plain loops become vector code.
+
+mod haar;
+mod multi;
+
+pub use haar::Haar;
+pub use multi::Multi;
+pub use wavesplat_format::Basis;
+
+use crate::error::{Error, Result};
+use std::fmt::Debug;
+use std::ops::Range;
+
+/// Voxels that are transformed together.
+pub const LANES: usize = 8;
+
+/// One sample or coefficient of each of [`LANES`] voxels.
+pub type Lane = [f64; LANES];
+
+/// A basis u_k of the series of one window: v(t) = sum over k of c_k u_k(t) (eq 5).
+pub trait TimeBasis: Send + Sync + Debug {
+    /// Samples in a series: the frames of the window.
+    fn frames(&self) -> usize;
+
+    /// Coefficients K of a series; at least [`Self::frames`].
+    fn coefficients(&self) -> usize;
+
+    /// Number of coefficients in each temporal level, coarse to fine; they add up to K.
+    fn levels(&self) -> Vec<usize>;
+
+    /// Samples to coefficients: `series` holds [`Self::frames`] lanes, `coefficients` K.
+    fn forward(&self, series: &[Lane], coefficients: &mut [Lane]);
+
+    /// Coefficients to samples. Overwrites `coefficients`, which are its working space.
+    fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]);
+}
+
+/// The basis of a window of `frames` frames.
+pub fn basis(kind: Basis, frames: usize) -> Box<dyn TimeBasis> {
+    match kind {
+        Basis::Haar => Box::new(Haar::new(frames)),
+        Basis::Multi => Box::new(Multi::new(frames)),
+    }
+}
+
+/// An error if whole windows of `frames` frames don't suit the basis.
+pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
+    let (fits, rule) = match kind {
+        Basis::Haar => (frames.is_power_of_two(), "a power of two, as 32"),
+        Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, as 33"),
+    };
+    let most = wavesplat_format::limits::MAX_WINDOW_FRAMES as usize;
+    if fits && frames <= most {
+        return Ok(());
+    }
+    Err(Error::usage(format!("--window {frames}: the {kind:?} basis takes {rule}, at most {most}").to_lowercase()))
+}
+
+/// The basis functions as numbers: `rows[k][t]` is u_k(t), with K rows of `frames` columns.
+pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
+    (0..basis.coefficients())
+        .map(|k| {
+            let mut coefficients = vec![Lane::default(); basis.coefficients()];
+            coefficients[k] = [1.0; LANES];
+            let mut series = vec![Lane::default(); basis.frames()];
+            basis.inverse(&mut coefficients, &mut series);
+            series.iter().map(|lane| lane[0]).collect()
+        })
+        .collect()
+}
+
+/// The largest sum over k of |u_k(t)|: how much a change of 1/2 in every coefficient can move a sample, doubled.
+pub fn gain(synthesis: &[Vec<f64>]) -> f64 {
+    let frames = synthesis.first().map_or(0, Vec::len);
+    (0..frames).map(|t| synthesis.iter().map(|u| u[t].abs()).sum()).fold(0.0, f64::max)
+}
+
+/// Which coefficients a reader needs who only wants `frames` of the window: those whose function is not zero there.
+pub fn needed(synthesis: &[Vec<f64>], frames: impl Iterator<Item = usize> + Clone) -> Vec<bool> {
+    synthesis.iter().map(|u| frames.clone().any(|t| u[t] != 0.0)).collect()
+}
+
+/// Splits `0..K` into ranges as long as `lengths`.
+pub fn ranges(lengths: &[usize]) -> Vec<Range<usize>> {
+    let mut start = 0;
+    lengths
+        .iter()
+        .map(|n| {
+            start += n;
+            start - n..start
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn every_basis() -> impl Iterator<Item = Box<dyn TimeBasis>> {
+        (1..=70).flat_map(|n| [basis(Basis::Haar, n), basis(Basis::Multi, n)])
+    }
+
+    fn some_series(n: usize) -> Vec<Lane> {
+        (0..n).map(|t| std::array::from_fn(|l| ((t * 37 + l * 101) % 53) as f64 - 20.0)).collect()
+    }
+
+    #[test]
+    fn inverse_undoes_forward_for_every_length() {
+        for b in every_basis() {
+            let series = some_series(b.frames());
+            let mut coefficients = vec![Lane::default(); b.coefficients()];
+            b.forward(&series, &mut coefficients);
+            let mut back = vec![Lane::default(); b.frames()];
+            b.inverse(&mut coefficients, &mut back);
+            for (x, y) in series.iter().flatten().zip(back.iter().flatten()) {
+                assert!((x - y).abs() < 1e-12, "{b:?}: {x} came back as {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn levels_add_up_to_all_coefficients() {
+        for b in every_basis() {
+            assert_eq!(b.levels().iter().sum::<usize>(), b.coefficients(), "{b:?}");
+            assert!(b.coefficients() >= b.frames());
+        }
+    }
+
+    #[test]
+    fn a_constant_series_has_one_haar_coefficient() {
+        for n in 1..=70 {
+            let b = basis(Basis::Haar, n);
+            let mut coefficients = vec![Lane::default(); n];
+            b.forward(&vec![[3.0; LANES]; n], &mut coefficients);
+            assert!((coefficients[0][0] - 3.0 * (n as f64).sqrt()).abs() < 1e-12);
+            assert!(coefficients[1..].iter().all(|c| c[0].abs() < 1e-12), "length {n}");
+        }
+    }
+
+    #[test]
+    fn a_frame_needs_few_haar_coefficients() {
+        let u = synthesis(basis(Basis::Haar, 32).as_ref());
+        let one = needed(&u, std::iter::once(11));
+        assert_eq!(one.iter().filter(|n| **n).count(), 6);
+        assert!(needed(&u, 0..32).iter().all(|n| *n));
+    }
+
+    #[test]
+    fn haar_gain_is_the_closed_form() {
+        let u = synthesis(basis(Basis::Haar, 32).as_ref());
+        let expected = (1.0 + (0..5).map(|l| 2f64.powf(f64::from(l) / 2.0)).sum::<f64>()) / 32f64.sqrt();
+        assert!((gain(&u) - expected).abs() < 1e-12);
+    }
+}
