@@ -8,7 +8,7 @@ use crate::sample::SampleType;
 use crate::volume::{BlockGrid, Grid};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use wavesplat_format::{BlockEntry, LeafEntry, Metadata, Reader};
+use wavesplat_format::{BlockEntry, FileId, LeafEntry, Metadata, Reader};
 
 /// An open file; several threads may read it.
 #[derive(Debug)]
@@ -40,6 +40,11 @@ impl CoefficientFile {
     /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Its identity.
+    pub fn id(&self) -> FileId {
+        self.reader.id()
     }
 
     /// Its length in bytes.

@@ -1,6 +1,7 @@
 //! wavesplat.
 pub mod bound;
 pub mod camera;
+pub mod cli;
 pub mod codec;
 pub mod convert;
 pub mod error;

@@ -173,17 +173,13 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let raw = samples * sample.size();
     let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
     let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
-    let per_block = 4 * raw + scratch.min(scratch * rayon::current_num_threads());
-    match config.memory.saturating_sub(FIXED_MEMORY) / per_block {
-        0 => {
-            let least = (per_block + FIXED_MEMORY).div_ceil(1 << 20);
-            Err(Error::usage(format!(
-                "--memory: a window of {} frames in blocks of {} voxels a side needs at least {least}MiB",
-                config.window, blocks.edge
-            )))
-        }
-        fits => Ok(fits.min(MOST_BLOCKS_IN_FLIGHT)),
-    }
+    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY;
+    let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) <= config.memory);
+    fits.ok_or_else(|| {
+        let (least, edge) = (needs(&1).div_ceil(1 << 20), blocks.edge);
+        let window = config.window;
+        Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))
+    })
 }
 
 /// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.

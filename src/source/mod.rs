@@ -3,9 +3,106 @@
 //! A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
+mod base64;
+mod format;
+mod frames;
+mod inputs;
+mod npy;
+mod nrrd;
+mod nrrd_data;
+mod nrrd_header;
+mod numbering;
+mod pvd;
+mod raw;
+mod select;
+mod series;
+mod stream;
+#[cfg(test)]
+mod testing;
+mod vti;
+mod vti_header;
+mod xml;
+
+pub use select::{Selection, select};
+
 use crate::error::Result;
+use crate::mapped::Access;
 use crate::sample::SampleType;
 use crate::volume::{Grid, Region};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// What was found in a file, or why not, in words that follow the file's name.
+type Parsed<T> = std::result::Result<T, String>;
+
+/// What a user may say about inputs.
+#[derive(Debug, Clone)]
+pub struct OpenOptions {
+    /// How the bytes of files are reached.
+    pub access: Access,
+    /// Voxels along x, y, z and, for several frames in one file, the number of frames; for headerless data alone.
+    pub dims: Option<Vec<usize>>,
+    /// The type of the samples; for headerless data alone.
+    pub sample: Option<SampleType>,
+    /// Whether the samples have their most significant byte first; for headerless data alone.
+    pub big_endian: bool,
+    /// Bytes before the first sample of each file; for headerless data alone.
+    pub offset: u64,
+    /// Which array of a `.vti` is meant.
+    pub variable: Option<String>,
+    /// World units between voxels along x, y, z, in place of what the files say.
+    pub spacing: Option<[f64; 3]>,
+    /// World position of the first voxel, in place of what the files say.
+    pub origin: Option<[f64; 3]>,
+    /// Whether irregular numbers in the names of frame files are accepted.
+    pub allow_gaps: bool,
+    /// Bytes that a stream may hold for one window before it spools to a temporary file.
+    pub memory: usize,
+}
+
+impl Default for OpenOptions {
+    /// Maps, files that describe themselves, and 256 MiB for a stream's window.
+    fn default() -> Self {
+        Self {
+            access: Access::Map,
+            dims: None,
+            sample: None,
+            big_endian: false,
+            offset: 0,
+            variable: None,
+            spacing: None,
+            origin: None,
+            allow_gaps: false,
+            memory: 256 << 20,
+        }
+    }
+}
+
+/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one `.pvd`, or `-` for standard
+/// input.
+///
+/// The header and size of every file are checked here; samples are read by [`FrameSource::window`].
+///
+/// # Errors
+/// Files that are absent, damaged, of a format or with a feature that is not supported, or unlike the first one;
+/// numbers in names that suggest a missing frame; options that the format has no use for.
+pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if let [only] = inputs
+        && only == Path::new(stream::NAME)
+    {
+        return open_stream(std::io::stdin(), options);
+    }
+    let files = inputs::expand(inputs, options)?;
+    Ok(Box::new(series::Series::open(&files, options)?))
+}
+
+/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`.
+///
+/// # Errors
+/// As [`open`]; messages call the stream `-`.
+pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    Ok(Box::new(stream::Stream::open(reader, options)?))
+}
 
 /// What an archive holds, known before any frame is read.
 #[derive(Debug, Clone)]

@@ -1,0 +1,82 @@
+//! `wavesplat extract`
+
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use wavesplat::cli::{CommonArgs, FrameList, RegionSpec};
+use wavesplat::error::{Error, Result};
+use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::file::CoefficientFile;
+use wavesplat::mapped::Access;
+use wavesplat::npy;
+use wavesplat::output::{Output, STANDARD};
+
+/// Decode frames back to samples
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  wavesplat extract run.wspl -o run.npy
+  wavesplat extract run.wspl --frames 10:20 --region 0:32,:,5:6 -o part.npy
+  wavesplat extract run.wspl -o - --format raw | python analyse.py
+The samples keep their type. An .npy holds (frames, z, y, x), with one header for all frames.")]
+pub(crate) struct ExtractArgs {
+    /// Coefficient file
+    file: PathBuf,
+    /// File to write, or - for standard output
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+    /// Only these frames: ranges a:b:step or numbers, with commas between them
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    frames: Option<FrameList>,
+    /// Only these voxels: x0:x1,y0:y1,z0:z1
+    #[arg(long, value_name = "BOX")]
+    region: Option<RegionSpec>,
+    /// npy or raw [default: by the ending of OUT; npy for -]
+    #[arg(long, value_enum)]
+    format: Option<Format>,
+    /// Read the file instead of mapping it
+    #[arg(long)]
+    no_mmap: bool,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// NumPy array
+    Npy,
+    /// Samples alone, little-endian
+    Raw,
+}
+
+pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
+    args.common.start()?;
+    let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
+    let access = if args.no_mmap { Access::Read } else { Access::Map };
+    let file = CoefficientFile::open(&args.file, access)?;
+    let config = ExtractConfig {
+        frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
+        region: args.region.map_or(Ok(file.grid.whole()), |r| r.resolve(&file.grid))?,
+        memory: args.common.memory.0,
+    };
+    let mut out = Output::create(&args.output, args.force)?;
+    if format == Format::Npy {
+        let [x, y, z] = config.region.dims();
+        let header = npy::write_header(file.sample(), &[config.frames.len(), z, y, x], &mut out);
+        header.map_err(|e| Error::io(&args.output, "writing", e))?;
+    }
+    let report = extract(&file, &config, &args.output, &mut out, &args.common.progress("frames"))?;
+    out.commit()?;
+    args.common.report(&report, args.output == PathBuf::from(STANDARD))
+}
+
+fn format_of(path: &Path) -> Result<Format> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("npy") => Ok(Format::Npy),
+        Some("raw" | "bin") => Ok(Format::Raw),
+        None if path == Path::new(STANDARD) => Ok(Format::Npy),
+        _ => Err(Error::usage(format!("{}: the ending says neither .npy nor .raw; give --format", path.display()))),
+    }
+}

@@ -1,0 +1,41 @@
+//! `wavesplat`: converts archives to coefficient files and looks after them.
+#![allow(missing_docs)] // clap takes an option's comment as its help
+
+mod convert;
+mod extract;
+mod info;
+mod verify;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Compresses time-varying volumes along time under a guaranteed error bound.
+#[derive(Debug, Parser)]
+#[command(name = "wavesplat", version, arg_required_else_help = true, after_help = "\
+Examples:
+  wavesplat convert frames/ -o run.wspl --tolerance 0.001
+  wavesplat info run.wspl
+  wavesplat verify run.wspl --against frames/
+  wavesplat extract run.wspl --frames 10:20 -o part.npy
+Pictures are made by wavesplat-render.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Convert(convert::ConvertArgs),
+    Info(info::InfoArgs),
+    Verify(verify::VerifyArgs),
+    Extract(extract::ExtractArgs),
+}
+
+fn main() -> ExitCode {
+    wavesplat::cli::main(|cli: Cli| match cli.command {
+        Command::Convert(args) => convert::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Extract(args) => extract::run(&args),
+    })
+}

@@ -1,0 +1,81 @@
+//! `wavesplat verify`
+
+use clap::Args;
+use std::path::PathBuf;
+use wavesplat::cli::{CommonArgs, InputArgs, narrow, print};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::source::FrameSource;
+use wavesplat::verify::{VerifyReport, verify};
+
+/// Check a coefficient file, and its promise against the source
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  wavesplat verify run.wspl
+  wavesplat verify run.wspl --against frames/
+Every byte is checked. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound.
+The frames and the region that were converted are remembered and chosen again.")]
+pub(crate) struct VerifyArgs {
+    /// Coefficient file
+    file: PathBuf,
+    /// The frames it was made from
+    #[arg(long, value_name = "INPUT", num_args = 1..)]
+    against: Vec<PathBuf>,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
+    args.common.start()?;
+    let file = CoefficientFile::open(&args.file, args.input.access())?;
+    let mut source = args.source(&file)?;
+    let source: Option<&mut dyn FrameSource> = match &mut source {
+        Some(source) => Some(source.as_mut()),
+        None => None,
+    };
+    let report = verify(&file, source, &args.common.progress("blocks"))?;
+    if args.common.json {
+        args.common.report(&report, false)?;
+    } else if !args.common.quiet {
+        print(&summary(&report))?;
+    }
+    match report.against {
+        Some(c) if c.series_outside > 0 => {
+            let share = c.largest_share_of_bound;
+            let what = format!("{} series are outside the bound, by up to {share} times", c.series_outside);
+            Err(Error::BoundMissed { path: args.file.clone(), what })
+        }
+        _ => Ok(()),
+    }
+}
+
+impl VerifyArgs {
+    fn source(&self, file: &CoefficientFile) -> Result<Option<Box<dyn FrameSource>>> {
+        if self.against.is_empty() {
+            return Ok(None);
+        }
+        let setting = |name: &str| file.metadata().settings.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone());
+        let parsed = |what: String| Error::input(&self.file, format!("its settings are not understood: {what}"));
+        let frames = setting("frames").map(|f| f.parse()).transpose().map_err(parsed)?;
+        let region = setting("region").map(|r| r.parse()).transpose().map_err(parsed)?;
+        let mut input = self.input.clone();
+        input.variable = input.variable.or_else(|| setting("variable"));
+        narrow(input.open(&self.against, &self.common)?, frames, region).map(Some)
+    }
+}
+
+fn summary(r: &VerifyReport) -> String {
+    let mut text = format!("{} blocks, {} bytes: whole\n", r.blocks, r.bytes);
+    if let Some(c) = &r.against {
+        let held = if c.series_outside == 0 { "kept" } else { "MISSED" };
+        text += &format!(
+            "bound {held}: largest error {:e} ({:.4} of the bound), rms error {:e}, {} missing samples as they were, \
+             {} samples compared\n",
+            c.largest_error, c.largest_share_of_bound, c.rms_error, c.missing, c.samples
+        );
+    }
+    text
+}

@@ -1,0 +1,92 @@
+//! Options that say how an archive is read.
+
+use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
+use crate::error::Result;
+use crate::mapped::Access;
+use crate::sample::SampleType;
+use crate::source::{self, FrameSource, OpenOptions, Selection};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// The order of a sample's bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Endian {
+    /// Least significant byte first
+    Little,
+    /// Most significant byte first
+    Big,
+}
+
+/// How an archive is read, besides its names.
+#[derive(Debug, Clone, Args)]
+pub struct InputArgs {
+    /// Voxels (and frames) of headerless data, x fastest: NXxNYxNZ[xNT]
+    #[arg(long, value_name = "DIMS", help_heading = "Input")]
+    pub dims: Option<Dims>,
+    /// Sample type of headerless data: u8 i8 u16 i16 u32 i32 f16 f32 f64
+    #[arg(long, value_name = "TYPE", help_heading = "Input")]
+    pub dtype: Option<SampleType>,
+    /// Byte order of headerless data
+    #[arg(long, value_enum, value_name = "ORDER", default_value = "little", help_heading = "Input")]
+    pub endian: Endian,
+    /// Bytes before the first sample of each headerless file
+    #[arg(long, value_name = "BYTES", default_value_t = 0, help_heading = "Input")]
+    pub offset: u64,
+    /// Which array of the files
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
+    pub variable: Option<String>,
+    /// World units between voxels, instead of what the files say: SX,SY,SZ
+    #[arg(long, value_name = "SX,SY,SZ", help_heading = "Input")]
+    pub spacing: Option<Triple>,
+    /// World position of the first voxel, instead of what the files say: X,Y,Z
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Input")]
+    pub origin: Option<Triple>,
+    /// Take frame files whose numbers have gaps
+    #[arg(long, help_heading = "Input")]
+    pub allow_gaps: bool,
+    /// Read files instead of mapping them (for network file systems and files that may change)
+    #[arg(long, help_heading = "Input")]
+    pub no_mmap: bool,
+}
+
+impl InputArgs {
+    /// How the bytes of files are reached.
+    pub fn access(&self) -> Access {
+        if self.no_mmap { Access::Read } else { Access::Map }
+    }
+
+    /// Opens an archive.
+    pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
+        let options = OpenOptions {
+            access: self.access(),
+            dims: self.dims.as_ref().map(|d| d.0.clone()),
+            sample: self.dtype,
+            big_endian: self.endian == Endian::Big,
+            offset: self.offset,
+            variable: self.variable.clone(),
+            spacing: self.spacing.map(|s| s.0),
+            origin: self.origin.map(|o| o.0),
+            allow_gaps: self.allow_gaps,
+            memory: common.stream_memory(),
+        };
+        let source = source::open(inputs, &options)?;
+        source.archive().notes.iter().for_each(|n| common.note(n));
+        Ok(source)
+    }
+}
+
+/// Narrows an archive to some frames and voxels.
+pub fn narrow(
+    source: Box<dyn FrameSource>,
+    frames: Option<FrameRange>,
+    region: Option<RegionSpec>,
+) -> Result<Box<dyn FrameSource>> {
+    if frames.is_none() && region.is_none() {
+        return Ok(source);
+    }
+    let archive = source.archive();
+    let all = || ":".parse::<FrameRange>().expect("a range of all frames");
+    let (first, step, count) = frames.unwrap_or_else(all).resolve(archive.frames)?;
+    let region = region.map_or(Ok(archive.grid.whole()), |r| r.resolve(&archive.grid))?;
+    source::select(source, Selection { first, step, frames: count, region })
+}

@@ -1,0 +1,116 @@
+//! The manners that the programs share: common options, values of options, progress, exit codes.
+//!
+//! Standard output carries data or one JSON object; notes and progress go to standard error.
+
+mod input;
+mod terminal;
+mod values;
+
+pub use input::{InputArgs, narrow};
+pub use terminal::TerminalProgress;
+pub use values::{Dims, FrameList, FrameRange, Numbers, Pair, RegionSpec, Size, Triple, Whole};
+
+use crate::error::{Error, Result};
+use crate::mapped;
+use clap::Args;
+use clap::error::ErrorKind;
+use serde::Serialize;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// Options that every program and subcommand takes.
+#[derive(Debug, Clone, Args)]
+pub struct CommonArgs {
+    /// Worker threads; by default one for each core
+    #[arg(long, value_name = "N", help_heading = "Common options")]
+    pub threads: Option<std::num::NonZeroUsize>,
+    /// Budget for what the program allocates
+    #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Common options")]
+    pub memory: Size,
+    /// Neither progress nor notes
+    #[arg(short, long, help_heading = "Common options")]
+    pub quiet: bool,
+    /// More notes
+    #[arg(short, long, conflicts_with = "quiet", help_heading = "Common options")]
+    pub verbose: bool,
+    /// Print one JSON object with everything measured and decided
+    #[arg(long, help_heading = "Common options")]
+    pub json: bool,
+}
+
+impl CommonArgs {
+    /// Starts the workers. Call once.
+    pub fn start(&self) -> Result<()> {
+        let threads = self.threads.map_or(0, std::num::NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}")))
+    }
+
+    /// The part of the budget that a stream may take for the frames of one window.
+    pub fn stream_memory(&self) -> usize {
+        self.memory.0 / 4
+    }
+
+    /// Progress on a terminal, or none.
+    pub fn progress(&self, unit: &'static str) -> TerminalProgress {
+        TerminalProgress::new(self.quiet, unit)
+    }
+
+    /// A note on standard error, unless quiet.
+    pub fn note(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            note(text);
+        }
+    }
+
+    /// A note that only `--verbose` shows.
+    pub fn detail(&self, text: impl std::fmt::Display) {
+        if self.verbose {
+            note(text);
+        }
+    }
+
+    /// With `--json`, prints a report to standard output, or to standard error if `data_on_stdout`.
+    pub fn report(&self, report: &impl Serialize, data_on_stdout: bool) -> Result<()> {
+        if !self.json {
+            return Ok(());
+        }
+        let text = serde_json::to_string_pretty(report).map_err(|e| Error::usage(format!("--json: {e}")))?;
+        if data_on_stdout {
+            note(text);
+            return Ok(());
+        }
+        print(&(text + "\n"))
+    }
+}
+
+/// Writes text to standard output.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| Error::io("-", "writing", e))
+}
+
+fn note(text: impl std::fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "{text}"); // nowhere is left to report a failure
+}
+
+/// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
+pub fn main<A: clap::Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
+    mapped::explain_sigbus();
+    let args = match A::try_parse() {
+        Ok(args) => args,
+        Err(e) => {
+            let _ = e.print();
+            let help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+            return ExitCode::from(if help { 0 } else { 2 });
+        }
+    };
+    match run(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
+        Err(e) => {
+            note(format_args!("error: {e}"));
+            ExitCode::from(e.exit_code())
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Values of options, parsed once into what they mean.
+
+use crate::error::{Error, Result};
+use crate::volume::{Grid, Region};
+use std::fmt;
+use std::str::FromStr;
+
+/// A number of bytes, as `512MiB`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size(pub usize);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let bytes = bytesize::ByteSize::from_str(text).map_err(|_| "takes a size, as 512MiB or 2GB".to_string())?;
+        usize::try_from(bytes.as_u64()).map(Self).map_err(|_| "is more than this machine can address".into())
+    }
+}
+
+/// `NXxNYxNZ` or `NXxNYxNZxNT`, x fastest.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Dims(pub Vec<usize>);
+
+impl FromStr for Dims {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let dims: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| *n > 0)).collect();
+        dims.filter(|d| d.len() == 3 || d.len() == 4).map(Self).ok_or_else(|| "takes NXxNYxNZ or NXxNYxNZxNT, as 75x75x20x32".into())
+    }
+}
+
+/// Width and height, as `512x512`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Whole<const N: usize>(pub [usize; N]);
+
+impl<const N: usize> FromStr for Whole<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok()).collect();
+        let numbers = numbers.and_then(|n| n.try_into().ok());
+        numbers.map(Self).ok_or_else(|| format!("takes {N} whole numbers with x between them, as 512x512"))
+    }
+}
+
+/// `N` numbers with commas between them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbers<const N: usize>(pub [f64; N]);
+
+/// Two numbers, as `0,1.5`.
+pub type Pair = Numbers<2>;
+/// Three numbers, as `1,1,2.5`.
+pub type Triple = Numbers<3>;
+
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        let numbers = numbers.and_then(|n| n.try_into().ok());
+        numbers.map(Self).ok_or_else(|| format!("takes {N} numbers with commas between them"))
+    }
+}
+
+/// `a:b` or `a:b:step`, end exclusive, either end may be left out or counted from the end; or one number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameRange {
+    start: Option<i64>,
+    end: Option<i64>,
+    step: usize,
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || format!("'{text}' is no range of frames: a:b, a:b:step, or one number; the end is left out");
+        let end = |t: &str| if t.is_empty() { Ok(None) } else { t.parse::<i64>().map(Some).map_err(|_| wrong()) };
+        let parts: Vec<&str> = text.split(':').collect();
+        match parts.as_slice() {
+            [one] => {
+                let first: i64 = one.parse().map_err(|_| wrong())?;
+                Ok(Self { start: Some(first), end: (first != -1).then_some(first + 1), step: 1 })
+            }
+            [a, b] => Ok(Self { start: end(a)?, end: end(b)?, step: 1 }),
+            [a, b, s] => {
+                let step = if s.is_empty() { 1 } else { s.parse().map_err(|_| wrong())? };
+                if step == 0 { Err(wrong()) } else { Ok(Self { start: end(a)?, end: end(b)?, step }) }
+            }
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl fmt::Display for FrameRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = |e: Option<i64>| e.map_or(String::new(), |n| n.to_string());
+        write!(f, "{}:{}:{}", end(self.start), end(self.end), self.step)
+    }
+}
+
+impl FrameRange {
+    /// First frame, step and number of frames, of an archive of `frames` frames; the number is unknown for all that a
+    /// stream brings.
+    pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {
+        let from_end = |n: i64| match frames {
+            Some(all) => Ok((all as i64).saturating_add(n).max(0)),
+            None => Err(Error::usage("--frames: a stream has no end to count from")),
+        };
+        let place = |n: i64| if n < 0 { from_end(n) } else { Ok(n) };
+        let start = self.start.map_or(Ok(0), place)? as usize;
+        let end = self.end.map(place).transpose()?.map(|e| e as usize).or(frames);
+        let end = end.map(|e| frames.map_or(e, |all| e.min(all)));
+        let count = end.map(|e| e.saturating_sub(start).div_ceil(self.step));
+        if count == Some(0) {
+            let all = frames.map_or(String::new(), |n| format!(" of {n}"));
+            return Err(Error::usage(format!("--frames: there is no such frame{all}")));
+        }
+        Ok((start, self.step, count))
+    }
+}
+
+/// Frames, as ranges with commas between them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameList(Vec<FrameRange>);
+
+impl FromStr for FrameList {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        text.split(',').map(str::parse).collect::<std::result::Result<_, _>>().map(Self)
+    }
+}
+
+impl FrameList {
+    /// The frames of an archive of `frames` frames, ascending, each once.
+    pub fn resolve(&self, frames: usize) -> Result<Vec<usize>> {
+        let mut all = Vec::new();
+        for range in &self.0 {
+            let (start, step, count) = range.resolve(Some(frames))?;
+            all.extend((0..count.unwrap_or(0)).map(|i| start + i * step));
+        }
+        all.sort_unstable();
+        all.dedup();
+        Ok(all)
+    }
+}
+
+/// `x0:x1,y0:y1,z0:z1`; an end that is left out is the volume's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RegionSpec([(Option<usize>, Option<usize>); 3]);
+
+impl FromStr for RegionSpec {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || "takes x0:x1,y0:y1,z0:z1, ends excluded, as 0:32,:,10:20".to_string();
+        let end = |t: &str| if t.is_empty() { Ok(None) } else { t.parse().map(Some).map_err(|_| wrong()) };
+        let axes: Vec<(Option<usize>, Option<usize>)> = text
+            .split(',')
+            .map(|axis| axis.split_once(':').ok_or_else(wrong).and_then(|(a, b)| Ok((end(a)?, end(b)?))))
+            .collect::<std::result::Result<_, String>>()?;
+        axes.try_into().map(Self).map_err(|_| wrong())
+    }
+}
+
+impl fmt::Display for RegionSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = |e: Option<usize>| e.map_or(String::new(), |n| n.to_string());
+        write!(f, "{}", self.0.map(|(a, b)| format!("{}:{}", end(a), end(b))).join(","))
+    }
+}
+
+impl RegionSpec {
+    /// The voxels of a grid that are meant.
+    pub fn resolve(&self, grid: &Grid) -> Result<Region> {
+        let region = Region {
+            start: std::array::from_fn(|a| self.0[a].0.unwrap_or(0)),
+            end: std::array::from_fn(|a| self.0[a].1.unwrap_or(grid.dims[a])),
+        };
+        if region.is_empty() || !grid.whole().contains(&region) {
+            let [x, y, z] = grid.dims;
+            return Err(Error::usage(format!("--region: empty, or not within the volume of {x}x{y}x{z} voxels")));
+        }
+        Ok(region)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(text: &str, all: usize) -> Option<Vec<usize>> {
+        text.parse::<FrameList>().ok()?.resolve(all).ok()
+    }
+
+    #[test]
+    fn ranges_of_frames_are_numpys() {
+        assert_eq!(frames("2:5", 10), Some(vec![2, 3, 4]));
+        assert_eq!(frames(":", 3), Some(vec![0, 1, 2]));
+        assert_eq!(frames("::4", 10), Some(vec![0, 4, 8]));
+        assert_eq!(frames("-2:", 10), Some(vec![8, 9]));
+        assert_eq!(frames("-1", 10), Some(vec![9]));
+        assert_eq!(frames("8:99", 10), Some(vec![8, 9]));
+        assert_eq!(frames("5,1,5,2:4", 10), Some(vec![1, 2, 3, 5]));
+        for wrong in ["", "a", "1:2:0", "5:5", "10", "1:2:3:4", "3:1"] {
+            assert_eq!(frames(wrong, 10), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_streams_frames_may_be_open_ended_but_not_counted_back() {
+        assert_eq!("2::3".parse::<FrameRange>().expect("a range").resolve(None).expect("open"), (2, 3, None));
+        assert!("-2:".parse::<FrameRange>().expect("a range").resolve(None).is_err());
+    }
+
+    #[test]
+    fn regions_may_leave_ends_out() {
+        let grid = Grid::unit([10, 20, 30]);
+        let region = "2:4,:,5:".parse::<RegionSpec>().expect("a region").resolve(&grid).expect("inside");
+        assert_eq!(region, Region { start: [2, 0, 5], end: [4, 20, 30] });
+        for wrong in ["0:11,:,:", "4:4,:,:"] {
+            assert!(wrong.parse::<RegionSpec>().expect("a region").resolve(&grid).is_err(), "{wrong}");
+        }
+        assert!("1:2,3:4".parse::<RegionSpec>().is_err());
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!("512MiB".parse(), Ok(Size(512 << 20)));
+        assert_eq!("1000".parse(), Ok(Size(1000)));
+        assert!("much".parse::<Size>().is_err());
+    }
+
+    #[test]
+    fn dims_have_three_or_four_numbers() {
+        assert_eq!("75x75x20".parse(), Ok(Dims(vec![75, 75, 20])));
+        assert!(["75x75", "1x2x3x4x5", "0x1x1", "axbxc"].iter().all(|t| t.parse::<Dims>().is_err()));
+    }
+}

@@ -1,0 +1,103 @@
+//! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
+
+use super::series::Described;
+use super::{OpenOptions, npy, nrrd, raw, vti};
+use crate::error::{Error, Result};
+use crate::mapped::{Access, FileBytes};
+use std::path::Path;
+
+/// The formats that describe themselves, for messages.
+pub(super) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .vti, .pvd, and headerless data of any name";
+
+/// How a file of frames is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Npy,
+    Nrrd,
+    Vti,
+    /// A list of files, not frames itself.
+    Pvd,
+    /// A coefficient file, which is no input.
+    Coefficients,
+}
+
+impl Format {
+    /// By extension; none for headerless data and for what is not supported.
+    pub(super) fn by_name(path: &Path) -> Option<Self> {
+        match extension(path).as_str() {
+            "npy" => Some(Self::Npy),
+            "nrrd" | "nhdr" => Some(Self::Nrrd),
+            "vti" => Some(Self::Vti),
+            "pvd" => Some(Self::Pvd),
+            "wspl" => Some(Self::Coefficients),
+            _ => None,
+        }
+    }
+
+    fn by_content(path: &Path) -> Result<Option<Self>> {
+        let head = head(&FileBytes::open(path, Access::Read)?, 16)?;
+        let formats = [(npy::MAGIC, Self::Npy), (nrrd::MAGIC, Self::Nrrd)];
+        Ok(formats.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format))
+    }
+}
+
+/// The extension in lower case, or nothing.
+pub(super) fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+/// The first bytes of a file, fewer if it is shorter.
+pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
+    let len = usize::try_from(file.len()).unwrap_or(usize::MAX).min(bytes);
+    let mut head = vec![0; len];
+    file.read_at(0, &mut head).map_err(|e| Error::io(file.path(), "reading the header", e))?;
+    Ok(head)
+}
+
+/// Reads the header of a file of frames and checks its size.
+pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+    let format = match Format::by_name(path) {
+        None if options.dims.is_none() => Format::by_content(path)?,
+        format => format,
+    };
+    if let Some(format) = format {
+        refuse_options(path, format, options)?;
+    }
+    match format {
+        Some(Format::Npy) => npy::describe(path),
+        Some(Format::Nrrd) => nrrd::describe(path),
+        Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
+        Some(Format::Pvd) => Err(Error::usage(format!("{}: a .pvd must be the only input", path.display()))),
+        Some(Format::Coefficients) => {
+            Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
+        }
+        None if options.dims.is_none() => Err(unknown(path)),
+        None => raw::describe(path, options),
+    }
+}
+
+fn unknown(path: &Path) -> Error {
+    let what = "is of no known format. Headerless data needs --dims NXxNYxNZ and --dtype";
+    Error::usage(format!("{}: {what}. Supported are {SUPPORTED}", path.display()))
+}
+
+/// Options that would be ignored are refused, so that nobody thinks they had an effect.
+pub(super) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
+    let given = [
+        (options.dims.is_some(), "--dims"),
+        (options.sample.is_some(), "--dtype"),
+        (options.big_endian, "--endian"),
+        (options.offset > 0, "--offset"),
+        (options.variable.is_some() && format != Format::Vti, "--variable"),
+    ];
+    match given.into_iter().find(|(given, _)| *given) {
+        Some((_, "--variable")) => {
+            Err(Error::usage(format!("{}: --variable is for .vti files; this has one array", path.display())))
+        }
+        Some((_, name)) if matches!(format, Format::Npy | Format::Nrrd | Format::Vti) => {
+            let what = format!("says itself what it holds; {name} is for headerless data, leave it out");
+            Err(Error::usage(format!("{}: {what}", path.display())))
+        }
+        _ => Ok(()),
+    }
+}

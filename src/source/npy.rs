@@ -1,0 +1,136 @@
+//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x).
+
+use super::Parsed;
+use super::frames::Shape;
+use super::series::{At, Described, Part, check_size};
+use crate::error::{Error, Result};
+use crate::mapped::{Access, FileBytes};
+use crate::sample::SampleType;
+use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+/// How every `.npy` starts.
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+
+const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
+const MAX_NESTING: usize = 16; // brackets within brackets
+
+/// What the header of an array says.
+#[derive(Debug)]
+pub(super) struct Array {
+    /// Voxels and sample type of a frame.
+    pub(super) shape: Shape,
+    /// Number of frames.
+    pub(super) frames: usize,
+    /// Whether samples have their most significant byte first.
+    pub(super) big_endian: bool,
+    /// Bytes before the first sample.
+    pub(super) start: u64,
+}
+
+/// Reads the header of one file and checks its size.
+pub(super) fn describe(path: &Path) -> Result<Described> {
+    let len = FileBytes::open(path, Access::Read)?.len();
+    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    let Array { shape, frames, big_endian, start } = read_header(&mut BufReader::with_capacity(256, file), path)?;
+    check_size(len, start, &shape, frames).map_err(|e| Error::input(path, e))?;
+    let part = Part { path: path.into(), len, frames, big_endian, at: At::Byte(start) };
+    Ok(Described::plain(shape, vec![part]))
+}
+
+/// Reads up to the first sample, and not a byte further.
+pub(super) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
+    let bytes = header_bytes(reader).map_err(|e| match e.kind() {
+        io::ErrorKind::UnexpectedEof => Error::input(path, "ends inside its npy header"),
+        io::ErrorKind::InvalidData => Error::input(path, e.to_string()),
+        _ => Error::io(path, "reading the npy header", e),
+    })?;
+    parse(&bytes).map_err(|e| Error::input(path, e))
+}
+
+fn header_bytes(reader: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut bytes = vec![0; 8];
+    reader.read_exact(&mut bytes)?;
+    if !bytes.starts_with(MAGIC) {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, "does not start as an npy file does"));
+    }
+    let mut len = [0; 4];
+    let width = if bytes[6] == 1 { 2 } else { 4 };
+    reader.read_exact(&mut len[..width])?;
+    let text = u32::from_le_bytes(len) as usize;
+    if text > MAX_HEADER {
+        let what = format!("its npy header claims {text} bytes; at most {MAX_HEADER} are accepted");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    }
+    bytes.extend(&len[..width]);
+    let before = bytes.len();
+    bytes.resize(before + text, 0);
+    reader.read_exact(&mut bytes[before..])?;
+    Ok(bytes)
+}
+
+fn parse(bytes: &[u8]) -> Parsed<Array> {
+    check_harmless(&bytes[8..])?;
+    let header = NpyHeader::from_reader(bytes).map_err(|e| format!("its npy header is damaged: {e}"))?;
+    let (sample, big_endian) = sample_type(&header.dtype())?;
+    if header.order() == Order::Fortran {
+        return Err("its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))".into());
+    }
+    let (dims, frames) = dims(header.shape())?;
+    if frames == 0 {
+        return Err("its array has 0 frames".into());
+    }
+    Ok(Array { shape: Shape::new(dims, sample)?, frames, big_endian, start: bytes.len() as u64 })
+}
+
+/// Stops text on which the parser would run out of stack or multiply beyond 64 bits.
+fn check_harmless(text: &[u8]) -> Parsed<()> {
+    let mut depth = 0_usize;
+    for byte in text {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_NESTING {
+            return Err("its npy header is nested too deeply".into());
+        }
+    }
+    let numbers = text.split(|b| !b.is_ascii_digit()).filter(|n| !n.is_empty());
+    let number = |n: &[u8]| std::str::from_utf8(n).ok()?.parse::<u64>().ok();
+    let product = numbers.map(number).try_fold(1_u64, |all, n| all.checked_mul(n?.max(1)));
+    product.map(|_| ()).ok_or_else(|| "the numbers in its npy header are too large".into())
+}
+
+fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
+    let number = |n: u64| usize::try_from(n).map_err(|_| format!("a length of {n} is too large"));
+    match *shape {
+        [z, y, x] => Ok(([number(x)?, number(y)?, number(z)?], 1)),
+        [t, z, y, x] => Ok(([number(x)?, number(y)?, number(z)?], number(t)?)),
+        _ => Err(format!("its array has {} dimension(s); supported are (z, y, x) and (t, z, y, x)", shape.len())),
+    }
+}
+
+fn sample_type(dtype: &DType) -> Parsed<(SampleType, bool)> {
+    let refused = || format!("its samples are {}; supported are u1 i1 u2 i2 u4 i4 f2 f4 f8", dtype.descr());
+    let DType::Plain(ty) = dtype else { return Err(refused()) };
+    let sample = plain_type(ty).ok_or_else(refused)?;
+    Ok((sample, ty.endianness() == Endianness::Big))
+}
+
+fn plain_type(ty: &TypeStr) -> Option<SampleType> {
+    Some(match (ty.type_char(), ty.size_field()) {
+        (TypeChar::Uint, 1) => SampleType::U8,
+        (TypeChar::Int, 1) => SampleType::I8,
+        (TypeChar::Uint, 2) => SampleType::U16,
+        (TypeChar::Int, 2) => SampleType::I16,
+        (TypeChar::Uint, 4) => SampleType::U32,
+        (TypeChar::Int, 4) => SampleType::I32,
+        (TypeChar::Float, 2) => SampleType::F16,
+        (TypeChar::Float, 4) => SampleType::F32,
+        (TypeChar::Float, 8) => SampleType::F64,
+        _ => return None,
+    })
+}

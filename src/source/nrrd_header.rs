@@ -1,0 +1,87 @@
+//! The text of a NRRD header: fields, and the list of data files that may end it.
+
+use super::Parsed;
+use super::nrrd::MAGIC;
+use std::collections::HashMap;
+use std::str::FromStr;
+
+/// The fields of a header, and where it ends.
+#[derive(Debug)]
+pub(super) struct Header {
+    fields: HashMap<String, String>, // names in lower case, without spaces
+    /// The file names after `data file: LIST`.
+    pub(super) list: Vec<String>,
+    /// Bytes up to the first sample of an attached file.
+    pub(super) len: u64,
+    /// Whether an empty line ended it, which an attached file needs.
+    pub(super) closed: bool,
+}
+
+impl Header {
+    /// Reads a header that these bytes start with; none if it goes on after them, unless they are the `whole` file.
+    pub(super) fn parse(bytes: &[u8], whole: bool) -> Parsed<Option<Self>> {
+        if !bytes.starts_with(MAGIC) {
+            return Err("does not start as a NRRD file does".into());
+        }
+        let mut header = Self { fields: HashMap::new(), list: Vec::new(), len: 0, closed: false };
+        for line in bytes.split_inclusive(|b| *b == b'\n') {
+            if !line.ends_with(b"\n") && !whole {
+                return Ok(None);
+            }
+            let first = header.len == 0;
+            header.len += line.len() as u64;
+            let text = std::str::from_utf8(line).map_err(|_| "has a header line that is not text")?.trim_end();
+            if text.is_empty() {
+                header.closed = true;
+                return Ok(Some(header));
+            }
+            if !first {
+                header.line(text)?;
+            }
+        }
+        Ok(whole.then_some(header))
+    }
+
+    fn line(&mut self, text: &str) -> Parsed<()> {
+        if text.starts_with('#') {
+            return Ok(());
+        }
+        if self.get("datafile").is_some_and(|v| v.split_whitespace().next() == Some("LIST")) {
+            self.list.push(text.into());
+            return Ok(());
+        }
+        match (text.split_once(": "), text.split_once(":=")) {
+            (Some((name, _)), Some((key, _))) if key.len() < name.len() => Ok(()),
+            (Some((name, value)), _) => self.field(name, value),
+            (None, Some(_)) => Ok(()), // a key and its value, for people
+            (None, None) => Err(format!("has a header line without a colon: {text:?}")),
+        }
+    }
+
+    fn field(&mut self, name: &str, value: &str) -> Parsed<()> {
+        let plain = name.to_lowercase().split_whitespace().collect::<String>();
+        match self.fields.insert(plain, value.trim().into()) {
+            Some(_) => Err(format!("says {name} twice")),
+            None => Ok(()),
+        }
+    }
+
+    /// A field by its name in lower case without spaces.
+    pub(super) fn get(&self, name: &str) -> Option<&str> {
+        self.fields.get(name).map(String::as_str)
+    }
+
+    /// A field that must be there.
+    pub(super) fn required(&self, name: &str) -> Parsed<&str> {
+        self.get(name).ok_or_else(|| format!("its header does not say {name}"))
+    }
+}
+
+/// Numbers separated by spaces: exactly `count`, or any number of them if that is 0.
+pub(super) fn numbers<T: FromStr>(text: &str, what: &str, count: usize) -> Parsed<Vec<T>> {
+    let found: Option<Vec<T>> = text.split_whitespace().map(|n| n.parse().ok()).collect();
+    let wrong = || {
+        format!("{what} must be {} numbers, not {text:?}", if count == 0 { "all".into() } else { count.to_string() })
+    };
+    found.filter(|v| count == 0 || v.len() == count).ok_or_else(wrong)
+}

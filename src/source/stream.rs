@@ -1,0 +1,213 @@
+//! Frames from a pipe: forward only, one window held at a time, in memory or in a temporary file.
+
+use super::frames::{Bytes, Frame, Frames, Shape};
+use super::series::{check_grid, override_grid};
+use super::{Archive, FrameSource, FrameWindow, OpenOptions, npy, raw};
+use crate::error::{Error, Result};
+use crate::volume::Grid;
+use std::fs::File;
+use std::io::{self, Chain, Cursor, ErrorKind, Read, Write};
+use std::path::Path;
+
+/// What stands for a stream on the command line and in messages.
+pub(super) const NAME: &str = "-";
+
+const CHUNK: usize = 1 << 20; // bytes asked for at a time
+
+/// Frames one after another from a reader.
+pub(super) struct Stream<R> {
+    archive: Archive,
+    shape: Shape,
+    big_endian: bool,
+    memory: usize,
+    next: usize, // the frame that comes
+    ended: bool,
+    chunk: Vec<u8>,
+    reader: Chain<Cursor<Vec<u8>>, R>,
+}
+
+impl<R: Read> Stream<R> {
+    /// Reads what comes before the first frame.
+    pub(super) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
+        let mut head = Vec::new();
+        let magic = npy::MAGIC.len() as u64;
+        reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(NAME, "reading", e))?;
+        let is_npy = head == npy::MAGIC;
+        let mut reader = Cursor::new(head).chain(reader);
+        let (shape, frames, big_endian) = match (&options.dims, is_npy) {
+            (Some(_), false) => headerless(&mut reader, options)?,
+            (Some(_), true) => {
+                return Err(Error::usage("-: is an npy stream, which says its own --dims; leave them out"));
+            }
+            (None, true) => numpy(&mut reader, options)?,
+            (None, false) => {
+                return Err(Error::usage("-: is no npy stream; headerless data needs --dims NXxNYxNZ and --dtype"));
+            }
+        };
+        let mut grid = Grid::unit(shape.dims());
+        override_grid(&mut grid, options);
+        check_grid(&grid, options, Path::new(NAME))?;
+        let (times, notes) = (Vec::new(), Vec::new());
+        let archive = Archive { grid, sample: shape.sample(), frames, times, variable: None, notes };
+        let (memory, chunk) = (options.memory, vec![0; CHUNK]);
+        Ok(Self { archive, shape, big_endian, memory, next: 0, ended: false, chunk, reader })
+    }
+
+    /// Moves up to `frames` frames to `sink`, and says how many there were.
+    fn copy(&mut self, frames: usize, sink: &mut dyn Write) -> Result<usize> {
+        let left = self.archive.frames.map_or(frames, |all| frames.min(all - self.next));
+        for done in 0..left {
+            if self.ended || !self.copy_frame(sink)? {
+                return Ok(done);
+            }
+            self.next += 1;
+        }
+        Ok(left)
+    }
+
+    /// Moves one frame; false if the stream ends before it.
+    fn copy_frame(&mut self, sink: &mut dyn Write) -> Result<bool> {
+        let (frame, bytes) = (self.next, self.shape.frame_bytes());
+        let mut got = 0;
+        while got < bytes {
+            let wanted = CHUNK.min(bytes - got);
+            let n = read_some(&mut self.reader, &mut self.chunk[..wanted])
+                .map_err(|e| Error::io(NAME, format!("reading frame {frame}"), e))?;
+            if n == 0 {
+                return self.end(got);
+            }
+            sink.write_all(&self.chunk[..n]).map_err(|e| Error::io(NAME, format!("holding frame {frame}"), e))?;
+            got += n;
+        }
+        if self.archive.frames == Some(frame + 1) {
+            self.expect_end()?;
+        }
+        Ok(true)
+    }
+
+    /// The stream ended after `got` bytes of the next frame.
+    fn end(&mut self, got: usize) -> Result<bool> {
+        self.ended = true;
+        let (frame, bytes) = (self.next, self.shape.frame_bytes());
+        if got > 0 {
+            let what =
+                format!("ends inside frame {frame}: expected {bytes} bytes, got {got}; check --dims and --dtype");
+            return Err(Error::input(NAME, what));
+        }
+        match self.archive.frames {
+            Some(all) => Err(Error::input(NAME, format!("ends after {frame} of {all} frames"))),
+            None if frame == 0 => Err(Error::input(NAME, "is empty")),
+            None => {
+                self.archive.frames = Some(frame);
+                Ok(false)
+            }
+        }
+    }
+
+    fn expect_end(&mut self) -> Result<()> {
+        self.ended = true;
+        let mut one = [0];
+        match read_some(&mut self.reader, &mut one).map_err(|e| Error::io(NAME, "reading", e))? {
+            0 => Ok(()),
+            _ => {
+                let all = self.archive.frames.unwrap_or(0);
+                Err(Error::input(
+                    NAME,
+                    format!("goes on after its {all} frame(s); several arrays in one stream are not supported"),
+                ))
+            }
+        }
+    }
+
+    /// Somewhere to hold so many frames.
+    fn sink(&self, frames: usize) -> Result<Sink> {
+        let bytes = frames.checked_mul(self.shape.frame_bytes()).filter(|n| *n <= self.memory);
+        let Some(bytes) = bytes else {
+            let file =
+                tempfile::tempfile().map_err(|e| Error::io(std::env::temp_dir(), "making a temporary file", e))?;
+            return Ok(Sink::Spool(file));
+        };
+        let mut held = Vec::new();
+        let failed = |_| Error::io(NAME, format!("holding {frames} frames"), ErrorKind::OutOfMemory.into());
+        held.try_reserve_exact(bytes).map_err(failed)?;
+        Ok(Sink::Memory(held))
+    }
+
+    fn frame(&self, index: usize, first: usize) -> Frame {
+        let offset = (index * self.shape.frame_bytes()) as u64;
+        let name = format!("standard input, frame {}", first + index);
+        Frame { bytes: 0, offset, big_endian: self.big_endian, name }
+    }
+}
+
+impl<R: Read + Send> FrameSource for Stream<R> {
+    fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
+        let Some(skip) = first.checked_sub(self.next) else {
+            let what = format!("frame {first} is over: a stream only goes forward, and frame {} comes next", self.next);
+            return Err(Error::usage(what));
+        };
+        self.copy(skip, &mut io::sink())?;
+        let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
+        let mut sink = self.sink(count)?;
+        let held = self.copy(count, &mut sink)?;
+        let frames = (0..held).map(|i| self.frame(i, first)).collect();
+        Ok(Box::new(Frames { shape: self.shape, bytes: vec![sink.into()], frames }))
+    }
+}
+
+fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
+    let (shape, frames) = raw::shape(options)?;
+    let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
+    match skipped.map_err(|e| Error::io(NAME, "reading", e))? {
+        n if n == options.offset => Ok((shape, frames, options.big_endian)),
+        n => Err(Error::input(NAME, format!("ends after {n} bytes, inside the --offset of {}", options.offset))),
+    }
+}
+
+fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
+    super::format::refuse_options(Path::new(NAME), super::format::Format::Npy, options)?;
+    let array = npy::read_header(reader, Path::new(NAME))?;
+    Ok((array.shape, Some(array.frames), array.big_endian))
+}
+
+/// Some bytes, or none at the end.
+fn read_some(reader: &mut impl Read, out: &mut [u8]) -> io::Result<usize> {
+    loop {
+        match reader.read(out) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            result => return result,
+        }
+    }
+}
+
+/// Where a window is held.
+enum Sink {
+    Memory(Vec<u8>),
+    Spool(File),
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Memory(held) => held.write(bytes),
+            Self::Spool(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl From<Sink> for Bytes {
+    fn from(sink: Sink) -> Self {
+        match sink {
+            Sink::Memory(held) => Self::Memory(held),
+            Sink::Spool(file) => Self::Spool(file),
+        }
+    }
+}
