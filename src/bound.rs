@@ -47,9 +47,9 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
 }
 
 /// Whether the errors of one series (one value per frame, rounded up) keep the promise.
-pub fn holds(bound: Bound, delta: f64, errors: impl ExactSizeIterator<Item = f64>) -> bool {
+pub fn holds(bound: Bound, delta: f64, mut errors: impl ExactSizeIterator<Item = f64>) -> bool {
     match bound {
-        Bound::Pointwise => errors.fold(true, |ok, e| ok && e <= delta),
+        Bound::Pointwise => errors.all(|e| e <= delta),
         Bound::Rms => {
             let frames = errors.len() as f64;
             let squares = errors.fold(0.0, |sum: f64, e| (sum + (e * e).next_up()).next_up());

@@ -114,7 +114,7 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport)
     let codec = file.codec(piece.window)?;
     let first = file.window_range(piece.window).start;
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
-    let wanted = crate::wavelet::needed(&codec.synthesis, frames.iter().copied());
+    let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
     let mut out = vec![0; frames.len() * piece.region.voxels() * size];
     for leaf in file.leaves(piece.window) {

@@ -68,7 +68,7 @@ impl Encoder {
         let missing = Missing::find(codec, samples);
         let coded = self.series(codec, samples, &missing);
         let coded = match coded {
-            Some(coded) => self.coded_parts(codec, coded)?,
+            Some(coded) => self.coded_parts(codec, &coded)?,
             None => self.exact_parts(codec, samples, &missing)?,
         };
         let (stats, mut parts) = self.smaller(codec, samples, &missing, coded)?;
@@ -123,7 +123,7 @@ impl Encoder {
     }
 
     /// The parts of a block coded by coefficients.
-    fn coded_parts(&mut self, codec: &WindowCodec, coded: Coded) -> wavesplat_format::Result<Parts> {
+    fn coded_parts(&mut self, codec: &WindowCodec, coded: &Coded) -> wavesplat_format::Result<Parts> {
         let voxels = self.codes.len() / codec.basis.coefficients();
         let mut parts = Vec::new();
         for (level, range) in codec.parts.iter().enumerate() {

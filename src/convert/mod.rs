@@ -122,8 +122,10 @@ pub fn convert<W: Write>(
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let (read_time, encode_time) = std::thread::scope(|scope| {
-        let reader = scope.spawn(|| gather::read(source, config, &plan, to_workers));
-        let workers = scope.spawn(|| encode(config.level, from_reader, to_writer));
+        // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
+        let plan = &plan;
+        let reader = scope.spawn(move || gather::read(source, config, plan, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -190,7 +192,7 @@ const FIXED_MEMORY: usize = 8 << 20;
 const MOST_BLOCKS_IN_FLIGHT: usize = 64;
 
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(level: i32, batches: Receiver<Batch>, out: Sender<EncodedBatch>) -> Result<Duration> {
+fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
     let idle = Mutex::new(Vec::new());
     let mut busy = Duration::ZERO;
     for batch in batches {

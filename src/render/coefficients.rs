@@ -93,7 +93,7 @@ struct CoefficientGroup<'a> {
 impl<'a> CoefficientGroup<'a> {
     fn new(file: &'a CoefficientFile, what: What, window: u32, frames: Vec<usize>) -> Result<Self> {
         let codec = file.codec(window)?;
-        let wanted = needed(&codec.synthesis, frames.iter().copied());
+        let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
         let (mut coded, mut exact) = (0, 0);
         for leaf in file.leaves(window) {
