@@ -27,7 +27,13 @@ pub fn difference_up(x: f64, y: f64) -> f64 {
 /// `tolerance` times (`hi` - `lo`), rounded down if it is not exact: the voxel bound delta.
 pub fn voxel_bound(tolerance: f64, (lo, hi): (f64, f64)) -> f64 {
     let range = match difference(hi, lo) {
-        (range, lost) if range.is_finite() => if lost < 0.0 { range.next_down() } else { range },
+        (range, lost) if range.is_finite() => {
+            if lost < 0.0 {
+                range.next_down()
+            } else {
+                range
+            }
+        }
         _ => f64::MAX,
     };
     let product = tolerance * range;

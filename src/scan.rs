@@ -21,7 +21,8 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    const NOTHING: Self = Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
+    const NOTHING: Self =
+        Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
 
     /// What two consecutive stretches hold together.
     fn then(self, next: Self) -> Self {

@@ -144,7 +144,12 @@ impl Encoder {
     }
 
     /// The parts of a block stored exactly.
-    fn exact_parts(&mut self, codec: &WindowCodec, samples: &[u8], missing: &Missing) -> wavesplat_format::Result<Parts> {
+    fn exact_parts(
+        &mut self,
+        codec: &WindowCodec,
+        samples: &[u8],
+        missing: &Missing,
+    ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::NONE;
         for_each_sample(codec.sample, samples, |i, value| {
             if !missing.mask[i] {
@@ -182,9 +187,8 @@ const MOST_OUTLIERS: usize = 8;
 
 impl Encoded {
     fn new(block: EncodedBlock, missing: u64) -> Self {
-        let count = |wanted: fn(PartKind) -> bool| {
-            block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum()
-        };
+        let count =
+            |wanted: fn(PartKind) -> bool| block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum();
         let coded = count(|kind| matches!(kind, PartKind::Level(_)));
         let outliers = count(|kind| kind == PartKind::Outliers);
         Self { block, coded, outliers, missing }

@@ -1,10 +1,10 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
-use crate::scan::{Scan, join_ranges, scan};
 use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
+use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::Grid;
 use crate::wavelet;

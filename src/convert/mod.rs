@@ -22,7 +22,6 @@ use crate::sample::SampleType;
 use crate::source::{Archive, FrameSource};
 use crate::volume::BlockGrid;
 use crate::wavelet::{self, Basis};
-use wavesplat_format::FileId;
 use crossbeam::channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
@@ -32,6 +31,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use wavesplat_format::FileId;
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -197,15 +197,19 @@ fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> 
     let mut busy = Duration::ZERO;
     for batch in batches {
         let started = Instant::now();
-        let blocks: Result<Vec<Encoded>> = batch.blocks.par_iter().map(|(id, samples)| {
-            let reused = idle.lock().ok().and_then(|mut e| e.pop());
-            let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-            let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
-            if let Ok(mut idle) = idle.lock() {
-                idle.push(encoder);
-            }
-            encoded
-        }).collect();
+        let blocks: Result<Vec<Encoded>> = batch
+            .blocks
+            .par_iter()
+            .map(|(id, samples)| {
+                let reused = idle.lock().ok().and_then(|mut e| e.pop());
+                let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+                let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
+                if let Ok(mut idle) = idle.lock() {
+                    idle.push(encoder);
+                }
+                encoded
+            })
+            .collect();
         busy += started.elapsed();
         let encoded = EncodedBatch { window: batch.window, blocks: blocks? };
         if out.send(encoded).is_err() {

@@ -29,7 +29,8 @@ impl Budget {
         let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1)) + budget.block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
-            let what = format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
+            let what =
+                format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
             return Err(Error::usage(what));
         }
         Ok(budget)
@@ -48,8 +49,10 @@ impl Budget {
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
         let fits = |f: &usize| {
-            let planes = self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
-            self.picture_bytes(*f) <= self.available / 3 && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
+            let planes =
+                self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
+            self.picture_bytes(*f) <= self.available / 3
+                && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
         };
         (1..=most).rev().find(fits).unwrap_or(1)
     }

@@ -99,7 +99,14 @@ struct Splat {
 
 impl Splats {
     /// Projects the voxels of the block at `region` that lie in `clip` and have terms.
-    pub(super) fn new(terms: Terms, region: &Region, clip: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Self {
+    pub(super) fn new(
+        terms: Terms,
+        region: &Region,
+        clip: &Region,
+        grid: &Grid,
+        camera: &Camera,
+        footprint: &Footprint,
+    ) -> Self {
         let mut voxels = Vec::new();
         let whole = region.relative_to(region.start);
         for v in region.intersect(clip).iter() {
