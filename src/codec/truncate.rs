@@ -18,6 +18,8 @@ pub(super) struct Group {
     /// The place of each coefficient in its voxel's order of dropping; K lanes.
     rank: Vec<[u16; LANES]>,
     dropped: [u16; LANES],
+    /// Scratch: (size, coefficient) of one voxel.
+    order: Vec<(u64, u16)>,
     /// What the decoder makes of the kept codes; `frames` lanes.
     pub(super) decoded: Vec<Lane>,
     work: Vec<Lane>,
@@ -33,6 +35,7 @@ impl Group {
             codes: vec![[0; LANES]; k],
             rank: vec![[0; LANES]; k],
             dropped: [0; LANES],
+            order: Vec::with_capacity(k),
             decoded: vec![Lane::default(); frames],
             work: vec![Lane::default(); k],
         }
@@ -82,17 +85,19 @@ impl Group {
         }
     }
 
-    /// Ranks the coefficients of each lane by size, those that are zero already first; returns how many are not zero.
+    /// Ranks the coefficients of each lane by size, the finer first where equal; returns how many are not zero.
     fn order(&mut self) -> [u16; LANES] {
         std::array::from_fn(|l| {
-            let mut order: Vec<u16> =
-                (0..self.codes.len() as u16).filter(|k| self.codes[*k as usize][l] != 0).collect();
-            let size = |k: &u16| self.coefficients[*k as usize][l].abs();
-            order.sort_unstable_by(|i, j| size(i).total_cmp(&size(j)).then(j.cmp(i)));
-            for (rank, k) in order.iter().enumerate() {
-                self.rank[*k as usize][l] = rank as u16;
+            self.order.clear();
+            for (k, _) in self.codes.iter().enumerate().filter(|(_, codes)| codes[l] != 0) {
+                let size = self.coefficients[k][l].abs().to_bits(); // ordered as the numbers are
+                self.order.push((size, u16::MAX - k as u16));
             }
-            order.len() as u16
+            self.order.sort_unstable();
+            for (rank, (_, k)) in self.order.iter().enumerate() {
+                self.rank[usize::from(u16::MAX - k)][l] = rank as u16;
+            }
+            self.order.len() as u16
         })
     }
 
@@ -103,20 +108,23 @@ impl Group {
 
     /// The error of each lane in the bound's own measure: the largest over the frames, or the root of the mean square.
     fn errors(&self, bound: Bound) -> Lane {
+        match bound {
+            Bound::Pointwise => self.fold_errors(f64::max),
+            Bound::Rms => {
+                let frames = self.source.len() as f64;
+                self.fold_errors(|sum, e| sum + e * e).map(|sum| (sum / frames).sqrt())
+            }
+        }
+    }
+
+    fn fold_errors(&self, add: impl Fn(f64, f64) -> f64) -> Lane {
         let mut out = Lane::default();
         for ((decoded, source), weight) in self.decoded.iter().zip(&self.source).zip(&self.weight) {
             for l in 0..LANES {
-                let e = (decoded[l] - source[l]).abs() * weight[l];
-                out[l] = match bound {
-                    Bound::Pointwise => out[l].max(e),
-                    Bound::Rms => out[l] + e * e,
-                };
+                out[l] = add(out[l], (decoded[l] - source[l]).abs() * weight[l]);
             }
         }
-        match bound {
-            Bound::Pointwise => out,
-            Bound::Rms => out.map(|sum| (sum / self.source.len() as f64).sqrt()),
-        }
+        out
     }
 }
 
