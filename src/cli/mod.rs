@@ -33,7 +33,7 @@ pub struct CommonArgs {
     /// More notes
     #[arg(short, long, conflicts_with = "quiet", help_heading = "Common options")]
     pub verbose: bool,
-    /// Print one JSON object with everything measured and decided
+    /// Print one JSON object with everything measured and decided (to standard error if data goes to standard output)
     #[arg(long, help_heading = "Common options")]
     pub json: bool,
 }
@@ -75,13 +75,22 @@ impl CommonArgs {
         if !self.json {
             return Ok(());
         }
-        let text = serde_json::to_string_pretty(report).map_err(|e| Error::usage(format!("--json: {e}")))?;
+        let text = serde_json::to_string_pretty(&Versioned { schema: 1, report })
+            .map_err(|e| Error::usage(format!("--json: {e}")))?;
         if data_on_stdout {
             note(text);
             return Ok(());
         }
         print(&(text + "\n"))
     }
+}
+
+/// The object that `--json` prints; a change of a key's meaning changes `schema`.
+#[derive(Debug, Serialize)]
+struct Versioned<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    report: &'a T,
 }
 
 /// Writes text to standard output.

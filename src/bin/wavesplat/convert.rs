@@ -154,7 +154,7 @@ fn summary(r: &ConvertReport) -> String {
     let rate = r.input_bytes as f64 / r.seconds / 1e6;
     format!(
         "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; \
-         largest error {:e} of {:e} allowed",
+         largest error {:.4e} of {:.4e} allowed",
         r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample, r.reached, r.delta
     )
 }

@@ -26,10 +26,9 @@ pub(crate) struct InfoArgs {
     common: CommonArgs,
 }
 
-/// The keys of `--json`; a change of their meaning changes `schema`.
+/// The keys of `--json`.
 #[derive(Debug, Serialize)]
 struct Info {
-    schema: u32,
     id: String,
     bytes: u64,
     dims: [u64; 3],
@@ -83,7 +82,6 @@ impl Info {
         let voxels: u64 = m.dims.iter().product();
         let windows: Vec<WindowInfo> = m.windows.iter().map(|w| WindowInfo::of(w, voxels)).collect();
         Self {
-            schema: 1,
             id: file.id().to_string(),
             bytes: file.bytes(),
             dims: m.dims,
@@ -121,9 +119,9 @@ impl Info {
         let [promised, reached] = [largest(&self.windows, |w| w.promised), largest(&self.windows, |w| w.reached)];
         let mut text = format!(
             "volume     {x} x {y} x {z} voxels, spacing {:?}, origin {:?}\n\
-             samples    {} ({name}), {} frames, values {:e} to {:e}\n\
+             samples    {} ({name}), {} frames, values {:.4e} to {:.4e}\n\
              size       {} bytes, {ratio:.1}x smaller than raw; {} blocks of {} voxels a side\n\
-             promise    {} error <= {:e} x {:e} = {promised:e}; largest sample error reached {reached:e}\n\
+             promise    {} error <= {:e} x {:.4e} = {promised:.4e}; largest sample error reached {reached:.4e}\n\
              content    {per_sample:.4} coefficients per sample, {} outliers, {} missing samples\n\
              id         {} ({})\n",
             self.spacing,
@@ -148,7 +146,7 @@ impl Info {
             let end = w.first_frame + u64::from(w.frames);
             let _ = writeln!(
                 text,
-                "window     frames {}..{end} {}: promised {:e}, reached {:e}, rms {:e}",
+                "window     frames {}..{end} {}: promised {:.4e}, reached {:.4e}, rms {:.4e}",
                 w.first_frame, w.basis, w.promised, w.reached, w.rms
             );
         }

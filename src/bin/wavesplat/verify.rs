@@ -72,7 +72,7 @@ fn summary(r: &VerifyReport) -> String {
     if let Some(c) = &r.against {
         let held = if c.series_outside == 0 { "kept" } else { "MISSED" };
         text += &format!(
-            "bound {held}: largest error {:e} ({:.4} of the bound), rms error {:e}, {} missing samples as they were, \
+            "bound {held}: largest error {:.4e} ({:.4} of the bound), rms error {:.4e}, {} missing samples as they were, \
              {} samples compared\n",
             c.largest_error, c.largest_share_of_bound, c.rms_error, c.missing, c.samples
         );
