@@ -111,19 +111,22 @@ impl Part {
     }
 }
 
+impl Output {
+    fn writer(&mut self) -> &mut dyn Write {
+        match &mut self.target {
+            Target::Stdout(out) => out,
+            Target::Special(out) | Target::File(out, _) => out,
+        }
+    }
+}
+
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match &mut self.target {
-            Target::Stdout(out) => out.write(bytes),
-            Target::Special(out) | Target::File(out, _) => out.write(bytes),
-        }
+        self.writer().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match &mut self.target {
-            Target::Stdout(out) => out.flush(),
-            Target::Special(out) | Target::File(out, _) => out.flush(),
-        }
+        self.writer().flush()
     }
 }
 

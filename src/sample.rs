@@ -76,6 +76,16 @@ pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     for_type!(ty, run, values, out);
 }
 
+/// Whether a sample is missing: not finite, or `declared` to stand for that.
+pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
+    !value.is_finite() || Some(value) == declared
+}
+
+/// A declared missing value as samples of type `ty` have it: 1e35 is another number as f32 than as f64.
+pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
+    declared.map(|v| if ty.is_float() { round_to(ty, v) } else { v })
+}
+
 /// Reverses the bytes of every sample: big-endian to little-endian and back.
 pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
     if ty.size() > 1 {

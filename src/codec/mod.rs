@@ -9,7 +9,7 @@ pub mod encode;
 mod truncate;
 
 use crate::bound::Bound;
-use crate::sample::SampleType;
+use crate::sample::{self, SampleType};
 use crate::wavelet::{self, LANES, Lane, TimeBasis};
 use std::ops::Range;
 use wavesplat_format::{Metadata, Window};
@@ -66,7 +66,7 @@ impl WindowCodec {
 
     /// Whether a sample is missing: not finite, or the declared value.
     pub fn is_missing(&self, value: f64) -> bool {
-        !value.is_finite() || Some(value) == self.missing_value
+        sample::is_missing(value, self.missing_value)
     }
 }
 

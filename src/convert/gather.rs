@@ -4,6 +4,7 @@ use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
+use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::Grid;
@@ -66,16 +67,16 @@ struct WindowReader<'a> {
 impl WindowReader<'_> {
     /// Looks at the window's samples and fixes its bound.
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize, first: usize) -> Result<WindowJob> {
-        let (config, sample) = (self.config, self.archive.sample);
-        let is_missing = |v: f64| !v.is_finite() || Some(v) == config.missing_value;
-        let seen = scan(window, &self.archive.grid, sample, is_missing)?;
+        let (config, ty) = (self.config, self.archive.sample);
+        let is_missing = |v: f64| sample::is_missing(v, config.missing_value);
+        let seen = scan(window, &self.archive.grid, ty, is_missing)?;
         self.refuse_missing(window, first, &seen)?;
         let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
         self.range = Some(range);
         let delta = bound::voxel_bound(config.tolerance, config.range.unwrap_or(range));
         let delta = if delta.is_finite() { delta.max(0.0) } else { 0.0 }; // nothing but missing samples so far
         let basis = wavelet::basis(config.basis, window.frames());
-        let mut codec = WindowCodec::new(basis, sample, config.bound, delta, self.plan.blocks.edge);
+        let mut codec = WindowCodec::new(basis, ty, config.bound, delta, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
         let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;

@@ -18,7 +18,7 @@ use crate::codec::WindowCodec;
 use crate::codec::encode::{Encoded, Encoder};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
-use crate::sample::SampleType;
+use crate::sample::{self, SampleType};
 use crate::source::{Archive, FrameSource};
 use crate::volume::BlockGrid;
 use crate::wavelet::{self, Basis};
@@ -116,6 +116,8 @@ pub fn convert<W: Write>(
 ) -> Result<ConvertReport> {
     let started = Instant::now();
     let archive = source.archive().clone();
+    let missing_value = sample::missing_value(archive.sample, config.missing_value);
+    let config = &ConvertConfig { missing_value, ..config.clone() };
     let plan = Plan::new(config, &archive)?;
     progress.start(archive.frames.map(|f| (f.div_ceil(config.window) * plan.blocks.len()) as u64));
     let mut recorder = Recorder::new(config, &archive, &plan, name, out);

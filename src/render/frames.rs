@@ -2,6 +2,7 @@
 
 use super::scene::{Group, Layout, Scene, Terms};
 use crate::error::Result;
+use crate::sample::{self, is_missing};
 use crate::scan::{join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::{BlockGrid, Grid, Region};
@@ -23,12 +24,9 @@ impl FrameScene {
     /// Of a source, with a value that means "missing" besides NaN and infinities.
     pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
         let archive = source.archive().clone();
+        let missing_value = sample::missing_value(archive.sample, missing_value);
         Self { source, archive, missing_value }
     }
-}
-
-fn is_missing(value: f64, declared: Option<f64>) -> bool {
-    !value.is_finite() || Some(value) == declared
 }
 
 impl Scene for FrameScene {

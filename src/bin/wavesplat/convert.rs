@@ -46,8 +46,9 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
     range: Option<Pair>,
     /// NaN, infinities and the missing value: refuse them, or keep them as they are
-    #[arg(long, value_enum, default_value = "error")]
-    missing: MissingName,
+    /// [default: error; mask with --missing-value]
+    #[arg(long, value_enum)]
+    missing: Option<MissingName>,
     /// A value that means "missing"
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     missing_value: Option<f64>,
@@ -128,9 +129,9 @@ impl ConvertArgs {
                 BoundName::Rms => Bound::Rms,
             },
             range,
-            missing: match self.missing {
-                MissingName::Error => MissingPolicy::Error,
-                MissingName::Mask => MissingPolicy::Mask,
+            missing: match (self.missing, self.missing_value) {
+                (Some(MissingName::Error), _) | (None, None) => MissingPolicy::Error,
+                (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
             },
             missing_value: self.missing_value,
             block: self.block,
