@@ -27,7 +27,13 @@ pub fn difference_up(x: f64, y: f64) -> f64 {
 /// `tolerance` times (`hi` - `lo`), rounded down if it is not exact: the voxel bound delta.
 pub fn voxel_bound(tolerance: f64, (lo, hi): (f64, f64)) -> f64 {
     let range = match difference(hi, lo) {
-        (range, lost) if range.is_finite() => if lost < 0.0 { range.next_down() } else { range },
+        (range, lost) if range.is_finite() => {
+            if lost < 0.0 {
+                range.next_down()
+            } else {
+                range
+            }
+        }
         _ => f64::MAX,
     };
     let product = tolerance * range;
@@ -47,9 +53,9 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
 }
 
 /// Whether the errors of one series (one value per frame, rounded up) keep the promise.
-pub fn holds(bound: Bound, delta: f64, errors: impl ExactSizeIterator<Item = f64>) -> bool {
+pub fn holds(bound: Bound, delta: f64, mut errors: impl ExactSizeIterator<Item = f64>) -> bool {
     match bound {
-        Bound::Pointwise => errors.fold(true, |ok, e| ok && e <= delta),
+        Bound::Pointwise => errors.all(|e| e <= delta),
         Bound::Rms => {
             let frames = errors.len() as f64;
             let squares = errors.fold(0.0, |sum: f64, e| (sum + (e * e).next_up()).next_up());

@@ -114,7 +114,7 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport)
     let codec = file.codec(piece.window)?;
     let first = file.window_range(piece.window).start;
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
-    let wanted = crate::wavelet::needed(&codec.synthesis, frames.iter().copied());
+    let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
     let mut out = vec![0; frames.len() * piece.region.voxels() * size];
     for leaf in file.leaves(piece.window) {
@@ -125,7 +125,8 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport)
         let touches = |e: &BlockEntry| !file.blocks.region(e.id.block as usize).intersect(&piece.region).is_empty();
         let entries: Vec<BlockEntry> = file.leaf(leaf)?.into_iter().filter(touches).collect();
         for entries in entries.chunks(rayon::current_num_threads()) {
-            let decode = |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+            let decode =
+                |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);
@@ -152,4 +153,3 @@ fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[
         }
     }
 }
-

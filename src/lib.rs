@@ -1,4 +1,59 @@
-//! wavesplat.
+//! wavesplat: time-varying volumes as few coefficients under a guaranteed error bound, and pictures from them.
+//!
+//! # The data's path
+//!
+//! ```text
+//!  frame files, a pipe                      source/     one file per input format behind one trait; mapped.rs
+//!    |  windows of T frames                 scan.rs     value range, missing samples: fixes the window's bound
+//!    |  boxes of voxels                     convert/    reader -> workers -> writer, bounded channels, in order
+//!    v
+//!  series, 8 voxels at a time               wavelet/    forward: samples to T coefficients along time (eq 5)
+//!    |                                      codec/      truncate under the bound, quantise, decode again, compare;
+//!    v                                                  what missed the bound is stored exactly
+//!  coded blocks                             format/     parts packed by zstd, directory, checksums (another package)
+//!    |
+//!  ===== the .wspl file: the only meeting point of the two halves =====                          file.rs
+//!    |
+//!    v
+//!  blocks that the picture needs            render/     plan: what fits in memory; scene: what is splatted
+//!    |  terms: (plane, amount) per voxel    codec/      the same decoder
+//!    v
+//!  planes of tiles                          camera.rs, footprint.rs, render/splat.rs (eq 4 and 9)
+//!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
+//!    v
+//!  pictures                                 render/weights.rs (eq 12), colour.rs, sink.rs; output.rs
+//! ```
+//!
+//! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source. The programs in `bin/`
+//! turn arguments into configurations and call one function; what they share is `cli/`.
+//!
+//! # Words
+//!
+//! *frame* one time step of the whole grid; *voxel* a lattice point; *series* one voxel over time; *window* T
+//! consecutive frames; *block* a box of voxels over one window; *coefficient* c_{i,k} of voxel i and basis function k;
+//! *code* a quantised coefficient; *part* a piece of a block with its own zstd frame: a group of temporal *levels*,
+//! coarse to fine, or what overrides them (*outliers*, *missing* samples, an *exact* block); *plane* a sum of splats
+//! over pixels; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed.
+//! Triples are x, y, z; arrays have x fastest, then y, z, and time slowest.
+//!
+//! # Who may call whom
+//!
+//! `bin, cli, tools -> convert | render | extract | verify -> source, scan, codec, file, camera, footprint
+//! -> wavelet, bound, sample, volume, mapped, output, error -> format`. A test reads the sources and holds this.
+//!
+//! 1. `convert` and `render` never name each other; the file is their only meeting point.
+//! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
+//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`) are pure functions over slices: no
+//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `scan.rs`, `render/mod.rs`, `extract.rs` and
+//!    `verify.rs`.
+//! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
+//! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
+//! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
+//!    only correctly rounded operations and `libm` are used.
+//! 7. Nothing is ever loaded whole: memory follows the budget and not the archive.
+//! 8. A transform is one replaceable part: [`wavelet::TimeBasis`] is all that the rest knows of it, and a
+//!    [`render::Scene`] turns blocks into terms and planes into frames, whatever they are made of.
+
 pub mod bound;
 pub mod camera;
 pub mod cli;

@@ -22,6 +22,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn every_type_has_a_numpy_name() {
+        let names = SampleType::ALL.map(|ty| dtype(ty).expect("a type").descr());
+        assert_eq!(names, ["'|u1'", "'|i1'", "'<u2'", "'<i2'", "'<u4'", "'<i4'", "'<f2'", "'<f4'", "'<f8'"]);
+    }
+
+    #[test]
     fn a_header_reads_back() {
         for ty in SampleType::ALL {
             let mut bytes = Vec::new();

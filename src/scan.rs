@@ -9,19 +9,20 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// What was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scan {
+pub(crate) struct Scan {
     /// Range of the samples that are not missing; (inf, -inf) if all are.
-    pub range: (f64, f64),
+    pub(crate) range: (f64, f64),
     /// Missing samples.
-    pub missing: u64,
+    pub(crate) missing: u64,
     /// The first of them: frame within the window, and index of the voxel within the frame.
-    pub first_missing: Option<(usize, usize)>,
+    pub(crate) first_missing: Option<(usize, usize)>,
     /// A digest of all samples, the same for every way in which they can be stored.
-    pub digest: u64,
+    pub(crate) digest: u64,
 }
 
 impl Scan {
-    const NOTHING: Self = Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
+    const NOTHING: Self =
+        Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
 
     /// What two consecutive stretches hold together.
     fn then(self, next: Self) -> Self {
@@ -38,12 +39,12 @@ impl Scan {
 }
 
 /// The smallest range that holds both.
-pub fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+pub(crate) fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
 /// Looks at every sample of a window; planes in parallel, joined in order.
-pub fn scan(
+pub(crate) fn scan(
     window: &dyn FrameWindow,
     grid: &Grid,
     ty: SampleType,

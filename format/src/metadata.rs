@@ -27,7 +27,7 @@ pub enum Bound {
 pub enum Basis {
     /// The Haar wavelet.
     Haar,
-    /// The multiscale basis.
+    /// The multiwavelet of Geronimo, Hardin and Massopust.
     Multi,
 }
 

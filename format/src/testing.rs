@@ -185,7 +185,7 @@ pub(crate) fn verify(file: &[u8]) -> Result<Vec<(BlockId, Content)>> {
 
 fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Content> {
     let level = |level| {
-        let mut codes = Vec::new();
+        let mut codes = vec![0; reader.geometry(block.id)?.codes(level).unwrap_or(0)];
         reader.codes(block, level, &mut codes).map(|()| codes)
     };
     let levels = (0..reader.geometry(block.id)?.levels.len() as u8).map(level).collect::<Result<_>>()?;

@@ -16,7 +16,11 @@ use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Sc
 
 /// Render pictures of time-varying volumes.
 #[derive(Debug, Parser)]
-#[command(name = "wavesplat-render", version, arg_required_else_help = true, after_help = "\
+#[command(
+    name = "wavesplat-render",
+    version,
+    arg_required_else_help = true,
+    after_help = "\
 Examples:
   wavesplat-render run.wspl -o frame_%04d.png
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
@@ -24,7 +28,8 @@ Examples:
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render frames/ --method direct -o frame_%04d.png
 An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours.
-The view looks along -y with z up at 0,0; azimuth turns about z, counter-clockwise seen from above.")]
+The view looks along -y with z up at 0,0; azimuth turns about z, counter-clockwise seen from above."
+)]
 struct Cli {
     /// Coefficient file; for --method direct also frames
     #[arg(required = true)]

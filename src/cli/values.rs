@@ -27,7 +27,9 @@ impl FromStr for Dims {
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let dims: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| *n > 0)).collect();
-        dims.filter(|d| d.len() == 3 || d.len() == 4).map(Self).ok_or_else(|| "takes NXxNYxNZ or NXxNYxNZxNT, as 75x75x20x32".into())
+        dims.filter(|d| d.len() == 3 || d.len() == 4)
+            .map(Self)
+            .ok_or_else(|| "takes NXxNYxNZ or NXxNYxNZxNT, as 75x75x20x32".into())
     }
 }
 
@@ -58,7 +60,8 @@ impl<const N: usize> FromStr for Numbers<N> {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
         let numbers = numbers.and_then(|n| n.try_into().ok());
         numbers.map(Self).ok_or_else(|| format!("takes {N} numbers with commas between them"))
     }

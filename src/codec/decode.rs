@@ -107,7 +107,8 @@ impl Block {
 
     /// Puts outliers and missing samples in their places.
     fn put_overrides(&self, size: usize, out: &mut [u8]) {
-        let outliers = self.outliers.positions.iter().map(|p| *p as usize).zip(self.outliers.samples.chunks_exact(size));
+        let outliers =
+            self.outliers.positions.iter().map(|p| *p as usize).zip(self.outliers.samples.chunks_exact(size));
         let places = self.missing.0.iter().enumerate().filter(|(_, missing)| **missing).map(|(i, _)| i);
         for (index, bytes) in outliers.chain(places.zip(self.missing.1.chunks_exact(size))) {
             out[index * size..(index + 1) * size].copy_from_slice(bytes);

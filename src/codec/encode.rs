@@ -68,7 +68,7 @@ impl Encoder {
         let missing = Missing::find(codec, samples);
         let coded = self.series(codec, samples, &missing);
         let coded = match coded {
-            Some(coded) => self.coded_parts(codec, coded)?,
+            Some(coded) => self.coded_parts(codec, &coded)?,
             None => self.exact_parts(codec, samples, &missing)?,
         };
         let (stats, mut parts) = self.smaller(codec, samples, &missing, coded)?;
@@ -123,7 +123,7 @@ impl Encoder {
     }
 
     /// The parts of a block coded by coefficients.
-    fn coded_parts(&mut self, codec: &WindowCodec, coded: Coded) -> wavesplat_format::Result<Parts> {
+    fn coded_parts(&mut self, codec: &WindowCodec, coded: &Coded) -> wavesplat_format::Result<Parts> {
         let voxels = self.codes.len() / codec.basis.coefficients();
         let mut parts = Vec::new();
         for (level, range) in codec.parts.iter().enumerate() {
@@ -144,7 +144,12 @@ impl Encoder {
     }
 
     /// The parts of a block stored exactly.
-    fn exact_parts(&mut self, codec: &WindowCodec, samples: &[u8], missing: &Missing) -> wavesplat_format::Result<Parts> {
+    fn exact_parts(
+        &mut self,
+        codec: &WindowCodec,
+        samples: &[u8],
+        missing: &Missing,
+    ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::NONE;
         for_each_sample(codec.sample, samples, |i, value| {
             if !missing.mask[i] {
@@ -182,9 +187,8 @@ const MOST_OUTLIERS: usize = 8;
 
 impl Encoded {
     fn new(block: EncodedBlock, missing: u64) -> Self {
-        let count = |wanted: fn(PartKind) -> bool| {
-            block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum()
-        };
+        let count =
+            |wanted: fn(PartKind) -> bool| block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum();
         let coded = count(|kind| matches!(kind, PartKind::Level(_)));
         let outliers = count(|kind| kind == PartKind::Outliers);
         Self { block, coded, outliers, missing }

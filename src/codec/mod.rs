@@ -48,7 +48,8 @@ impl WindowCodec {
     pub fn of_file(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
         let basis = wavelet::basis(window.basis, window.frames as usize);
         if basis.coefficients() != window.coefficients as usize {
-            let what = format!("{} coefficients for {} frames of {:?}", window.coefficients, window.frames, window.basis);
+            let what =
+                format!("{} coefficients for {} frames of {:?}", window.coefficients, window.frames, window.basis);
             return Err(wavesplat_format::Error::Invalid(what));
         }
         let lengths: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();

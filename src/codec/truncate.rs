@@ -85,7 +85,8 @@ impl Group {
     /// Ranks the coefficients of each lane by size, those that are zero already first; returns how many are not zero.
     fn order(&mut self) -> [u16; LANES] {
         std::array::from_fn(|l| {
-            let mut order: Vec<u16> = (0..self.codes.len() as u16).filter(|k| self.codes[*k as usize][l] != 0).collect();
+            let mut order: Vec<u16> =
+                (0..self.codes.len() as u16).filter(|k| self.codes[*k as usize][l] != 0).collect();
             let size = |k: &u16| self.coefficients[*k as usize][l].abs();
             order.sort_unstable_by(|i, j| size(i).total_cmp(&size(j)).then(j.cmp(i)));
             for (rank, k) in order.iter().enumerate() {

@@ -1,10 +1,10 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
-use crate::scan::{Scan, join_ranges, scan};
 use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
+use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::Grid;
 use crate::wavelet;
@@ -26,7 +26,7 @@ pub(super) fn read(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
     plan: &Plan,
-    out: Sender<Batch>,
+    out: &Sender<Batch>,
 ) -> Result<Duration> {
     let mut reader = WindowReader { config, plan, archive: source.archive().clone(), range: None, id: None };
     let mut busy = Duration::ZERO;
@@ -43,7 +43,7 @@ pub(super) fn read(
         }
         let job = Arc::new(reader.prepare(window.as_ref(), index, first)?);
         busy += started.elapsed();
-        if !reader.send_blocks(window.as_ref(), &job, &out, &mut busy)? {
+        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? {
             break; // a later stage failed and says why
         }
         window.check_unchanged()?;

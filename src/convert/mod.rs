@@ -22,7 +22,6 @@ use crate::sample::SampleType;
 use crate::source::{Archive, FrameSource};
 use crate::volume::BlockGrid;
 use crate::wavelet::{self, Basis};
-use wavesplat_format::FileId;
 use crossbeam::channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
@@ -32,6 +31,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use wavesplat_format::FileId;
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,8 +122,10 @@ pub fn convert<W: Write>(
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let (read_time, encode_time) = std::thread::scope(|scope| {
-        let reader = scope.spawn(|| gather::read(source, config, &plan, to_workers));
-        let workers = scope.spawn(|| encode(config.level, from_reader, to_writer));
+        // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
+        let plan = &plan;
+        let reader = scope.spawn(move || gather::read(source, config, plan, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -190,20 +192,24 @@ const FIXED_MEMORY: usize = 8 << 20;
 const MOST_BLOCKS_IN_FLIGHT: usize = 64;
 
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(level: i32, batches: Receiver<Batch>, out: Sender<EncodedBatch>) -> Result<Duration> {
+fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
     let idle = Mutex::new(Vec::new());
     let mut busy = Duration::ZERO;
     for batch in batches {
         let started = Instant::now();
-        let blocks: Result<Vec<Encoded>> = batch.blocks.par_iter().map(|(id, samples)| {
-            let reused = idle.lock().ok().and_then(|mut e| e.pop());
-            let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-            let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
-            if let Ok(mut idle) = idle.lock() {
-                idle.push(encoder);
-            }
-            encoded
-        }).collect();
+        let blocks: Result<Vec<Encoded>> = batch
+            .blocks
+            .par_iter()
+            .map(|(id, samples)| {
+                let reused = idle.lock().ok().and_then(|mut e| e.pop());
+                let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+                let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
+                if let Ok(mut idle) = idle.lock() {
+                    idle.push(encoder);
+                }
+                encoded
+            })
+            .collect();
         busy += started.elapsed();
         let encoded = EncodedBatch { window: batch.window, blocks: blocks? };
         if out.send(encoded).is_err() {

@@ -1,9 +1,9 @@
 //! The writer's stage: coded blocks into the file, and the metadata that the run adds up to.
 
-use crate::scan::join_ranges;
 use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, WindowJob};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
+use crate::scan::join_ranges;
 use crate::source::Archive;
 use crossbeam::channel::Receiver;
 use std::io::Write;

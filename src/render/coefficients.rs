@@ -93,7 +93,7 @@ struct CoefficientGroup<'a> {
 impl<'a> CoefficientGroup<'a> {
     fn new(file: &'a CoefficientFile, what: What, window: u32, frames: Vec<usize>) -> Result<Self> {
         let codec = file.codec(window)?;
-        let wanted = needed(&codec.synthesis, frames.iter().copied());
+        let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
         let (mut coded, mut exact) = (0, 0);
         for leaf in file.leaves(window) {
@@ -130,7 +130,8 @@ impl<'a> CoefficientGroup<'a> {
 
     fn terms_of_samples(&self, block: &Block, samples: &[u8]) -> Terms {
         let ty: SampleType = self.codec.sample;
-        let is_missing = |i: usize, _: f64| block.is_missing(self.frames[i / block.voxels] * block.voxels + i % block.voxels);
+        let is_missing =
+            |i: usize, _: f64| block.is_missing(self.frames[i / block.voxels] * block.voxels + i % block.voxels);
         let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), is_missing);
         terms.bytes_read = block.bytes_read;
         terms
@@ -230,7 +231,8 @@ impl Overrides {
     fn of(block: &Block, codec: &WindowCodec, frames: &[usize]) -> Self {
         let mut wanted = vec![None; codec.frames()];
         frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
-        let place = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
+        let place =
+            |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
         let mut samples = vec![0.0; block.outliers.positions.len()];
         crate::sample::load(codec.sample, &block.outliers.samples, &mut samples);
         let outliers = block.outliers.positions.iter().map(|p| *p as usize).zip(samples);
@@ -245,7 +247,11 @@ impl Overrides {
 }
 
 /// Turns (voxel, frame of the group, frame of the window, sample) into (voxel, frame, sample - what the codes give).
-fn subtract_series(block: &Block, codec: &WindowCodec, targets: &[(usize, usize, usize, f64)]) -> Vec<(usize, usize, f64)> {
+fn subtract_series(
+    block: &Block,
+    codec: &WindowCodec,
+    targets: &[(usize, usize, usize, f64)],
+) -> Vec<(usize, usize, f64)> {
     let mut out = Vec::new();
     for of_voxel in targets.chunk_by(|a, b| a.0 == b.0) {
         let series = block.series(codec, of_voxel[0].0);

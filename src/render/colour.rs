@@ -36,7 +36,10 @@ impl ColourMap {
             _ => return Err(Error::usage(format!("--colormap {name}: unknown; one of {}", NAMES.join(" ")))),
         };
         if !(range.0.is_finite() && range.1.is_finite() && range.0 <= range.1) {
-            return Err(Error::usage(format!("--range {},{}: takes two numbers, the lower one first", range.0, range.1)));
+            return Err(Error::usage(format!(
+                "--range {},{}: takes two numbers, the lower one first",
+                range.0, range.1
+            )));
         }
         Ok(Self { map, range, background })
     }

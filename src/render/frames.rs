@@ -73,8 +73,8 @@ impl Scene for FrameScene {
         let window = self.source.window(first, last + 1 - first)?;
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let absent = can_miss
-            && scan(window.as_ref(), &archive.grid, archive.sample, |v| is_missing(v, declared))?.missing > 0;
+        let absent =
+            can_miss && scan(window.as_ref(), &archive.grid, archive.sample, |v| is_missing(v, declared))?.missing > 0;
         let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent };
         let frames = frames.iter().map(|f| f - first).collect();
         let blocks = self.blocks();

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// What is allocated at once.
 #[derive(Debug, Clone, Copy)]
-pub struct Budget {
+pub(super) struct Budget {
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
@@ -23,13 +23,14 @@ const WEIGHT_BYTES: usize = 16;
 
 impl Budget {
     /// For pictures of `size` pixels of a scene.
-    pub fn new(memory: usize, size: [usize; 2], scene: &dyn Scene) -> Result<Self> {
+    pub(super) fn new(memory: usize, size: [usize; 2], scene: &dyn Scene) -> Result<Self> {
         let fixed = FIXED_MEMORY + size[0] * size[1] * WEIGHT_BYTES;
         let budget = Self { available: memory.saturating_sub(fixed), size, block_bytes: scene.block_bytes() };
         let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1)) + budget.block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
-            let what = format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
+            let what =
+                format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
             return Err(Error::usage(what));
         }
         Ok(budget)
@@ -46,23 +47,25 @@ impl Budget {
     }
 
     /// How many of `most` frames to render together.
-    pub fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
+    pub(super) fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
         let fits = |f: &usize| {
-            let planes = self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
-            self.picture_bytes(*f) <= self.available / 3 && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
+            let planes =
+                self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
+            self.picture_bytes(*f) <= self.available / 3
+                && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
         };
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
     /// The bands of rows to splat one after another, each as tall as fits.
-    pub fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
+    pub(super) fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
         let left = self.available - self.picture_bytes(layout.frames) - self.block_bytes;
         let rows = (left / self.row_bytes(layout.planes()).max(1)).max(1).saturating_mul(TILE);
         (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
-    pub fn batch(&self, layout: &Layout, rows: usize) -> usize {
+    pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let used = self.picture_bytes(layout.frames) + self.row_bytes(layout.planes()) * rows.div_ceil(TILE);
         (self.available.saturating_sub(used) / self.block_bytes).clamp(1, MOST_BLOCKS)
     }

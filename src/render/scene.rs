@@ -150,7 +150,12 @@ impl Terms {
     }
 
     /// The terms of samples that are splatted frame by frame: `samples` holds `layout.frames` frames of `voxels`.
-    pub fn of_samples(layout: &Layout, ty: SampleType, samples: &[u8], is_missing: impl Fn(usize, f64) -> bool) -> Self {
+    pub fn of_samples(
+        layout: &Layout,
+        ty: SampleType,
+        samples: &[u8],
+        is_missing: impl Fn(usize, f64) -> bool,
+    ) -> Self {
         let mut values = vec![0.0; samples.len() / ty.size()];
         sample::load(ty, samples, &mut values);
         let voxels = values.len() / layout.frames;

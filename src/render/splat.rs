@@ -10,22 +10,22 @@ use crate::volume::{Grid, Region};
 use std::ops::Range;
 
 /// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
-pub const TILE: usize = 64;
+pub(super) const TILE: usize = 64;
 
 /// A rectangle of pixels with its planes.
 #[derive(Debug)]
-pub struct Tile {
+pub(super) struct Tile {
     /// Columns of the picture.
-    pub x: Range<usize>,
+    pub(super) x: Range<usize>,
     /// Rows of the picture.
-    pub y: Range<usize>,
+    pub(super) y: Range<usize>,
     /// Plane by plane, row by row.
-    pub planes: Vec<f64>,
+    pub(super) planes: Vec<f64>,
 }
 
 impl Tile {
     /// The tiles of the rows `y` of a picture `width` pixels wide, with all planes at zero.
-    pub fn cover(width: usize, y: Range<usize>, planes: usize) -> Vec<Self> {
+    pub(super) fn cover(width: usize, y: Range<usize>, planes: usize) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(TILE).map(move |s| s..(s + TILE).min(r.end));
         pieces(y)
             .flat_map(|y| pieces(0..width).map(move |x| (x, y.clone())))
@@ -34,12 +34,12 @@ impl Tile {
     }
 
     /// Number of pixels.
-    pub fn pixels(&self) -> usize {
+    pub(super) fn pixels(&self) -> usize {
         self.x.len() * self.y.len()
     }
 
     /// Adds a block's voxels.
-    pub fn splat(&mut self, voxels: &Splats, footprint: &Footprint) {
+    pub(super) fn splat(&mut self, voxels: &Splats, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.x) && overlap(&voxels.y, &self.y)) {
             return;
         }
@@ -78,7 +78,7 @@ impl Tile {
 
 /// A block's voxels as the camera sees them.
 #[derive(Debug)]
-pub struct Splats {
+pub(super) struct Splats {
     voxels: Vec<Splat>,
     terms: Terms,
     size: [usize; 2],
@@ -99,7 +99,14 @@ struct Splat {
 
 impl Splats {
     /// Projects the voxels of the block at `region` that lie in `clip` and have terms.
-    pub fn new(terms: Terms, region: &Region, clip: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Self {
+    pub(super) fn new(
+        terms: Terms,
+        region: &Region,
+        clip: &Region,
+        grid: &Grid,
+        camera: &Camera,
+        footprint: &Footprint,
+    ) -> Self {
         let mut voxels = Vec::new();
         let whole = region.relative_to(region.start);
         for v in region.intersect(clip).iter() {
@@ -116,12 +123,12 @@ impl Splats {
     }
 
     /// Nonzero coefficients among the terms.
-    pub fn coefficients(&self) -> u64 {
+    pub(super) fn coefficients(&self) -> u64 {
         self.terms.coefficients
     }
 
     /// Stored bytes that were read.
-    pub fn bytes_read(&self) -> u64 {
+    pub(super) fn bytes_read(&self) -> u64 {
         self.terms.bytes_read
     }
 }
@@ -133,7 +140,7 @@ fn reach(spans: impl Iterator<Item = Range<usize>>) -> Range<usize> {
 }
 
 /// The rows of the picture that any voxel of a block can reach; a block that reaches no column reaches no row.
-pub fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
+pub(super) fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
     let ends: [[f64; 3]; 2] = [grid.position(region.start), grid.position(region.end.map(|e| e - 1))];
     let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for corner in 0..8 {
@@ -153,7 +160,7 @@ pub fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &F
 }
 
 /// Whether two ranges share anything.
-pub fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+pub(super) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
     !intersect(a, b).is_empty()
 }
 

@@ -8,11 +8,11 @@ use crate::error::Result;
 use crate::footprint::{Footprint, Kernel, Method};
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
-pub const BACKGROUND: f64 = 0.01;
+pub(super) const BACKGROUND: f64 = 0.01;
 
 /// The sums of weights of all voxels of a view.
 #[derive(Debug)]
-pub struct Weights {
+pub(super) struct Weights {
     width: usize,
     /// With the footprints that values are splatted with, so that the quotient is a mean.
     sums: Vec<f64>,
@@ -23,7 +23,7 @@ pub struct Weights {
 
 /// The weights of one pixel.
 #[derive(Debug, Clone, Copy)]
-pub struct PixelWeight {
+pub(super) struct PixelWeight {
     sum: f64,
     uncut: f64,
     threshold: f64,
@@ -31,14 +31,14 @@ pub struct PixelWeight {
 
 impl PixelWeight {
     /// The weighted mean of an emission, less weights that are missing; NaN in the background.
-    pub fn mean(&self, emission: f64, absent: f64) -> f64 {
+    pub(super) fn mean(&self, emission: f64, absent: f64) -> f64 {
         if self.uncut - absent < self.threshold { f64::NAN } else { emission / (self.sum - absent) }
     }
 }
 
 impl Weights {
     /// Splats a 1 for every voxel.
-    pub fn new(eye: &Eye, kernel: Kernel, budget: &Budget) -> Result<Self> {
+    pub(super) fn new(eye: &Eye, kernel: Kernel, budget: &Budget) -> Result<Self> {
         let sums = sums(eye, budget)?;
         let exact = Footprint::new(kernel, &eye.grid, eye.camera.scale, Method::EXACT);
         let uncut = if eye.footprint.reach < exact.reach {
@@ -51,7 +51,7 @@ impl Weights {
     }
 
     /// The weights of a tile's pixel, counted row by row.
-    pub fn at(&self, tile: &Tile, pixel: usize) -> PixelWeight {
+    pub(super) fn at(&self, tile: &Tile, pixel: usize) -> PixelWeight {
         let (x, y) = (tile.x.start + pixel % tile.x.len(), tile.y.start + pixel / tile.x.len());
         let sum = self.sums[y * self.width + x];
         let uncut = self.uncut.get(y * self.width + x).copied().unwrap_or(sum);

@@ -53,7 +53,8 @@ struct Text {
 }
 
 impl Place {
-    /// Checks the count of an array of `expected` bytes, and that the file can hold its text; with `whole`, that it does.
+    /// Checks the count of an array of `expected` bytes, and that the file can hold its text; with `whole`, that it
+    /// does.
     pub(super) fn check(&self, file: &FileBytes, expected: usize, whole: bool) -> Result<()> {
         let text = self.text(file, expected)?;
         if whole {

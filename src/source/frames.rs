@@ -223,3 +223,66 @@ fn flattened(dims: [usize; 3], region: &Region) -> ([usize; 3], Region) {
     let flat = |at: [usize; 3], z| [at[1] * dims[0], at[2], z];
     ([dims[0] * dims[1], dims[2], 1], Region { start: flat(region.start, 0), end: flat(region.end, 1) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{DIMS, check_window, payload};
+    use super::*;
+    use std::io::Write;
+
+    /// Large enough that some boxes are read row by row and some joined.
+    const LARGE: [usize; 3] = [300, 40, 20];
+
+    fn spool(bytes: &[u8]) -> Bytes {
+        let mut file = tempfile::tempfile().expect("temporary file");
+        file.write_all(bytes).expect("writing");
+        Bytes::Spool(file)
+    }
+
+    #[test]
+    fn joined_reads_copy_the_same_as_single_ones() {
+        let shape = Shape::new(LARGE, SampleType::U32).expect("shape");
+        let voxels: Vec<u8> = (0..240_000_u32).flat_map(u32::to_le_bytes).collect();
+        let name = || "frame".to_string();
+        let frame = |bytes| Frame { bytes, offset: 3, big_endian: false, name: name() };
+        let stored = [b"abc", voxels.as_slice()].concat();
+        let bytes = vec![spool(&stored), Bytes::Memory(stored)];
+        let frames = Frames { shape, bytes, frames: vec![frame(0), frame(1)] };
+        for (start, end) in
+            [([0; 3], LARGE), ([5, 3, 2], [7, 40, 20]), ([0, 7, 0], [300, 9, 20]), ([1, 0, 0], [299, 40, 20])]
+        {
+            let region = Region { start, end };
+            let mut found = [vec![0; region.voxels() * 4], vec![0; region.voxels() * 4]];
+            for (i, found) in found.iter_mut().enumerate() {
+                frames.read_box(i, &region, found).expect("reading");
+            }
+            assert_eq!(found[0], found[1], "{region:?}");
+            let index = |[x, y, z]: [usize; 3]| (((z * LARGE[1] + y) * LARGE[0] + x) as u32).to_le_bytes();
+            assert_eq!(found[0], region.iter().flat_map(index).collect::<Vec<_>>(), "{region:?}");
+        }
+    }
+
+    #[test]
+    fn every_place_of_bytes_serves_frames() {
+        let ty = SampleType::F16;
+        let shape = Shape::new(DIMS, ty).expect("shape");
+        let stored = payload(ty, 0..2, true);
+        for bytes in [spool(&stored), Bytes::Memory(stored.clone())] {
+            let frame = |offset| Frame { bytes: 0, offset, big_endian: true, name: String::new() };
+            let frames = vec![frame(0), frame(shape.frame_bytes() as u64)];
+            check_window(&Frames { shape, bytes: vec![bytes], frames }, ty, 0);
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_not_there_are_an_error() {
+        let shape = Shape::new([2, 2, 2], SampleType::U8).expect("shape");
+        for bytes in [spool(&[0; 7]), Bytes::Memory(vec![0; 7])] {
+            let frame = Frame { bytes: 0, offset: 0, big_endian: false, name: "frame 9".into() };
+            let frames = Frames { shape, bytes: vec![bytes], frames: vec![frame] };
+            let whole = Region { start: [0; 3], end: [2; 3] };
+            let error = frames.read_box(0, &whole, &mut [0; 8]).expect_err("too short");
+            assert!(error.to_string().contains("reading frame 9"), "{error}");
+        }
+    }
+}

@@ -83,7 +83,10 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
     let matches = glob::glob_with(text, rules).map_err(|e| refused(format!("is no valid pattern: {e}")))?;
     let mut paths = Vec::new();
     for path in matches {
-        let path = path.map_err(|e| Error::io(e.path().to_path_buf(), "listing", e.into()))?;
+        let path = path.map_err(|e| {
+            let place = e.path().to_path_buf();
+            Error::io(place, "listing", e.into())
+        })?;
         paths.extend(path.is_file().then_some(path));
     }
     if paths.is_empty() {
@@ -147,4 +150,100 @@ fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
 
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use super::*;
+    use crate::sample::SampleType;
+
+    const TY: SampleType = SampleType::U16;
+
+    fn raw() -> OpenOptions {
+        OpenOptions { dims: Some(DIMS.into()), sample: Some(TY), ..OpenOptions::default() }
+    }
+
+    fn frames(folder: &Folder, frames: std::ops::Range<usize>) -> Vec<PathBuf> {
+        frames.map(|t| folder.write(&format!("f{t}.raw"), payload(TY, t..t + 1, false))).collect()
+    }
+
+    #[test]
+    fn a_directory_and_a_pattern_are_sorted_by_number() {
+        let folder = Folder::new();
+        frames(&folder, 0..12);
+        folder.write(".hidden.raw", "x");
+        folder.write("a.wspl", "x");
+        fs::create_dir(folder.path("f3.raw.d")).expect("folder");
+        check_inputs(&[folder.path("")], &raw(), TY, 12);
+        check_inputs(&[folder.path("f*.raw")], &raw(), TY, 12);
+        check_inputs(&[folder.path("f?.raw")], &raw(), TY, 10);
+    }
+
+    #[test]
+    fn a_list_is_taken_in_its_order() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..3);
+        files.reverse();
+        let listed = expand(&files, &raw()).expect("list");
+        assert_eq!(listed.paths, files);
+    }
+
+    #[test]
+    fn missing_frames_are_refused_unless_allowed() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..5);
+        fs::remove_file(files.remove(3)).expect("removing");
+        for inputs in [files.clone(), vec![folder.path("")], vec![folder.path("*.raw")]] {
+            refused(&inputs, &raw(), "f2.raw is followed by f4.raw");
+            let options = OpenOptions { allow_gaps: true, ..raw() };
+            assert_eq!(super::super::open(&inputs, &options).expect("gaps").archive().frames, Some(4));
+        }
+    }
+
+    #[test]
+    fn files_that_are_not_there_are_named() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..2);
+        files.push(folder.path("f2.raw"));
+        refused(&files, &raw(), "f2.raw: opening");
+        refused(&[folder.path("gone.npy")], &OpenOptions::default(), "gone.npy: opening");
+        refused(&[folder.path("g*.raw")], &raw(), "no file matches");
+        refused(&[folder.path("[")], &raw(), "no valid pattern");
+    }
+
+    #[test]
+    fn unclear_inputs_are_refused() {
+        let folder = Folder::new();
+        let files = frames(&folder, 0..2);
+        let (a, b) = (files[0].clone(), files[1].clone());
+        refused(&[], &raw(), "no input");
+        refused(&[a.clone(), b.clone(), folder.path("./f0.raw")], &raw(), "given twice");
+        refused(&[a.clone(), "-".into()], &raw(), "must be the only input");
+        refused(&[a.clone(), folder.path("")], &raw(), "directory must be the only");
+        refused(&[a.clone(), folder.path("*.raw")], &raw(), "pattern must be the only");
+        refused(&[folder.path("")], &OpenOptions::default(), "has no file of frames");
+        refused(&[folder.write("a.wspl", "x")], &OpenOptions::default(), "coefficient file already");
+        folder.write("c.dat", payload(TY, 0..1, false));
+        refused(&[folder.path("")], &raw(), "mixes formats, for example c.dat and f0.raw");
+    }
+
+    #[test]
+    fn a_frame_unlike_the_first_is_named() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..2);
+        files.push(folder.write("f2.raw", "short"));
+        refused(&files, &raw(), "f2.raw: expected 210 bytes");
+    }
+
+    #[test]
+    fn options_for_headerless_data_are_refused_elsewhere() {
+        let folder = Folder::new();
+        let file = [folder.write("a.npy", "x")];
+        refused(&file, &raw(), "--dims is for headerless data");
+        refused(&file, &OpenOptions { offset: 1, ..OpenOptions::default() }, "--offset is for");
+        refused(&file, &OpenOptions { big_endian: true, ..OpenOptions::default() }, "--endian is for");
+        refused(&file, &OpenOptions { sample: Some(TY), ..OpenOptions::default() }, "--dtype is for");
+        refused(&file, &OpenOptions { variable: Some("a".into()), ..OpenOptions::default() }, "--variable is for");
+    }
 }

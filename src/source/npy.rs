@@ -134,3 +134,91 @@ fn plain_type(ty: &TypeStr) -> Option<SampleType> {
         _ => return None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::OpenOptions;
+    use super::super::testing::{Folder, check_inputs, payload, refused, survives_damage};
+    use super::*;
+
+    fn npy(version: u8, dict: &str, payload: &[u8]) -> Vec<u8> {
+        let text = format!("{dict}\n");
+        let len = (text.len() as u32).to_le_bytes();
+        let len = &len[..if version == 1 { 2 } else { 4 }];
+        [MAGIC, &[version, 0], len, text.as_bytes(), payload].concat()
+    }
+
+    fn dict(descr: &str, shape: &str) -> String {
+        format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}")
+    }
+
+    #[test]
+    fn every_type_byte_order_and_version_is_read() {
+        let folder = Folder::new();
+        let names = ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"];
+        for (i, (name, ty)) in names.into_iter().zip(SampleType::ALL).enumerate() {
+            for (order, big_endian) in [('<', false), ('>', true)] {
+                let order = if ty.size() == 1 { '|' } else { order };
+                let dict = dict(&format!("'{order}{name}'"), "(4, 3, 5, 7)");
+                let bytes = npy(1 + (i % 3) as u8, &dict, &payload(ty, 0..4, big_endian));
+                check_inputs(&[folder.write("a.npy", bytes)], &OpenOptions::default(), ty, 4);
+            }
+        }
+    }
+
+    #[test]
+    fn three_dimensions_are_one_frame_and_the_extension_is_not_needed() {
+        let folder = Folder::new();
+        let files = [0, 1, 2].map(|t| {
+            let bytes = npy(1, &dict("'<f4'", "(3, 5, 7)"), &payload(SampleType::F32, t..t + 1, false));
+            folder.write(&format!("f{t}.data"), bytes)
+        });
+        check_inputs(&files, &OpenOptions::default(), SampleType::F32, 3);
+    }
+
+    #[test]
+    fn what_is_not_supported_is_named() {
+        let folder = Folder::new();
+        let header = |descr: &str, shape: &str, words: &str| {
+            let file = folder.write("a.npy", npy(1, &dict(descr, shape), &[0; 64]));
+            refused(&[file], &OpenOptions::default(), words);
+        };
+        for descr in ["'<i8'", "'<u8'", "'|b1'", "'<c8'", "'<U3'", "[('a', '<f4'), ('b', '<i2')]"] {
+            header(descr, "(2, 2, 2)", "its samples are");
+        }
+        header("'<f4'", "(4, 4)", "2 dimension(s)");
+        header("'<f4'", "(1, 1, 4, 2, 2)", "5 dimension(s)");
+        header("'<f4'", "(0, 2, 2, 2)", "0 frames");
+        header("'<f4'", "(2, 0, 2)", "is empty");
+        header("'<f4'", "(4, 4, 4)", "expected");
+        header("'<f4'", "(9223372036854775808, 2, 2)", "too large");
+        header("'<f4'", "(99999999999999999999, 2, 2)", "too large");
+        header(&"[".repeat(100_000)[..60_000], "(4, 4, 4)", "nested");
+        let fortran = dict("'<f4'", "(2, 2, 4)").replace("False", "True");
+        refused(&[folder.write("a.npy", npy(1, &fortran, &[0; 64]))], &OpenOptions::default(), "Fortran");
+    }
+
+    #[test]
+    fn no_damage_panics() {
+        survives_damage("a.npy", &npy(1, &dict("'<f4'", "(2, 2, 4)"), &[0; 64]));
+    }
+
+    #[test]
+    fn damaged_headers_are_errors() {
+        let folder = Folder::new();
+        let good = npy(2, &dict("'<f4'", "(2, 2, 4)"), &[0; 64]);
+        for len in 0..good.len() {
+            let file = folder.write("a.npy", &good[..len]);
+            assert!(super::super::open(&[file], &OpenOptions::default()).is_err(), "{len} bytes");
+        }
+        let mut huge = good.clone();
+        huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+        refused(&[folder.write("a.npy", huge)], &OpenOptions::default(), "claims 4294967295 bytes");
+        refused(&[folder.write("a.npy", npy(4, "{}", &[]))], &OpenOptions::default(), "unsupported version");
+        refused(
+            &[folder.write("a.npy", [good.clone(), vec![0; 64]].concat())],
+            &OpenOptions::default(),
+            "2 whole frame",
+        );
+    }
+}

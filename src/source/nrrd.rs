@@ -174,3 +174,6 @@ fn times(header: &Header, frames: usize) -> Parsed<Vec<f64>> {
     let first = fourth("axismins", "axis mins")?.unwrap_or(0.0);
     Ok((0..frames).map(|i| first + step * i as f64).collect())
 }
+
+#[cfg(test)]
+mod tests;

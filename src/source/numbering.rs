@@ -73,3 +73,42 @@ fn pieces(path: &Path) -> Option<(String, Vec<i64>)> {
     let numbers = digits.map(|n| if n.len() <= MAX_DIGITS { n.parse().ok() } else { None }).collect::<Option<_>>()?;
     Some((words, numbers))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::message;
+    use super::*;
+
+    fn checked(names: &[&str]) -> Result<()> {
+        check(&names.iter().map(PathBuf::from).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_missing_frame_is_named_by_its_neighbours() {
+        let message = message(checked(&["d/f_08.npy", "d/f_09.npy", "d/f_10.npy", "d/f_12.npy", "d/f_13.npy"]));
+        assert!(message.contains("f_10.npy is followed by f_12.npy: a frame seems to be missing"), "{message}");
+        assert!(message.contains("--allow-gaps"), "{message}");
+    }
+
+    #[test]
+    fn steps_that_are_all_the_same_pass() {
+        for names in [["a10", "a20", "a30"], ["3/a", "2/a", "1/a"], ["x1y7", "x2y7", "x3y7"]] {
+            checked(&names).expect("regular");
+        }
+    }
+
+    #[test]
+    fn names_that_say_nothing_pass() {
+        for names in [vec!["a1", "a7"], vec!["1a", "a5", "b6"], vec!["a1b1", "a2b3", "a9b7"], vec!["x", "y", "z"]] {
+            checked(&names).expect("no numbering");
+        }
+        checked(&["a1234567890123456789012", "a2", "a9"]).expect("too long to be a frame's number");
+    }
+
+    #[test]
+    fn files_out_of_order_are_noticed() {
+        assert!(message(checked(&["a1", "a2", "a3", "a5", "a4", "a6", "a7", "a8"])).contains("a3 is followed by a5"));
+        assert!(message(checked(&["a1", "a2", "a3", "a1"])).contains("steps of 1"));
+        assert!(message(checked(&["a1", "a2", "a02"])).contains("steps of"));
+    }
+}

@@ -53,3 +53,64 @@ fn advice(len: u64, shape: &Shape, options: &OpenOptions) -> String {
         _ => "; check --dims, --dtype and --offset".into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use super::*;
+    use crate::sample::SampleType;
+
+    fn options(frames: Option<usize>, sample: SampleType) -> OpenOptions {
+        let dims = DIMS.into_iter().chain(frames).collect();
+        OpenOptions { dims: Some(dims), sample: Some(sample), ..OpenOptions::default() }
+    }
+
+    #[test]
+    fn every_type_and_byte_order_is_read() {
+        let folder = Folder::new();
+        for ty in SampleType::ALL {
+            for big_endian in [false, true] {
+                let files = [0, 1, 2].map(|t| {
+                    let bytes = payload(ty, t..t + 1, big_endian);
+                    folder.write(&format!("f{t}.raw"), [b"12345", bytes.as_slice()].concat())
+                });
+                check_inputs(&files, &OpenOptions { big_endian, offset: 5, ..options(None, ty) }, ty, 3);
+            }
+        }
+    }
+
+    #[test]
+    fn frames_of_one_file_follow_one_another() {
+        let folder = Folder::new();
+        let file = [folder.write("all", payload(SampleType::I16, 0..5, false))];
+        check_inputs(&file, &options(Some(5), SampleType::I16), SampleType::I16, 5);
+    }
+
+    #[test]
+    fn wrong_sizes_are_explained() {
+        let folder = Folder::new();
+        let file = [folder.write("all.raw", payload(SampleType::F32, 0..4, false))];
+        refused(&file, &options(None, SampleType::F32), "say --dims 7x5x3x4");
+        refused(&file, &options(Some(5), SampleType::F32), "expected 2100 bytes");
+        refused(&file, &options(Some(4), SampleType::U8), "--dims 7x5x3x16");
+        refused(&file, &options(Some(4), SampleType::F64), "right for samples of 4 byte(s)");
+        refused(&file, &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) }, "check --dims");
+        let empty = [folder.write("empty.raw", "")];
+        refused(&empty, &options(None, SampleType::F32), "found 0");
+    }
+
+    #[test]
+    fn senseless_options_are_refused() {
+        let folder = Folder::new();
+        let file = [folder.write("a.raw", "abc")];
+        let of = |dims: &[usize]| OpenOptions { dims: Some(dims.into()), ..options(None, SampleType::F32) };
+        refused(&file, &of(&[2, 2]), "not 2 number(s)");
+        refused(&file, &of(&[2, 0, 2]), "is empty");
+        refused(&file, &of(&[2, 2, 2, 0]), "0 frames");
+        refused(&file, &of(&[usize::MAX, 2, 2]), "too large");
+        refused(&file, &of(&[2, 2, 2, usize::MAX]), "too large");
+        refused(&file, &OpenOptions { sample: None, ..of(&[2, 2, 2]) }, "--dtype");
+        refused(&file, &OpenOptions { variable: Some("a".into()), ..of(&[2, 2, 2]) }, "--variable");
+        refused(&file, &OpenOptions::default(), "Supported are .npy");
+    }
+}

@@ -63,10 +63,6 @@ impl Described {
     fn grid(&self) -> Grid {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }
-
-    fn frames(&self) -> usize {
-        self.parts.iter().fold(0, |n, p| n.saturating_add(p.frames))
-    }
 }
 
 /// Checks that a file of `len` bytes holds `frames` frames from byte `start` and nothing after them.
@@ -78,12 +74,10 @@ pub(super) fn check_size(len: u64, start: u64, shape: &Shape, frames: usize) -> 
         return Ok(());
     }
     let found = len.saturating_sub(start);
-    let hint = match found {
-        n if n > 0 && n.is_multiple_of(frame) => {
-            format!("; it holds exactly {} whole frame(s) of that size", n / frame)
-        }
-        n => other_sample(n, shape, frames).unwrap_or_default(),
-    };
+    let mut hint = other_sample(found, shape, frames).unwrap_or_default();
+    if found > 0 && found.is_multiple_of(frame) {
+        hint += &format!("; it holds exactly {} whole frame(s) of that size", found / frame);
+    }
     Err(format!("expected {expected} bytes ({start} before {frames} frame(s) of {shape}), found {len}{hint}"))
 }
 
@@ -263,3 +257,6 @@ pub(super) fn check_grid(grid: &Grid, options: &OpenOptions, path: &Path) -> Res
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -211,3 +211,6 @@ impl From<Sink> for Bytes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

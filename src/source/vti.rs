@@ -121,18 +121,17 @@ fn base64(file: &FileBytes, place: Place, shape: &Shape, whole: bool) -> Result<
 }
 
 fn raw(file: &FileBytes, start: u64, count: Count, shape: &Shape) -> Result<At> {
-    let samples = start.checked_add(count.size() as u64);
-    let end = samples.and_then(|at| at.checked_add(shape.frame_bytes() as u64));
-    let (Some(samples), Some(end)) = (samples, end) else {
-        return Err(Error::input(file.path(), "its array's offset is too large"));
+    let refused = |e| Error::input(file.path(), e);
+    let after = |at: u64, bytes: usize| match at.checked_add(bytes as u64) {
+        Some(end) if end <= file.len() => Ok(end),
+        Some(end) => Err(refused(format!("is cut short: its array ends at byte {end}, the file at {}", file.len()))),
+        None => Err(refused("its array's offset is too large".into())),
     };
-    if end > file.len() {
-        let what = format!("is cut short: its array ends at byte {end}, the file at {}", file.len());
-        return Err(Error::input(file.path(), what));
-    }
+    let samples = after(start, count.size())?;
     let mut stored = vec![0; count.size()];
     file.read_at(start, &mut stored).map_err(|e| Error::io(file.path(), "reading an array's length", e))?;
-    count.check(&stored, shape.frame_bytes()).map_err(|e| Error::input(file.path(), e))?;
+    count.check(&stored, shape.frame_bytes()).map_err(refused)?;
+    after(samples, shape.frame_bytes())?;
     Ok(At::Byte(samples))
 }
 
@@ -164,3 +163,6 @@ fn described(header: &Header, array: &Array, shape: Shape, file: &FileBytes, at:
     }
     described
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,8 +17,7 @@ const NODE: [f64; 7] = [-0.05, -3.0 * Q / 20.0, 0.45, 10.0 * Q / 20.0, 0.45, -3.
 /// An interior node's symmetric wavelet, centred on it.
 const EVEN: [f64; 7] = [-0.05, -3.0 * Q / 20.0, 0.45, -10.0 * Q / 20.0, 0.45, -3.0 * Q / 20.0, -0.05];
 /// An interior node's antisymmetric wavelet, centred on it.
-const ODD: [f64; 7] =
-    [-1.0 / (10.0 * Q), -0.3, 9.0 / (10.0 * Q), 0.0, -9.0 / (10.0 * Q), 0.3, 1.0 / (10.0 * Q)];
+const ODD: [f64; 7] = [-1.0 / (10.0 * Q), -0.3, 9.0 / (10.0 * Q), 0.0, -9.0 / (10.0 * Q), 0.3, 1.0 / (10.0 * Q)];
 /// An end node's function, inward from it.
 const END_NODE: [f64; 4] = [10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 / (10.0 * Q)];
 /// An end node's wavelet, inward from it.

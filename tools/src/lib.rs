@@ -1,4 +1,5 @@
 //! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets.
+pub mod demo;
 pub mod eddy;
 pub mod lattice;
 pub mod output;

@@ -5,12 +5,13 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
-use wavesplat_tools::eddy::{Magnet, Plate, eddy_currents};
+use wavesplat_tools::demo;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
 
 const EXAMPLES: &str = "\
 Examples:
+  wavesplat-tools demo
   wavesplat-tools synth moving --dims 128x128x64x100 -o moving.npy
   wavesplat-tools synth sparse --dims 256x256x256x500 --dtype u8 -o frames/
   wavesplat-tools synth noise --dims 64x64x64x10 --format raw -o - | wc -c
@@ -36,13 +37,10 @@ enum Command {
 #[derive(Args)]
 struct Demo {
     /// Write the frames of |J| (A/m^2, f32) as frame_0000.npy and so on, and stop
-    #[arg(long, required = true)]
+    #[arg(long)]
     frames_only: bool,
-    /// Number of frames
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..))]
-    frames: u16,
     /// The folder to write to
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", default_value = "demo-output")]
     output: std::path::PathBuf,
 }
 
@@ -82,13 +80,15 @@ fn parse_dims(text: &str) -> std::result::Result<[usize; 4], String> {
 }
 
 fn demo(args: &Demo) -> Result<()> {
-    let plate = Plate::default();
-    let shape = Shape { dims: plate.dims, frames: args.frames.into(), ty: SampleType::F32 };
-    let mut frames = eddy_currents(plate, Magnet::default(), shape.frames);
-    Target::Directory(args.output.clone(), Format::Npy).write(&shape, |_, bytes| {
-        let values = frames.next().into_iter().flatten();
-        bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
-    })
+    if args.frames_only {
+        return demo::write_frames(&args.output, demo::FRAMES);
+    }
+    let files = demo::Files { folder: args.output.clone() };
+    let table = demo::run(&files, &mut |step| {
+        let _ = writeln!(io::stderr().lock(), "{step} ..."); // progress that nobody reads is no error
+    })?;
+    let figure = files.figure();
+    wavesplat::cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
 }
 
 fn synth(args: &SynthArgs) -> Result<()> {

@@ -1,7 +1,7 @@
 //! `wavesplat convert`
 
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow};
 use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let report = convert(source.as_mut(), &config, &args.output, &mut out, &progress)?;
     out.commit()?;
     args.common.note(summary(&report));
-    args.common.report(&report, args.output == PathBuf::from(STANDARD))
+    args.common.report(&report, args.output == Path::new(STANDARD))
 }
 
 impl ConvertArgs {

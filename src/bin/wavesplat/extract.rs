@@ -69,7 +69,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     }
     let report = extract(&file, &config, &args.output, &mut out, &args.common.progress("frames"))?;
     out.commit()?;
-    args.common.report(&report, args.output == PathBuf::from(STANDARD))
+    args.common.report(&report, args.output == Path::new(STANDARD))
 }
 
 fn format_of(path: &Path) -> Result<Format> {

@@ -126,9 +126,22 @@ impl Info {
              promise    {} error <= {:e} x {:e} = {promised:e}; largest sample error reached {reached:e}\n\
              content    {per_sample:.4} coefficients per sample, {} outliers, {} missing samples\n\
              id         {} ({})\n",
-            self.spacing, self.origin, self.sample, self.frames, self.value_range.0, self.value_range.1, self.bytes,
-            self.blocks, self.block_edge, self.bound, self.tolerance, self.range.1 - self.range.0, self.outliers,
-            self.missing, self.id, self.program
+            self.spacing,
+            self.origin,
+            self.sample,
+            self.frames,
+            self.value_range.0,
+            self.value_range.1,
+            self.bytes,
+            self.blocks,
+            self.block_edge,
+            self.bound,
+            self.tolerance,
+            self.range.1 - self.range.0,
+            self.outliers,
+            self.missing,
+            self.id,
+            self.program
         );
         let shown = if verbose { self.windows.len() } else { self.windows.len().min(MOST_WINDOWS) };
         for w in &self.windows[..shown] {

@@ -11,13 +11,18 @@ use std::process::ExitCode;
 
 /// Compresses time-varying volumes along time under a guaranteed error bound.
 #[derive(Debug, Parser)]
-#[command(name = "wavesplat", version, arg_required_else_help = true, after_help = "\
+#[command(
+    name = "wavesplat",
+    version,
+    arg_required_else_help = true,
+    after_help = "\
 Examples:
   wavesplat convert frames/ -o run.wspl --tolerance 0.001
   wavesplat info run.wspl
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
-Pictures are made by wavesplat-render.")]
+Pictures are made by wavesplat-render."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -25,7 +30,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Convert(convert::ConvertArgs),
+    Convert(Box<convert::ConvertArgs>),
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),

@@ -1,0 +1,64 @@
+//! Tests of files as one archive.
+
+use super::*;
+use crate::sample::SampleType;
+use crate::source::open;
+use crate::source::testing::{DIMS, Folder, message, payload, refused};
+
+fn raw() -> OpenOptions {
+    OpenOptions { dims: Some(DIMS.into()), sample: Some(SampleType::U8), ..OpenOptions::default() }
+}
+
+fn nrrd(sizes: &str, bytes: &[u8]) -> Vec<u8> {
+    let text = format!("NRRD0004\ntype: uchar\ndimension: 4\nsizes: {sizes}\nencoding: raw\n\n");
+    [text.as_bytes(), bytes].concat()
+}
+
+#[test]
+fn windows_cross_files_of_several_frames() {
+    let folder = Folder::new();
+    let all = payload(SampleType::U8, 0..6, false);
+    let files = [(0, 2), (2, 3), (5, 1)].map(|(first, count)| {
+        let bytes = &all[first * 105..(first + count) * 105];
+        folder.write(&format!("f{first}.nrrd"), nrrd(&format!("7 5 3 {count}"), bytes))
+    });
+    let options = OpenOptions { allow_gaps: true, ..OpenOptions::default() };
+    let mut source = open(&files, &options).expect("opening");
+    for (first, count) in [(0, 6), (1, 3), (3, 1), (4, 2), (5, 1), (2, 3)] {
+        let window = source.window(first, count).expect("window");
+        assert_eq!(window.frames(), count);
+        crate::source::testing::check_window(&*window, SampleType::U8, first);
+    }
+    assert!(source.window(4, 2).expect("window").name(0).ends_with("f2.nrrd, frame 2"));
+    assert!(message(source.window(usize::MAX, 2)).contains("there are 6"));
+}
+
+#[test]
+fn a_frame_of_another_shape_is_named() {
+    let folder = Folder::new();
+    let a = folder.write("a.nrrd", nrrd("7 5 3 1", &[0; 105]));
+    let b = folder.write("b.nrrd", nrrd("7 3 5 1", &[0; 105]));
+    refused(&[a, b], &OpenOptions::default(), "b.nrrd: has 7x3x5 u8 samples, but the first frame");
+}
+
+#[test]
+fn a_file_that_changes_after_opening_is_noticed() {
+    let folder = Folder::new();
+    let file = folder.write("a.raw", payload(SampleType::U8, 0..1, false));
+    let mut source = open(std::slice::from_ref(&file), &raw()).expect("opening");
+    let window = source.window(0, 1).expect("window");
+    std::fs::write(&file, [0; 200]).expect("writing");
+    assert!(matches!(window.check_unchanged(), Err(Error::Changed { .. })));
+    assert!(matches!(source.window(0, 1), Err(Error::Changed { .. })));
+}
+
+#[test]
+fn the_user_may_give_another_grid() {
+    let folder = Folder::new();
+    let file = [folder.write("a.raw", payload(SampleType::U8, 0..1, false))];
+    let given = OpenOptions { spacing: Some([1.0, 2.0, 3.0]), origin: Some([4.0, 5.0, 6.0]), ..raw() };
+    let grid = open(&file, &given).expect("opening").archive().grid;
+    assert_eq!(grid, Grid { dims: DIMS, spacing: [1.0, 2.0, 3.0], origin: [4.0, 5.0, 6.0] });
+    refused(&file, &OpenOptions { spacing: Some([1.0, 0.0, 1.0]), ..raw() }, "not positive");
+    refused(&file, &OpenOptions { origin: Some([f64::NAN, 0.0, 1.0]), ..raw() }, "not finite");
+}
