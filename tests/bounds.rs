@@ -207,7 +207,7 @@ fn report(series: usize, started: std::time::Instant) {
 #[test]
 fn no_series_breaks_its_bound() {
     let (started, series) = (std::time::Instant::now(), Cell::new(0));
-    let config = Config { cases: 450, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
+    let config = Config { cases: 900, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let found = runner.run(&cases(), |case| {
         series.set(series.get() + case.check());

@@ -7,4 +7,5 @@ mod common;
 mod reference;
 
 mod bounds;
+mod truncation;
 mod wavelets;
