@@ -7,5 +7,6 @@ mod common;
 mod reference;
 
 mod bounds;
+mod images;
 mod truncation;
 mod wavelets;

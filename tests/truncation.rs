@@ -31,7 +31,13 @@ fn archive(kind: &str, frames: usize) -> Vec<f64> {
                 "ramp" => a + b * x,
                 "wave" => a * (6.0 * x + 9.0 * b).sin(),
                 "flash" => a * 0.1 + if t == place { b } else { 0.0 },
-                "step" => if t >= place { a } else { b },
+                "step" => {
+                    if t >= place {
+                        a
+                    } else {
+                        b
+                    }
+                }
                 _ => unreachable!("{kind}"),
             };
         }
@@ -93,7 +99,8 @@ fn the_coefficients_kept_are_near_the_fewest_possible() {
             }
             let excess = (ours - best) / cases;
             let most = if (*basis, bound) == (Basis::Haar, Bound::Rms) { 0.1 } else { 0.5 };
-            std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{basis:?} {bound:?}: {excess:.3} more\n")).unwrap();
+            std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{basis:?} {bound:?}: {excess:.3} more\n"))
+                .unwrap();
             assert!(excess <= most, "{basis:?} {bound:?}: {excess:.3} coefficients more than needed on average");
         }
     }

@@ -5,6 +5,7 @@ pub(crate) mod memory;
 pub(crate) mod random;
 pub(crate) mod samples;
 pub(crate) mod series;
+pub(crate) mod views;
 
 use memory::Memory;
 use std::path::{Path, PathBuf};
