@@ -37,7 +37,8 @@ pub fn voxel_bound(tolerance: f64, (lo, hi): (f64, f64)) -> f64 {
         _ => f64::MAX,
     };
     let product = tolerance * range;
-    if tolerance.mul_add(range, -product) < 0.0 { product.next_down().max(0.0) } else { product }
+    let rounded_up = tolerance.mul_add(range, -product) < 0.0 || product < 1e-280; // there what was lost may underflow
+    if rounded_up { product.next_down().max(0.0) } else { product }
 }
 
 /// The largest error before rounding to the sample type that still leaves `delta` after it; 0 or less if there is none.
@@ -58,8 +59,10 @@ pub fn holds(bound: Bound, delta: f64, mut errors: impl ExactSizeIterator<Item =
         Bound::Pointwise => errors.all(|e| e <= delta),
         Bound::Rms => {
             let frames = errors.len() as f64;
-            let squares = errors.fold(0.0, |sum: f64, e| (sum + (e * e).next_up()).next_up());
-            squares <= (frames * delta * delta).next_down().next_down() || squares == 0.0
+            let add = |(sum, each): (f64, bool), e: f64| ((sum + (e * e).next_up()).next_up(), each && e <= delta);
+            let (squares, each) = errors.fold((0.0, true), add);
+            // Each within delta is enough; squares alone are rounded too far against us at delta itself, and underflow.
+            each || squares <= (frames * delta * delta).next_down().next_down()
         }
     }
 }
@@ -100,6 +103,16 @@ mod tests {
         assert_eq!(voxel_bound(0.5, (-1.0, 1.0)), 1.0);
         assert_eq!(voxel_bound(0.0, (0.0, 1e300)), 0.0);
         assert!(voxel_bound(0.01, (-f64::MAX, f64::MAX)).is_finite());
+        assert_eq!(voxel_bound(0.3, (0.0, 5e-324)), 0.0);
+        assert_eq!(voxel_bound(0.3, (0.0, 1e-323)), 0.0);
+    }
+
+    #[test]
+    fn errors_of_just_delta_keep_the_root_mean_square() {
+        for delta in [0.0, 5e-324, 1e-200, 0.1, 4.0, f64::MAX] {
+            assert!(holds(Bound::Rms, delta, [delta; 3].into_iter()), "{delta}");
+            assert!(!holds(Bound::Rms, delta, [delta.next_up(); 3].into_iter()), "{delta}");
+        }
     }
 
     #[test]

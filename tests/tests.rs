@@ -3,5 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
 
+mod bounds;
+mod common;
+mod images;
 mod layering;
 mod reference;
+mod truncation;
+mod wavelets;
+

@@ -76,6 +76,7 @@ impl Encoder {
             pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
+            parts.sort_by_key(|part| part.kind); // an exact part stands after it
         }
         Ok(Encoded::new(EncodedBlock { id, stats, parts }, missing.count))
     }
@@ -295,7 +296,8 @@ fn check_group(
     let mut errors = vec![0.0; codec.frames()];
     for lane in 0..count {
         for (t, error) in errors.iter_mut().enumerate() {
-            *error = sample_error(codec.sample, group.decoded[t][lane], group.source[t][lane]) * group.weight[t][lane];
+            let counts = group.weight[t][lane] > 0.0;
+            *error = if counts { sample_error(codec, group.decoded[t][lane], group.source[t][lane]) } else { 0.0 };
         }
         let holds = bound::holds(codec.bound, codec.delta, errors.iter().copied());
         for (t, error) in errors.iter().enumerate().filter(|(t, _)| group.weight[*t][lane] > 0.0) {
@@ -310,9 +312,12 @@ fn check_group(
 }
 
 /// The larger error of a decoded value as it is splatted and as it is extracted, rounded to its type; rounded up.
-fn sample_error(ty: SampleType, decoded: f64, source: f64) -> f64 {
-    let (splatted, extracted) = (difference_up(decoded, source), difference_up(sample::round_to(ty, decoded), source));
-    if splatted.is_nan() || extracted.is_nan() { f64::INFINITY } else { splatted.max(extracted) }
+/// Infinite if it would be taken for a missing one.
+fn sample_error(codec: &WindowCodec, decoded: f64, source: f64) -> f64 {
+    let rounded = sample::round_to(codec.sample, decoded);
+    let (splatted, extracted) = (difference_up(decoded, source), difference_up(rounded, source));
+    let lost = splatted.is_nan() || extracted.is_nan() || codec.is_missing(rounded);
+    if lost { f64::INFINITY } else { splatted.max(extracted) }
 }
 
 fn gather_outliers(codec: &WindowCodec, samples: &[u8], mut positions: Vec<u32>) -> wavesplat_format::Outliers {

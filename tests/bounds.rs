@@ -1,0 +1,254 @@
+//! The promise of method.md section 5, searched for series that break it. Nothing here calls the library's own bound.
+
+use crate::common::exact::Limit;
+use crate::common::memory::Memory;
+use crate::common::samples::{TYPES, numbers};
+use crate::common::series::{KINDS, Kind, Mask, volume};
+use crate::common::{Stored, extracted, settings, stored};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use std::cell::Cell;
+use wavesplat::bound::Bound;
+use wavesplat::codec::WindowCodec;
+use wavesplat::file::CoefficientFile;
+use wavesplat::progress::Silent;
+use wavesplat::sample::SampleType;
+use wavesplat::verify::verify;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+
+#[derive(Debug, Clone)]
+struct Case {
+    ty: SampleType,
+    kind: Kind,
+    mask: Mask,
+    basis: Basis,
+    bound: Bound,
+    tolerance: f64,
+    frames: usize,
+    /// log2 of the window's length, or of one less.
+    window: u32,
+    edge: usize,
+    dims: [usize; 3],
+    seed: u64,
+}
+
+/// What was converted, and what came back of it.
+struct Trial {
+    case: Case,
+    file: CoefficientFile,
+    source: Vec<f64>,
+    missing: Vec<bool>,
+    found: Vec<f64>,
+}
+
+impl Case {
+    fn config(&self) -> wavesplat::convert::ConvertConfig {
+        let window = (1 << self.window) + usize::from(self.basis == Basis::Multi);
+        let missing_value = if let Mask::Declared(value) = self.mask { Some(value) } else { None };
+        let plain = settings(self.basis, window, self.tolerance);
+        wavesplat::convert::ConvertConfig { bound: self.bound, block: Some(self.edge), missing_value, ..plain }
+    }
+
+    /// Converts, compares everything, and returns the number of series: of a voxel in a window.
+    fn check(&self) -> usize {
+        let Self { ty, kind, mask, frames, dims, seed, .. } = *self;
+        let grid = Grid::unit(dims);
+        let bytes = volume(kind, ty, mask, grid.whole().voxels(), frames, seed);
+        let mut memory = Memory::new(grid, ty, bytes.clone());
+        let config = self.config();
+        let stored: Stored = stored(&mut memory, &config);
+        let file = stored.open();
+        let back = extracted(&file);
+        let report = verify(&file, Some(&mut memory), &Silent).unwrap().against.unwrap();
+        assert_eq!(report.series_outside, 0, "by verify: {self:?} {report:?}");
+        let source = numbers(ty, &bytes);
+        let missing: Vec<bool> = source.iter().map(|v| !v.is_finite() || Some(*v) == config.missing_value).collect();
+        assert_eq!(report.missing, missing.iter().filter(|m| **m).count() as u64);
+        for (i, (a, b)) in bytes.chunks(ty.size()).zip(back.chunks(ty.size())).enumerate() {
+            assert!(a == b || self.tolerance > 0.0 && !missing[i], "sample {i}: the bits {b:?} for {a:?}");
+        }
+        let found = numbers(ty, &back);
+        for (i, v) in found.iter().enumerate() {
+            assert!(
+                missing[i] || v.is_finite() && Some(*v) != config.missing_value,
+                "{v}, so missing, for {}",
+                source[i]
+            );
+        }
+        let trial = Trial { case: self.clone(), file, source, missing, found };
+        let windows = trial.file.metadata().windows.len() as u32;
+        (0..windows).map(|w| trial.window(w)).sum()
+    }
+}
+
+impl Trial {
+    fn window(&self, window: u32) -> usize {
+        let frames = self.file.window_range(window);
+        let voxels = self.file.grid.whole().voxels();
+        let Some(limit) = self.limit(frames.end * voxels) else { return voxels }; // all missing so far
+        let record = &self.file.metadata().windows[window as usize];
+        assert!(limit.holds(record.delta, 0.0), "delta {} for {limit:?}", record.delta);
+        let pointwise = self.case.bound == Bound::Pointwise;
+        assert!(!pointwise || record.reached <= record.delta);
+        for voxel in 0..voxels {
+            let places: Vec<usize> = frames.clone().map(|t| t * voxels + voxel).collect();
+            self.series(&limit, &places, &self.found, "extracted");
+            for i in places.into_iter().filter(|i| !self.missing[*i]) {
+                assert!(Limit::of(record.reached).holds(self.found[i], self.source[i]), "sample {i}: beyond reached");
+            }
+        }
+        self.splatted(window, &limit);
+        voxels
+    }
+
+    /// The tolerance times the range of the first samples; none if all are missing.
+    fn limit(&self, samples: usize) -> Option<Limit> {
+        let present = || (0..samples).filter(|i| !self.missing[*i]).map(|i| self.source[i]);
+        let (lo, hi) = (present().reduce(f64::min)?, present().reduce(f64::max)?);
+        Some(Limit { tolerance: self.case.tolerance, lo, hi })
+    }
+
+    /// `found` has a value for every sample of the archive; `places` are those of the series.
+    fn series(&self, limit: &Limit, places: &[usize], found: &[f64], what: &str) {
+        let present = places.iter().filter(|i| !self.missing[**i]);
+        let pairs: Vec<(f64, f64)> = present.map(|i| (found[*i], self.source[*i])).collect();
+        let holds = match self.case.bound {
+            Bound::Pointwise => pairs.iter().all(|(a, b)| limit.holds(*a, *b)),
+            Bound::Rms => limit.holds_rms(&pairs, places.len()),
+        };
+        assert!(holds, "{what}, sample {}: outside {limit:?}: (found, source) {pairs:?}", places[0]);
+    }
+
+    /// What the renderer splats: coefficients not rounded to the samples' type, and what overrides them.
+    fn splatted(&self, window: u32, limit: &Limit) {
+        let codec = self.file.codec(window).unwrap();
+        let mut found = self.found.clone(); // right for missing and exact samples
+        for leaf in self.file.leaves(window) {
+            for entry in self.file.leaf(leaf).unwrap() {
+                let places = self.places(&codec, window, entry.id.block);
+                let pointwise = self.case.bound == Bound::Pointwise;
+                assert!(!pointwise || entry.stats.reached <= codec.delta);
+                let block = self.file.block(&codec, &entry, &vec![true; codec.basis.coefficients()]).unwrap();
+                if block.exact.is_some() {
+                    assert!(places.iter().all(|i| self.missing[*i] || self.found[*i] == self.source[*i]));
+                    continue;
+                }
+                block.for_each_group(&codec, |first, count, series| {
+                    for (t, lanes) in series.iter().enumerate() {
+                        let at = t * block.voxels + first;
+                        places[at..at + count].iter().zip(lanes).for_each(|(i, v)| found[*i] = *v);
+                    }
+                });
+                let outliers = numbers(codec.sample, &block.outliers.samples);
+                for (place, value) in block.outliers.positions.iter().zip(outliers) {
+                    found[places[*place as usize]] = value;
+                    assert_eq!(value, self.source[places[*place as usize]]);
+                }
+                let reached = Limit::of(entry.stats.reached);
+                let present = || places.iter().filter(|i| !self.missing[**i]);
+                assert!(present().all(|i| reached.holds(found[*i], self.source[*i])), "beyond the block's reached");
+                assert!(present().all(|i| (entry.stats.min..=entry.stats.max).contains(&self.found[*i])));
+            }
+        }
+        let voxels = self.file.grid.whole().voxels();
+        for voxel in 0..voxels {
+            let places: Vec<usize> = self.file.window_range(window).map(|t| t * voxels + voxel).collect();
+            self.series(limit, &places, &found, "splatted");
+        }
+    }
+
+    /// Where the samples of a block are in the archive.
+    fn places(&self, codec: &WindowCodec, window: u32, block: u32) -> Vec<usize> {
+        let (whole, region) = (self.file.grid.whole(), self.file.blocks.region(block as usize));
+        let first = self.file.window_range(window).start;
+        let frame = |t: usize| region.iter().map(move |v| (first + t) * whole.voxels() + whole.index(v));
+        (0..codec.frames()).flat_map(frame).collect()
+    }
+}
+
+const TOLERANCES: [f64; 12] = [0.0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.02, 0.1, 0.3, 0.5];
+
+fn cases() -> impl Strategy<Value = Case> {
+    let data = (0..TYPES.len(), 0..KINDS.len(), 0..8_usize, any::<u64>());
+    let coding = (any::<bool>(), any::<bool>(), 0..TOLERANCES.len(), 0.5..1.0, 1..=6_u32);
+    let shape = (1..=70_usize, 1..=9_usize, 0..4_usize);
+    (data, coding, shape).prop_map(
+        |((ty, kind, mask, seed), (multi, rms, tolerance, share, window), (frames, edge, dims))| {
+            let ty = TYPES[ty];
+            let mask = match mask {
+                0 | 1 if ty.is_float() => Mask::Special,
+                2 if ty.is_float() => Mask::Most,
+                3 => Mask::Declared(if ty == SampleType::U8 { 0.0 } else { 7.0 }),
+                _ => Mask::None,
+            };
+            Case {
+                ty,
+                kind: KINDS[kind],
+                mask,
+                basis: if multi { Basis::Multi } else { Basis::Haar },
+                bound: if rms { Bound::Rms } else { Bound::Pointwise },
+                tolerance: TOLERANCES[tolerance] * share, // with all digits in use
+                frames,
+                window,
+                edge,
+                dims: [[16, 16, 1], [13, 7, 3], [1, 1, 200], [9, 5, 5]][dims],
+                seed,
+            }
+        },
+    )
+}
+
+fn report(series: usize, started: std::time::Instant) {
+    std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{series} series in {:.1?}\n", started.elapsed()))
+        .unwrap();
+}
+
+#[test]
+fn no_series_breaks_its_bound() {
+    let (started, series) = (std::time::Instant::now(), Cell::new(0));
+    let config = Config { cases: 900, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
+    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let found = runner.run(&cases(), |case| {
+        series.set(series.get() + case.check());
+        Ok(())
+    });
+    found.unwrap();
+    report(series.get(), started);
+}
+
+#[test]
+fn no_kind_of_series_breaks_its_bound_for_any_type() {
+    let (started, mut series) = (std::time::Instant::now(), 0);
+    for (n, ty) in TYPES.into_iter().enumerate() {
+        for (m, kind) in KINDS.into_iter().enumerate() {
+            for (k, (basis, bound)) in [
+                (Basis::Haar, Bound::Pointwise),
+                (Basis::Multi, Bound::Pointwise),
+                (Basis::Haar, Bound::Rms),
+                (Basis::Multi, Bound::Rms),
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                let seed = (n * 1000 + m * 10 + k) as u64;
+                let tolerance = TOLERANCES[2 + (n + 3 * m + 5 * k) % 10];
+                let (frames, window) = (33 + 9 * k, [5, 4, 3, 5][k]);
+                let (edge, dims) = (8, [16, 8, 2]);
+                let mask = Mask::None;
+                series += Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed }.check();
+            }
+        }
+    }
+    report(series, started);
+}
+
+#[test]
+fn a_flash_in_any_frame_of_any_window_is_kept() {
+    for frames in 1..=70 {
+        let basis = if frames % 2 == 0 { Basis::Haar } else { Basis::Multi };
+        let (ty, kind, mask, bound) = (SampleType::F32, Kind::Flash, Mask::None, Bound::Pointwise);
+        let (window, edge, dims, seed) = (6, 4, [frames, 2, 1], frames as u64);
+        Case { ty, kind, mask, basis, bound, tolerance: 0.01, frames, window, edge, dims, seed }.check();
+    }
+}

@@ -1,0 +1,105 @@
+//! What several topics share.
+
+pub(crate) mod exact;
+pub(crate) mod memory;
+pub(crate) mod random;
+pub(crate) mod samples;
+pub(crate) mod series;
+pub(crate) mod views;
+
+use memory::Memory;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use wavesplat::bound::Bound;
+use wavesplat::camera::View;
+use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
+use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::file::CoefficientFile;
+use wavesplat::footprint::Kernel;
+use wavesplat::mapped::Access;
+use wavesplat::progress::Silent;
+use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
+use wavesplat::source::FrameSource;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+
+/// Plenty for every test.
+pub(crate) const MEMORY: usize = 256 << 20;
+
+/// Pointwise, missing samples kept.
+pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
+    ConvertConfig {
+        basis,
+        window,
+        tolerance,
+        bound: Bound::Pointwise,
+        range: None,
+        missing: MissingPolicy::Mask,
+        missing_value: None,
+        block: None,
+        level: 1,
+        memory: MEMORY,
+        settings: Vec::new(),
+    }
+}
+
+/// A coefficient file in a folder of its own.
+pub(crate) struct Stored {
+    folder: TempDir,
+    pub(crate) report: ConvertReport,
+}
+
+impl Stored {
+    pub(crate) fn path(&self) -> PathBuf {
+        self.folder.path().join("a.wspl")
+    }
+
+    pub(crate) fn open(&self) -> CoefficientFile {
+        CoefficientFile::open(&self.path(), Access::Read).unwrap()
+    }
+
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        std::fs::read(self.path()).unwrap()
+    }
+}
+
+pub(crate) fn stored(source: &mut dyn FrameSource, config: &ConvertConfig) -> Stored {
+    let mut bytes = Vec::new();
+    let report = convert(source, config, Path::new("a.wspl"), &mut bytes, &Silent).unwrap();
+    let stored = Stored { folder: tempfile::tempdir().unwrap(), report };
+    std::fs::write(stored.path(), bytes).unwrap();
+    stored
+}
+
+/// All samples of a file.
+pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
+    let config = ExtractConfig { frames: (0..file.frames()).collect(), region: file.grid.whole(), memory: MEMORY };
+    let mut out = Vec::new();
+    extract(file, &config, Path::new("out"), &mut out, &Silent).unwrap();
+    out
+}
+
+/// All frames, all voxels, by the exact method, default kernel.
+pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, frames: usize) -> RenderConfig {
+    let kernel = Kernel::new(None, tau, grid).unwrap();
+    let frames = (0..frames).collect();
+    RenderConfig { view, kernel, quantity, frames, region: None, splat_error: 0.0, memory: MEMORY }
+}
+
+/// The pictures, one after another.
+pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, RenderReport) {
+    let mut out = Vec::new();
+    let mut numbers = Vec::new();
+    let report = render(scene, config, &Silent, &mut |frame, picture| {
+        numbers.push(frame);
+        out.extend_from_slice(picture);
+        Ok(())
+    });
+    assert_eq!(numbers, config.frames);
+    (out, report.unwrap())
+}
+
+/// The frames of `memory` as they are.
+pub(crate) fn direct(memory: &Memory, missing_value: Option<f64>) -> wavesplat::render::FrameScene {
+    wavesplat::render::FrameScene::new(Box::new(memory.clone()), missing_value)
+}
