@@ -6,6 +6,7 @@
 pub use wavesplat_format::Bound;
 
 use crate::sample::SampleType;
+use half::f16;
 
 /// x - y and what rounding took from it: the exact difference is their sum. Not numbers if x - y overflows.
 fn difference(x: f64, y: f64) -> (f64, f64) {
@@ -48,7 +49,7 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),
-        SampleType::F16 => delta - magnitude * 2f64.powi(-10) - 2f64.powi(-24),
+        SampleType::F16 => delta - magnitude * f64::from(f16::EPSILON) - f64::from(f16::MIN_POSITIVE_SUBNORMAL),
         _ => delta.min(delta.floor() + 0.499),
     }
 }

@@ -27,7 +27,7 @@ const HOMES: [(&str, &[&str]); 12] = [
     ("colorous::", &["render/colour.rs"]),
     ("npyz::", &["npy.rs", "source/npy.rs"]),
     ("quick_xml::", &["source/"]),
-    ("half::", &["sample.rs"]),
+    ("half::", &["sample.rs", "bound.rs"]),
 ];
 
 fn rust_files(folder: &Path) -> Vec<PathBuf> {

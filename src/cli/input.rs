@@ -20,7 +20,7 @@ pub enum Endian {
 /// How an archive is read, besides its names.
 #[derive(Debug, Clone, Args)]
 pub struct InputArgs {
-    /// Voxels (and frames) of headerless data, x fastest: NXxNYxNZ[xNT]
+    /// Voxels (and frames) of headerless data, x fastest: NXxNYxNZ or NXxNYxNZxNT
     #[arg(long, value_name = "DIMS", help_heading = "Input")]
     pub dims: Option<Dims>,
     /// Sample type of headerless data: u8 i8 u16 i16 u32 i32 f16 f32 f64
