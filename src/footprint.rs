@@ -81,7 +81,9 @@ impl Footprint {
         let in_pixels = sigma * scale;
         let decay = 0.5 / (in_pixels * in_pixels);
         let peak = cell * libm::exp(tau * tau * sigma * sigma / 2.0) / (2.0 * std::f64::consts::PI * sigma * sigma);
-        Self { reach: method.radius * in_pixels, peak, tau, decay, bend: libm::exp(-2.0 * decay) }
+        // At least a pixel: a voxel far smaller than that must still reach the nearest pixel's centre.
+        let reach = (method.radius * in_pixels).max(1.0);
+        Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) }
     }
 
     /// The weight w = exp(-tau z) f(0, 0) that a voxel at depth `z` has at its centre.

@@ -86,6 +86,38 @@ pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
     declared.map(|v| if ty.is_float() { round_to(ty, v) } else { v })
 }
 
+/// The range of some values; none if any of them is missing. For runs long enough to pay for vector code.
+pub fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
+    let declared = declared.unwrap_or(f64::NAN); // equal to nothing
+    let (mut lo, mut hi, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
+    for v in values {
+        lo = if *v < lo { *v } else { lo };
+        hi = if *v > hi { *v } else { hi };
+        whole &= v.abs() < f64::INFINITY && *v != declared;
+    }
+    whole.then_some((lo, hi))
+}
+
+/// What storing a few values as `ty` leaves, as [`round_to`].
+pub fn round_all<const N: usize>(ty: SampleType, values: &[f64; N]) -> [f64; N] {
+    match ty {
+        SampleType::F64 => *values,
+        SampleType::F32 => values.map(|v| f64::from(v as f32)),
+        _ => values.map(|v| round_to(ty, v)),
+    }
+}
+
+/// Calls `visit(index of the first, values)` for all samples, a run at a time.
+pub fn for_each_run(ty: SampleType, samples: &[u8], mut visit: impl FnMut(usize, &[f64])) {
+    const RUN: usize = 512;
+    let mut values = [0.0; RUN];
+    for (run, bytes) in samples.chunks(RUN * ty.size()).enumerate() {
+        let values = &mut values[..bytes.len() / ty.size()];
+        load(ty, bytes, values);
+        visit(run * RUN, values);
+    }
+}
+
 /// Reverses the bytes of every sample: big-endian to little-endian and back.
 pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
     if ty.size() > 1 {

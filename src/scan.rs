@@ -43,13 +43,8 @@ pub(crate) fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Looks at every sample of a window; planes in parallel, joined in order.
-pub(crate) fn scan(
-    window: &dyn FrameWindow,
-    grid: &Grid,
-    ty: SampleType,
-    is_missing: impl Fn(f64) -> bool + Sync,
-) -> Result<Scan> {
+/// Looks at every sample of a window; planes in parallel, joined in order. `declared` stands for a missing sample.
+pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declared: Option<f64>) -> Result<Scan> {
     let plane_voxels = grid.dims[0] * grid.dims[1];
     let planes: Result<Vec<Scan>> = (0..window.frames() * grid.dims[2])
         .into_par_iter()
@@ -58,27 +53,27 @@ pub(crate) fn scan(
             let plane = Region { start: [0, 0, z], end: [grid.dims[0], grid.dims[1], z + 1] };
             bytes.resize(plane_voxels * ty.size(), 0);
             window.read_box(frame, &plane, bytes)?;
-            Ok(scan_plane(bytes, ty, &is_missing, (frame, z * plane_voxels)))
+            Ok(scan_plane(bytes, ty, declared, (frame, z * plane_voxels)))
         })
         .collect();
     Ok(planes?.into_iter().fold(Scan::NOTHING, Scan::then))
 }
 
-fn scan_plane(bytes: &[u8], ty: SampleType, is_missing: impl Fn(f64) -> bool, (frame, at): (usize, usize)) -> Scan {
-    const CHUNK: usize = 512;
+fn scan_plane(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
-    let mut values = [0.0; CHUNK];
-    for (chunk, bytes) in bytes.chunks(CHUNK * ty.size()).enumerate() {
-        let values = &mut values[..bytes.len() / ty.size()];
-        sample::load(ty, bytes, values);
+    sample::for_each_run(ty, bytes, |first, values| {
+        if let Some(range) = sample::range_unless_missing(values, declared) {
+            seen.range = join_ranges(seen.range, range);
+            return;
+        }
         for (i, v) in values.iter().enumerate() {
-            if is_missing(*v) {
+            if sample::is_missing(*v, declared) {
                 seen.missing += 1;
-                seen.first_missing.get_or_insert((frame, at + chunk * CHUNK + i));
+                seen.first_missing.get_or_insert((frame, at + first + i));
             } else {
-                seen.range = (seen.range.0.min(*v), seen.range.1.max(*v));
+                seen.range = join_ranges(seen.range, (*v, *v));
             }
         }
-    }
+    });
     seen
 }

@@ -10,4 +10,3 @@ mod layering;
 mod reference;
 mod truncation;
 mod wavelets;
-

@@ -67,7 +67,10 @@ impl Block {
         let mut work = vec![Lane::default(); codec.basis.coefficients()];
         let mut series = vec![Lane::default(); codec.frames()];
         for (first, count) in lane_groups(self.voxels) {
-            let code = |k: usize, l: usize| if l < count { self.codes[k * self.voxels + first + l] } else { 0 };
+            let code = |k: usize| {
+                let codes = &self.codes[k * self.voxels + first..][..count];
+                std::array::from_fn(|l| codes.get(l).copied().unwrap_or(0))
+            };
             if !self.codes.is_empty() {
                 reconstruct(codec.basis.as_ref(), self.step, code, &mut work, &mut series);
             }
@@ -79,7 +82,7 @@ impl Block {
     pub fn series(&self, codec: &WindowCodec, voxel: usize) -> Vec<f64> {
         let mut work = vec![Lane::default(); codec.basis.coefficients()];
         let mut series = vec![Lane::default(); codec.frames()];
-        let code = |k: usize, l: usize| if l == 0 { self.codes[k * self.voxels + voxel] } else { 0 };
+        let code = |k: usize| [self.codes[k * self.voxels + voxel]; LANES];
         if !self.codes.is_empty() {
             reconstruct(codec.basis.as_ref(), self.step, code, &mut work, &mut series);
         }

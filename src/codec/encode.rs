@@ -3,8 +3,8 @@
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::bound::{self, difference_up};
-use crate::sample::{self, SampleType};
-use crate::wavelet::Lane;
+use crate::sample;
+use crate::wavelet::{LANES, Lane};
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
@@ -57,6 +57,36 @@ impl Tally {
     }
 }
 
+impl Tally {
+    /// Adds a group of present samples whose errors are clearly within the bound, by vector code and with one
+    /// rounding up at the end. False if they are not, so that each must be looked at; nothing is added then.
+    fn add_clearly_within(&mut self, codec: &WindowCodec, group: &Group) -> bool {
+        let (mut all, mut largest, mut squares) = ((self.min, self.max), Lane::default(), Lane::default());
+        for (decoded, source) in group.decoded.iter().zip(&group.source) {
+            let rounded = sample::round_all(codec.sample, decoded);
+            for l in 0..LANES {
+                let (a, b) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs());
+                let e = if a > b { a } else { b };
+                largest[l] = if e > largest[l] { e } else { largest[l] };
+                squares[l] += e * e;
+            }
+            match sample::range_unless_missing(&rounded, codec.missing_value) {
+                Some(range) => all = (all.0.min(range.0), all.1.max(range.1)),
+                None => return false,
+            }
+        }
+        let largest = largest.into_iter().fold(0.0, f64::max);
+        let largest = if largest > 0.0 { largest.next_up() } else { largest };
+        if largest > codec.delta {
+            return false;
+        }
+        self.reached = self.reached.max(largest);
+        self.squared_error += squares.iter().sum::<f64>();
+        (self.min, self.max) = all;
+        true
+    }
+}
+
 impl Encoder {
     /// With a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
@@ -100,7 +130,9 @@ impl Encoder {
             }
             group.truncate(codec, step, error);
             coded.dropped += self.keep_codes(&group, step, voxels, first, count);
-            check_group(codec, &group, voxels, first, count, &mut coded.tally, &mut places);
+            if count < LANES || missing.count > 0 || !coded.tally.add_clearly_within(codec, &group) {
+                check_group(codec, &group, voxels, first, count, &mut coded.tally, &mut places);
+            }
             if places.len() > samples.len() / codec.sample.size() / MOST_OUTLIERS {
                 return None;
             }
@@ -113,9 +145,9 @@ impl Encoder {
     fn keep_codes(&mut self, group: &Group, step: f64, voxels: usize, first: usize, count: usize) -> f64 {
         let mut lost = 0.0;
         for (k, coefficients) in group.coefficients.iter().enumerate() {
-            for (lane, c) in coefficients.iter().enumerate().take(count) {
-                let code = group.code(k, lane);
-                self.codes[k * voxels + first + lane] = code;
+            let codes = group.kept(k);
+            self.codes[k * voxels + first..][..count].copy_from_slice(&codes[..count]);
+            for (c, code) in coefficients.iter().zip(codes).take(count) {
                 let error = c - f64::from(code) * step;
                 lost += error * error;
             }
@@ -152,10 +184,9 @@ impl Encoder {
         missing: &Missing,
     ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::NONE;
-        for_each_sample(codec.sample, samples, |i, value| {
-            if !missing.mask[i] {
-                tally.add(value, 0.0);
-            }
+        sample::for_each_run(codec.sample, samples, |first, values| {
+            let present = values.iter().zip(&missing.mask[first..]).filter(|(_, missing)| !**missing);
+            present.for_each(|(value, _)| tally.add(*value, 0.0));
         });
         pack_exact(samples, codec.sample.size(), clear(&mut self.raw));
         let count = (samples.len() / codec.sample.size()) as u64;
@@ -227,12 +258,16 @@ struct Missing {
 impl Missing {
     fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
         let mut found = Self { mask: vec![false; samples.len() / codec.sample.size()], count: 0, magnitude: 0.0 };
-        for_each_sample(codec.sample, samples, |i, value| {
-            if codec.is_missing(value) {
-                found.mask[i] = true;
-                found.count += 1;
-            } else {
-                found.magnitude = found.magnitude.max(value.abs());
+        sample::for_each_run(codec.sample, samples, |first, values| {
+            if let Some((lo, hi)) = sample::range_unless_missing(values, codec.missing_value) {
+                found.magnitude = found.magnitude.max(-lo).max(hi);
+                return;
+            }
+            for (i, value) in values.iter().enumerate() {
+                found.mask[first + i] = codec.is_missing(*value);
+                found.count += u64::from(found.mask[first + i]);
+                found.magnitude =
+                    if found.mask[first + i] { found.magnitude } else { found.magnitude.max(value.abs()) };
             }
         });
         found
@@ -242,17 +277,6 @@ impl Missing {
     fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
         let each = samples.chunks_exact(codec.sample.size());
         each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
-    }
-}
-
-/// Calls `visit(index, value)` for every sample.
-fn for_each_sample(ty: SampleType, samples: &[u8], mut visit: impl FnMut(usize, f64)) {
-    const CHUNK: usize = 512;
-    let mut values = [0.0; CHUNK];
-    for (c, bytes) in samples.chunks(CHUNK * ty.size()).enumerate() {
-        let values = &mut values[..bytes.len() / ty.size()];
-        sample::load(ty, bytes, values);
-        values.iter().enumerate().for_each(|(i, v)| visit(c * CHUNK + i, *v));
     }
 }
 

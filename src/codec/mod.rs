@@ -92,16 +92,18 @@ fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
 
 /// The series of [`LANES`] voxels from their codes: coefficient = code * step, then the inverse transform.
 ///
-/// `codes(k, lane)` is the code of coefficient k. Encoder and decoder both come through here, so they agree to the bit.
+/// `codes(k)` are the codes of coefficient k. Encoder and decoder both come through here, so they agree to the bit.
 fn reconstruct(
     basis: &dyn TimeBasis,
     step: f64,
-    codes: impl Fn(usize, usize) -> i32,
+    codes: impl Fn(usize) -> [i32; LANES],
     work: &mut [Lane],
     series: &mut [Lane],
 ) {
     for (k, lane) in work.iter_mut().enumerate() {
-        *lane = std::array::from_fn(|l| f64::from(codes(k, l)) * step);
+        for (c, code) in lane.iter_mut().zip(codes(k)) {
+            *c = f64::from(code) * step;
+        }
     }
     basis.inverse(work, series);
 }

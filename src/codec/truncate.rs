@@ -18,8 +18,8 @@ pub(super) struct Group {
     /// The place of each coefficient in its voxel's order of dropping; K lanes.
     rank: Vec<[u16; LANES]>,
     dropped: [u16; LANES],
-    /// Scratch: (size, coefficient) of one voxel.
-    order: Vec<(u64, u16)>,
+    /// Scratch: sizes of one voxel's coefficients, and their numbers in the low bits.
+    order: Vec<u64>,
     /// What the decoder makes of the kept codes; `frames` lanes.
     pub(super) decoded: Vec<Lane>,
     work: Vec<Lane>,
@@ -47,7 +47,7 @@ impl Group {
         let mut fits = true;
         for (codes, coefficients) in self.codes.iter_mut().zip(&self.coefficients) {
             for (code, c) in codes.iter_mut().zip(coefficients) {
-                let q = (c / step).round();
+                let q = nearest(c / step);
                 fits &= q.abs() < f64::from(i32::MAX); // false for NaN too
                 *code = q as i32;
             }
@@ -55,9 +55,9 @@ impl Group {
         fits
     }
 
-    /// The code that is kept of coefficient k of a lane.
-    pub(super) fn code(&self, k: usize, lane: usize) -> i32 {
-        kept(&self.codes, &self.rank, &self.dropped, k, lane)
+    /// The codes of coefficient k that are kept.
+    pub(super) fn kept(&self, k: usize) -> [i32; LANES] {
+        kept(&self.codes[k], &self.rank[k], &self.dropped)
     }
 
     /// Drops as many of the smallest coefficients as the error allows, and decodes the rest into `decoded`.
@@ -90,19 +90,20 @@ impl Group {
         std::array::from_fn(|l| {
             self.order.clear();
             for (k, _) in self.codes.iter().enumerate().filter(|(_, codes)| codes[l] != 0) {
-                let size = self.coefficients[k][l].abs().to_bits(); // ordered as the numbers are
-                self.order.push((size, u16::MAX - k as u16));
+                // The bits of positive numbers are ordered as the numbers are; the lowest make room for k.
+                let size = self.coefficients[k][l].abs().to_bits() & !u64::from(u16::MAX);
+                self.order.push(size | u64::from(u16::MAX - k as u16));
             }
             self.order.sort_unstable();
-            for (rank, (_, k)) in self.order.iter().enumerate() {
-                self.rank[usize::from(u16::MAX - k)][l] = rank as u16;
+            for (rank, key) in self.order.iter().enumerate() {
+                self.rank[usize::from(u16::MAX - *key as u16)][l] = rank as u16;
             }
             self.order.len() as u16
         })
     }
 
     fn reconstruct(&mut self, codec: &WindowCodec, step: f64) {
-        let code = |k, l| kept(&self.codes, &self.rank, &self.dropped, k, l);
+        let code = |k: usize| kept(&self.codes[k], &self.rank[k], &self.dropped);
         reconstruct(codec.basis.as_ref(), step, code, &mut self.work, &mut self.decoded);
     }
 
@@ -128,6 +129,13 @@ impl Group {
     }
 }
 
-fn kept(codes: &[[i32; LANES]], rank: &[[u16; LANES]], dropped: &[u16; LANES], k: usize, lane: usize) -> i32 {
-    if rank[k][lane] >= dropped[lane] { codes[k][lane] } else { 0 }
+/// The codes of one coefficient, zero where the lane drops it.
+fn kept(codes: &[i32; LANES], rank: &[u16; LANES], dropped: &[u16; LANES]) -> [i32; LANES] {
+    std::array::from_fn(|l| if rank[l] >= dropped[l] { codes[l] } else { 0 })
+}
+
+/// The nearest whole number, for what fits a code. Adding and taking away 1.5 x 2^52 leaves no bits for a fraction.
+fn nearest(x: f64) -> f64 {
+    const BIG: f64 = 6_755_399_441_055_744.0;
+    (x + BIG) - BIG
 }

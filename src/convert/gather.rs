@@ -4,7 +4,6 @@ use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
-use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::Grid;
@@ -68,8 +67,7 @@ impl WindowReader<'_> {
     /// Looks at the window's samples and fixes its bound.
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize, first: usize) -> Result<WindowJob> {
         let (config, ty) = (self.config, self.archive.sample);
-        let is_missing = |v: f64| sample::is_missing(v, config.missing_value);
-        let seen = scan(window, &self.archive.grid, ty, is_missing)?;
+        let seen = scan(window, &self.archive.grid, ty, config.missing_value)?;
         self.refuse_missing(window, first, &seen)?;
         let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
         self.range = Some(range);

@@ -150,7 +150,9 @@ impl<'a> CoefficientGroup<'a> {
             }
             if self.layout.absent {
                 let missing = |f: usize| block.is_missing(self.frames[f] * block.voxels + voxel);
-                terms.add_absent(&self.layout, missing);
+                // Judged by the window, not by the group, whose frames depend on the memory that there is.
+                let in_all = (0..self.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel));
+                terms.add_absent(&self.layout, in_all, missing);
             }
             terms.end_voxel();
         }

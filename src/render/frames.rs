@@ -47,7 +47,7 @@ impl Scene for FrameScene {
         let declared = self.missing_value;
         for frame in frames {
             let window = self.source.window(*frame, 1)?;
-            let seen = scan(window.as_ref(), &self.archive.grid, self.archive.sample, |v| is_missing(v, declared))?;
+            let seen = scan(window.as_ref(), &self.archive.grid, self.archive.sample, declared)?;
             range = join_ranges(range, seen.range);
         }
         Ok(range)
@@ -71,8 +71,7 @@ impl Scene for FrameScene {
         let window = self.source.window(first, last + 1 - first)?;
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let absent =
-            can_miss && scan(window.as_ref(), &archive.grid, archive.sample, |v| is_missing(v, declared))?.missing > 0;
+        let absent = can_miss && scan(window.as_ref(), &archive.grid, archive.sample, declared)?.missing > 0;
         let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent };
         let frames = frames.iter().map(|f| f - first).collect();
         let blocks = self.blocks();

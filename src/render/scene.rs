@@ -140,9 +140,9 @@ impl Terms {
         (&self.planes[range.clone()], &self.amounts[range])
     }
 
-    /// Weights that are missing: `absent(frame)` of the frames of the current voxel.
-    pub fn add_absent(&mut self, layout: &Layout, absent: impl Fn(usize) -> bool) {
-        if (0..layout.frames).all(&absent) {
+    /// Weights that are missing: in all frames of the window, or in those of the group that `absent` names.
+    pub(super) fn add_absent(&mut self, layout: &Layout, in_all: bool, absent: impl Fn(usize) -> bool) {
+        if in_all {
             self.add(layout.absent_in_all(), 1.0);
         } else {
             (0..layout.frames).filter(|f| absent(*f)).for_each(|f| self.add(layout.absent(f), 1.0));
@@ -166,7 +166,7 @@ impl Terms {
                 terms.add(layout.value(f), values[f * voxels + voxel]);
             }
             if layout.absent {
-                terms.add_absent(layout, missing);
+                terms.add_absent(layout, false, missing);
             }
             terms.end_voxel();
         }
@@ -187,11 +187,11 @@ mod tests {
     }
 
     #[test]
-    fn a_voxel_missing_in_all_frames_takes_one_term() {
+    fn missing_samples_take_weights_instead_of_values() {
         let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true };
-        let samples: Vec<u8> = [f32::NAN, 1.0, f32::NAN, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let samples: Vec<u8> = [f32::NAN, 1.0, 3.0, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         let terms = Terms::of_samples(&layout, SampleType::F32, &samples, |_, v| v.is_nan());
-        assert_eq!(terms.of_voxel(0), (&[4u16][..], &[1.0][..]));
+        assert_eq!(terms.of_voxel(0), (&[1u16, 2][..], &[3.0, 1.0][..]));
         assert_eq!(terms.of_voxel(1), (&[0u16, 1][..], &[1.0, 2.0][..]));
     }
 }
