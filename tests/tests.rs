@@ -7,6 +7,9 @@ mod common;
 mod reference;
 
 mod bounds;
+mod coefficients;
+mod determinism;
 mod images;
+mod real;
 mod truncation;
 mod wavelets;
