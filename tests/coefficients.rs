@@ -227,7 +227,7 @@ fn memory_changes_no_bit_of_a_picture_from_coefficients() {
     let mut samples = field(&grid, FRAMES, 3);
     for mask in [false, true] {
         if mask {
-            let missing = |i: usize| i % 3 == 0 || i % 5760 < 900;
+            let missing = |i: usize| i.is_multiple_of(3) || i % 5760 < 900;
             samples.iter_mut().enumerate().filter(|(i, _)| missing(*i)).for_each(|(_, v)| *v = f64::NAN);
         }
         for basis in [Basis::Haar, Basis::Multi] {
