@@ -59,7 +59,7 @@ fn the_exact_method_is_within_a_millionth_of_brute_force() {
 #[test]
 fn every_footprint_keeps_the_error_that_it_states() {
     let mut names = Vec::new();
-    for (n, (grid, view, tau)) in scenes().into_iter().enumerate().filter(|(n, _)| *n != 9) {
+    for (n, (grid, view, tau)) in scenes().into_iter().enumerate() {
         let memory = archive(grid, SampleType::F64, &field(&grid, 2, n as u64));
         let samples = values(&memory, SampleType::F64);
         let (lo, hi) = samples.iter().fold((f64::MAX, f64::MIN), |(lo, hi), v| (lo.min(*v), hi.max(*v)));

@@ -4,9 +4,12 @@
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
 
 mod bounds;
+mod coefficients;
 mod common;
+mod determinism;
 mod images;
 mod layering;
+mod real;
 mod reference;
 mod truncation;
 mod wavelets;

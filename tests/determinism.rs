@@ -1,0 +1,80 @@
+//! The same input gives the same bytes and pixels, whatever the number of threads and the memory.
+
+use crate::common::memory::Memory;
+use crate::common::series::{Kind, Mask, volume};
+use crate::common::views::view;
+use crate::common::{direct, extracted, looking, pictures, settings, stored};
+use crate::images::bits;
+use std::path::Path;
+use std::process::Command;
+use wavesplat::convert::{ConvertConfig, convert};
+use wavesplat::progress::Silent;
+use wavesplat::render::{CoefficientScene, Quantity, What};
+use wavesplat::sample::SampleType;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+
+const GRID: Grid = Grid { dims: [40, 33, 20], spacing: [1.0; 3], origin: [0.0; 3] };
+
+fn memory(mask: Mask) -> Memory {
+    Memory::new(GRID, SampleType::F32, volume(Kind::Wave, SampleType::F32, mask, GRID.whole().voxels(), 20, 4))
+}
+
+fn config(basis: Basis) -> ConvertConfig {
+    let window = if basis == Basis::Haar { 16 } else { 9 };
+    ConvertConfig { block: Some(8), ..settings(basis, window, 0.01) }
+}
+
+fn under<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+}
+
+#[test]
+fn threads_change_no_byte_and_no_pixel() {
+    for (basis, mask) in [(Basis::Haar, Mask::None), (Basis::Multi, Mask::Special)] {
+        let run = |threads| {
+            under(threads, || {
+                let memory = memory(mask);
+                let file = stored(&mut memory.clone(), &config(basis));
+                let look = looking(view(30.0, 20.0, [140, 90]), 0.01, Quantity::Mean, &GRID, 20);
+                let (a, _) = pictures(&mut direct(&memory, None), &look);
+                let (b, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+                (file.bytes(), extracted(&file.open()), bits(&a), bits(&b))
+            })
+        };
+        let one = run(1);
+        assert!([2, 5].into_iter().all(|n| run(n) == one), "{basis:?}");
+    }
+}
+
+#[test]
+fn memory_changes_no_byte_of_a_file() {
+    let source = memory(Mask::Special);
+    let mut files = Vec::new();
+    for mib in [15, 16, 20, 40, 300] {
+        let config = ConvertConfig { memory: mib << 20, ..config(Basis::Haar) };
+        let mut bytes = Vec::new();
+        let done = convert(&mut source.clone(), &config, Path::new("a.wspl"), &mut bytes, &Silent);
+        files.extend(done.is_ok().then_some(bytes));
+    }
+    assert!(files.len() >= 4, "{} budgets suffice", files.len());
+    assert!(files.iter().all(|f| *f == files[0]));
+}
+
+/// The stages of a conversion work in the program's own pool, which only the program can size.
+#[test]
+fn the_program_writes_the_same_bytes_with_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames.raw");
+    std::fs::write(&frames, memory(Mask::None).frames.as_slice()).unwrap();
+    let run = |threads: &str| {
+        let out = folder.path().join(format!("{threads}.wspl"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wavesplat"));
+        command.arg("convert").arg(&frames).args(["--dims", "40x33x20x20", "--dtype", "f32", "--threads", threads]);
+        let done = command.arg("-o").arg(&out).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(out).unwrap()
+    };
+    let one = run("1");
+    assert!(["2", "5"].into_iter().all(|n| run(n) == one));
+}
