@@ -159,19 +159,17 @@ impl Cli {
 
     /// What is rendered, and the tolerance that it was converted with.
     fn scene(&self) -> Result<(Box<dyn Scene>, Option<f64>)> {
-        let coefficient_file = match self.inputs.as_slice() {
-            [only] if only.extension().is_some_and(|e| e == "wspl") => Some(only),
-            [only] if self.method == MethodName::Coefficients => Some(only),
-            _ => None,
-        };
-        if let Some(path) = coefficient_file {
-            let file = CoefficientFile::open(path, self.input.access())?;
+        let coefficients = self.method == MethodName::Coefficients;
+        if let [only] = self.inputs.as_slice()
+            && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
+        {
+            let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let tolerance = file.metadata().tolerance;
-            let what = if self.method == MethodName::Direct { What::Samples } else { What::Coefficients };
+            let what = if coefficients { What::Coefficients } else { What::Samples };
             return Ok((Box::new(CoefficientScene::new(file, what)), Some(tolerance)));
         }
-        if self.method == MethodName::Coefficients {
-            return Err(Error::usage("takes one coefficient file; frames are rendered with --method direct"));
+        if coefficients {
+            return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
         }
         if self.inputs == [PathBuf::from(STANDARD)] {
             return Err(Error::usage("--method direct reads frames more than once, so not from standard input"));
@@ -228,6 +226,17 @@ impl Cli {
         };
         ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)
     }
+}
+
+const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
+
+/// Says what to do about a file that holds no coefficients.
+fn hint_at_frames(path: &Path, error: Error) -> Error {
+    let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
+    if foreign || path.is_dir() {
+        return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
+    }
+    error
 }
 
 /// The volume's diagonal: no ray stays in it for longer.
