@@ -233,7 +233,8 @@ const FRAMES_HINT: &str = "convert frames first, or render them as they are with
 /// Says what to do about a file that holds no coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-    if foreign || path.is_dir() {
+    let named_so = path.extension().is_some_and(|e| e == "wspl");
+    if !named_so && (foreign || path.is_dir()) {
         return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
     }
     error

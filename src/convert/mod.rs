@@ -65,6 +65,8 @@ pub struct ConvertConfig {
     pub level: i32,
     /// Bytes that may be allocated.
     pub memory: usize,
+    /// Bytes of these that the source takes for itself: a stream's window.
+    pub reserved: usize,
     /// What was asked of the input (frames, region), kept as provenance.
     pub settings: Vec<(String, String)>,
 }
@@ -177,7 +179,9 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let raw = samples * sample.size();
     let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
     let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
-    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY;
+    let needs = |batch: &usize| {
+        batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY + config.reserved
+    };
     let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) <= config.memory);
     fits.ok_or_else(|| {
         let (least, edge) = (needs(&1).div_ceil(1 << 20), blocks.edge);

@@ -39,6 +39,7 @@ pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertCo
         block: None,
         level: 1,
         memory: MEMORY,
+        reserved: 0,
         settings: Vec::new(),
     }
 }

@@ -113,6 +113,7 @@ fn by_coefficients(files: &Files, name: &'static str, basis: Basis, window: usiz
         block: None,
         level: 3,
         memory: MEMORY,
+        reserved: 0,
         settings: Vec::new(),
     };
     let mut out = Output::create(&path, true)?;

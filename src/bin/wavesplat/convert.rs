@@ -136,7 +136,8 @@ impl ConvertArgs {
             missing_value: self.missing_value,
             block: self.block,
             level: self.level,
-            memory: if streamed { self.common.memory.0 - self.common.stream_memory() } else { self.common.memory.0 },
+            memory: self.common.memory.0,
+            reserved: if streamed { self.common.stream_memory() } else { 0 },
             settings: self.settings(),
         })
     }
