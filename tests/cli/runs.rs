@@ -88,17 +88,17 @@ fn pictures_from_coefficients_are_within_the_bound_of_pictures_from_frames() {
     {
         b.done(
             "wavesplat-render",
-            &format!("a.wspl -o c.npy --force --size 64x48 {view} --splat-error 0")
+            &format!("a.wspl -o c.npy --force {view} --splat-error 0")
                 .replace("--size 64x48 --view 0,90", "--view 0,90"),
         );
         b.done(
             "wavesplat-render",
-            &format!("frames --method direct -o d.npy --force --size 64x48 {view} --splat-error 0")
+            &format!("frames --method direct -o d.npy --force {view} --splat-error 0")
                 .replace("--size 64x48 --view 0,90", "--view 0,90"),
         );
         b.done(
             "wavesplat-render",
-            &format!("a.wspl --method direct -o s.npy --force --size 64x48 {view} --splat-error 0")
+            &format!("a.wspl --method direct -o s.npy --force {view} --splat-error 0")
                 .replace("--size 64x48 --view 0,90", "--view 0,90"),
         );
         let (shape, coefficients) = b.array("c.npy");
