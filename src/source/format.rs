@@ -1,7 +1,7 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
-use super::series::Described;
-use super::{OpenOptions, npy, nrrd, raw, vti};
+use super::described::{Described, head};
+use super::{OpenOptions, npy, nrrd, nrrd_header, raw, vti};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use std::path::Path;
@@ -36,7 +36,7 @@ impl Format {
 
     fn by_content(path: &Path) -> Result<Option<Self>> {
         let head = head(&FileBytes::open(path, Access::Read)?, 16)?;
-        let formats = [(npy::MAGIC, Self::Npy), (nrrd::MAGIC, Self::Nrrd)];
+        let formats = [(npy::MAGIC, Self::Npy), (nrrd_header::MAGIC, Self::Nrrd)];
         Ok(formats.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format))
     }
 }
@@ -44,14 +44,6 @@ impl Format {
 /// The extension in lower case, or nothing.
 pub(super) fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
-}
-
-/// The first bytes of a file, fewer if it is shorter.
-pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
-    let len = usize::try_from(file.len()).unwrap_or(usize::MAX).min(bytes);
-    let mut head = vec![0; len];
-    file.read_at(0, &mut head).map_err(|e| Error::io(file.path(), "reading the header", e))?;
-    Ok(head)
 }
 
 /// Reads the header of a file of frames and checks its size.

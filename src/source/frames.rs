@@ -4,6 +4,7 @@ use super::FrameWindow;
 use super::Parsed;
 use crate::error::{Error, Result};
 use crate::mapped::FileBytes;
+use crate::output::STANDARD;
 use crate::sample::{SampleType, swap_endian};
 use crate::volume::Region;
 use std::fs::File;
@@ -139,7 +140,7 @@ impl FrameWindow for Frames {
         let bytes = &self.bytes[frame.bytes];
         let rows = Rows::new(dims, region, sample.size());
         rows.copy(bytes, frame.offset, out).map_err(|e| {
-            let path = bytes.file().map_or(Path::new(super::stream::NAME), FileBytes::path);
+            let path = bytes.file().map_or(Path::new(STANDARD), FileBytes::path);
             Error::io(path, format!("reading {}", frame.name), e)
         })?;
         if frame.big_endian {

@@ -1,22 +1,13 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
+use super::described::Files;
 use super::format::{self, Format, SUPPORTED};
 use super::{OpenOptions, numbering, pvd};
 use crate::error::{Error, Result};
+use crate::output::STANDARD;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// The files of an archive, in order.
-#[derive(Debug, Default)]
-pub(super) struct Files {
-    /// The files, at least one, none twice.
-    pub(super) paths: Vec<PathBuf>,
-    /// Time of each where a list says so, else empty.
-    pub(super) times: Vec<f64>,
-    /// What a user should know about how they were found.
-    pub(super) notes: Vec<String>,
-}
 
 /// The files that the inputs stand for.
 pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files> {
@@ -49,7 +40,7 @@ fn listed(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
         return Err(Error::usage("no input was given"));
     }
     for input in inputs {
-        if input == Path::new(super::stream::NAME) {
+        if input == Path::new(STANDARD) {
             return Err(Error::usage("standard input (-) must be the only input"));
         }
         if input.is_dir() {

@@ -4,6 +4,7 @@
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
 mod base64;
+mod described;
 mod format;
 mod frames;
 mod inputs;
@@ -27,6 +28,7 @@ pub use select::{Selection, select};
 
 use crate::error::Result;
 use crate::mapped::Access;
+use crate::output::STANDARD;
 use crate::sample::SampleType;
 use crate::volume::{Grid, Region};
 use std::io::Read;
@@ -88,7 +90,7 @@ impl Default for OpenOptions {
 /// numbers in names that suggest a missing frame; options that the format has no use for.
 pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     if let [only] = inputs
-        && only == Path::new(stream::NAME)
+        && only == Path::new(STANDARD)
     {
         return open_stream(std::io::stdin(), options);
     }

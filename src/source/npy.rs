@@ -1,8 +1,8 @@
 //! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x).
 
 use super::Parsed;
+use super::described::{At, Described, Part, check_size};
 use super::frames::Shape;
-use super::series::{At, Described, Part, check_size};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;

@@ -1,18 +1,14 @@
 //! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`): axes x y z or x y z t, raw encoding.
 
 use super::Parsed;
-use super::format::head;
+use super::described::{Described, head};
 use super::frames::Shape;
 use super::nrrd_data;
 use super::nrrd_header::{Header, numbers};
-use super::series::Described;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use std::path::Path;
-
-/// How every NRRD starts.
-pub(super) const MAGIC: &[u8] = b"NRRD000";
 
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 const FIRST_READ: usize = 4 << 10;

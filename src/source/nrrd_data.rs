@@ -1,9 +1,9 @@
 //! Where the samples of a NRRD are: after the header, in another file, or in one file for each frame.
 
 use super::Parsed;
+use super::described::{At, Part, check_size};
 use super::frames::Shape;
 use super::nrrd_header::Header;
-use super::series::{At, Part, check_size};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use std::path::Path;

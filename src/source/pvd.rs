@@ -1,7 +1,7 @@
 //! ParaView's `.pvd`: a list of files and their times.
 
 use super::Parsed;
-use super::inputs::Files;
+use super::described::Files;
 use super::xml::{attribute, required};
 use crate::error::{Error, Result};
 use quick_xml::Reader;

@@ -1,8 +1,8 @@
 //! Headerless samples: the user says what they are.
 
 use super::OpenOptions;
+use super::described::{At, Described, Part, check_size};
 use super::frames::Shape;
-use super::series::{At, Described, Part, check_size};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use std::path::Path;

@@ -4,13 +4,11 @@ use super::frames::{Bytes, Frame, Frames, Shape};
 use super::series::{check_grid, override_grid};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, npy, raw};
 use crate::error::{Error, Result};
+use crate::output::STANDARD;
 use crate::volume::Grid;
 use std::fs::File;
 use std::io::{self, Chain, Cursor, ErrorKind, Read, Write};
 use std::path::Path;
-
-/// What stands for a stream on the command line and in messages.
-pub(super) const NAME: &str = "-";
 
 const CHUNK: usize = 1 << 20; // bytes asked for at a time
 
@@ -31,7 +29,7 @@ impl<R: Read> Stream<R> {
     pub(super) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
         let mut head = Vec::new();
         let magic = npy::MAGIC.len() as u64;
-        reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(NAME, "reading", e))?;
+        reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;
         let is_npy = head == npy::MAGIC;
         let mut reader = Cursor::new(head).chain(reader);
         let (shape, frames, big_endian) = match (&options.dims, is_npy) {
@@ -46,7 +44,7 @@ impl<R: Read> Stream<R> {
         };
         let mut grid = Grid::unit(shape.dims());
         override_grid(&mut grid, options);
-        check_grid(&grid, options, Path::new(NAME))?;
+        check_grid(&grid, options, Path::new(STANDARD))?;
         let (times, notes) = (Vec::new(), Vec::new());
         let archive = Archive { grid, sample: shape.sample(), frames, times, variable: None, notes };
         let (memory, chunk) = (options.memory, vec![0; CHUNK]);
@@ -72,11 +70,11 @@ impl<R: Read> Stream<R> {
         while got < bytes {
             let wanted = CHUNK.min(bytes - got);
             let n = read_some(&mut self.reader, &mut self.chunk[..wanted])
-                .map_err(|e| Error::io(NAME, format!("reading frame {frame}"), e))?;
+                .map_err(|e| Error::io(STANDARD, format!("reading frame {frame}"), e))?;
             if n == 0 {
                 return self.end(got);
             }
-            sink.write_all(&self.chunk[..n]).map_err(|e| Error::io(NAME, format!("holding frame {frame}"), e))?;
+            sink.write_all(&self.chunk[..n]).map_err(|e| Error::io(STANDARD, format!("holding frame {frame}"), e))?;
             got += n;
         }
         if self.archive.frames == Some(frame + 1) {
@@ -92,11 +90,11 @@ impl<R: Read> Stream<R> {
         if got > 0 {
             let what =
                 format!("ends inside frame {frame}: expected {bytes} bytes, got {got}; check --dims and --dtype");
-            return Err(Error::input(NAME, what));
+            return Err(Error::input(STANDARD, what));
         }
         match self.archive.frames {
-            Some(all) => Err(Error::input(NAME, format!("ends after {frame} of {all} frames"))),
-            None if frame == 0 => Err(Error::input(NAME, "is empty")),
+            Some(all) => Err(Error::input(STANDARD, format!("ends after {frame} of {all} frames"))),
+            None if frame == 0 => Err(Error::input(STANDARD, "is empty")),
             None => {
                 self.archive.frames = Some(frame);
                 Ok(false)
@@ -107,12 +105,12 @@ impl<R: Read> Stream<R> {
     fn expect_end(&mut self) -> Result<()> {
         self.ended = true;
         let mut one = [0];
-        match read_some(&mut self.reader, &mut one).map_err(|e| Error::io(NAME, "reading", e))? {
+        match read_some(&mut self.reader, &mut one).map_err(|e| Error::io(STANDARD, "reading", e))? {
             0 => Ok(()),
             _ => {
                 let all = self.archive.frames.unwrap_or(0);
                 Err(Error::input(
-                    NAME,
+                    STANDARD,
                     format!("goes on after its {all} frame(s); several arrays in one stream are not supported"),
                 ))
             }
@@ -128,7 +126,7 @@ impl<R: Read> Stream<R> {
             return Ok(Sink::Spool(file));
         };
         let mut held = Vec::new();
-        let failed = |_| Error::io(NAME, format!("holding {frames} frames"), ErrorKind::OutOfMemory.into());
+        let failed = |_| Error::io(STANDARD, format!("holding {frames} frames"), ErrorKind::OutOfMemory.into());
         held.try_reserve_exact(bytes).map_err(failed)?;
         Ok(Sink::Memory(held))
     }
@@ -162,15 +160,15 @@ impl<R: Read + Send> FrameSource for Stream<R> {
 fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
     let (shape, frames) = raw::shape(options)?;
     let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
-    match skipped.map_err(|e| Error::io(NAME, "reading", e))? {
+    match skipped.map_err(|e| Error::io(STANDARD, "reading", e))? {
         n if n == options.offset => Ok((shape, frames, options.big_endian)),
-        n => Err(Error::input(NAME, format!("ends after {n} bytes, inside the --offset of {}", options.offset))),
+        n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the --offset of {}", options.offset))),
     }
 }
 
 fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
-    super::format::refuse_options(Path::new(NAME), super::format::Format::Npy, options)?;
-    let array = npy::read_header(reader, Path::new(NAME))?;
+    super::format::refuse_options(Path::new(STANDARD), super::format::Format::Npy, options)?;
+    let array = npy::read_header(reader, Path::new(STANDARD))?;
     Ok((array.shape, Some(array.frames), array.big_endian))
 }
 

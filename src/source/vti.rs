@@ -2,9 +2,8 @@
 
 use super::Parsed;
 use super::base64::{Count, Place};
-use super::format::head;
+use super::described::{At, Described, Part, head};
 use super::frames::Shape;
-use super::series::{At, Described, Part};
 use super::vti_header::{self, Array, Association, Header};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
