@@ -34,6 +34,11 @@ pub struct ExtractReport {
     pub bytes: u64,
 }
 
+/// An error if the memory is too small, before anything is written.
+pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()> {
+    Pieces::new(file, config).map(|_| ())
+}
+
 /// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
 pub fn extract(
     file: &CoefficientFile,

@@ -52,8 +52,9 @@ pub struct SinkConfig {
 /// Where pictures go.
 #[derive(Debug)]
 pub enum Sink {
-    /// To one file or stream.
-    One(Box<Output>, SinkConfig),
+    /// To one file or stream; what comes before the first picture is written with it, so that a request that cannot be
+    /// met leaves a pipe empty.
+    One { out: Box<Output>, config: SinkConfig, begun: bool },
     /// Each to a file of its own, named by [`Numbered`].
     Many(Numbered, SinkConfig),
 }
@@ -64,16 +65,16 @@ impl Sink {
         if config.format == PictureFormat::Png && path != Path::new(crate::output::STANDARD) {
             return Ok(Self::Many(Numbered::new(path, config.frames)?, config));
         }
-        let mut out = Output::create(path, config.force)?;
-        begin(&config, &mut out).map_err(|e| Error::io(path, "writing", e))?;
-        Ok(Self::One(Box::new(out), config))
+        Ok(Self::One { out: Box::new(Output::create(path, config.force)?), config, begun: false })
     }
 
     /// Writes the picture of a frame.
     pub fn picture(&mut self, frame: usize, picture: Picture<'_>) -> Result<()> {
         match self {
-            Self::One(out, config) => {
-                write(config, picture, out).map_err(|e| Error::io(out.path(), format!("writing frame {frame}"), e))
+            Self::One { out, config, begun } => {
+                let header = if std::mem::replace(begun, true) { Ok(()) } else { begin(config, out) };
+                let written = header.and_then(|()| write(config, picture, out));
+                written.map_err(|e| Error::io(out.path(), format!("writing frame {frame}"), e))
             }
             Self::Many(names, config) => {
                 let path = names.of(frame);
@@ -87,7 +88,7 @@ impl Sink {
     /// Ends the stream and gives the file its final name.
     pub fn finish(self) -> Result<()> {
         match self {
-            Self::One(out, _) => out.commit(),
+            Self::One { out, .. } => out.commit(),
             Self::Many(..) => Ok(()),
         }
     }
@@ -172,9 +173,17 @@ fn write_png(size: [usize; 2], rgb: &[u8], out: &mut impl Write) -> io::Result<(
     let mut encoder = png::Encoder::new(out, size[0] as u32, size[1] as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb)?;
-    Ok(writer.finish()?)
+    let mut writer = encoder.write_header().map_err(cause)?;
+    writer.write_image_data(rgb).map_err(cause)?;
+    writer.finish().map_err(cause)
+}
+
+/// What the system said, whose kind tells a broken pipe from other failures.
+fn cause(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(e) => e,
+        other => io::Error::other(other),
+    }
 }
 
 /// Full-range BT.601, what players assume of a stream that does not say more.
