@@ -49,6 +49,9 @@ impl Output {
             let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "opening", e))?;
             Target::Special(BufWriter::with_capacity(BUFFER, file))
         } else {
+            if path.is_dir() {
+                return Err(Error::usage(format!("{}: is a folder; name a file", path.display())));
+            }
             if path.exists() && !force {
                 return Err(Error::usage(format!("{}: exists already; --force replaces it", path.display())));
             }

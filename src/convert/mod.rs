@@ -117,6 +117,12 @@ pub fn convert<W: Write>(
     let started = Instant::now();
     let archive = source.archive().clone();
     let plan = Plan::new(config, &archive)?;
+    if plan.batch == 0 {
+        let least = least_memory(config, &archive)?.div_ceil(1 << 20);
+        let (window, edge) = (config.window, plan.blocks.edge);
+        let what = format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
+        return Err(Error::usage(what));
+    }
     progress.start(archive.frames.map(|f| (f.div_ceil(config.window) * plan.blocks.len()) as u64));
     let mut recorder = Recorder::new(config, &archive, &plan, name, out);
     let (to_workers, from_reader) = bounded(0);
@@ -161,25 +167,26 @@ impl Plan {
             return Err(Error::usage(format!("--block {edge}: a block holds 1 to {most} samples over a window")));
         }
         let blocks = BlockGrid { dims: archive.grid.dims, edge };
-        let batch = batch_len(config, blocks, archive.sample)?;
+        let fits = |batch: &usize| memory_for(*batch, config, blocks, archive.sample) <= config.memory;
+        let batch = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(fits).unwrap_or(0);
         Ok(Self { blocks, batch })
     }
 }
 
-/// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, and a worker's scratch.
-fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> Result<usize> {
+/// The least memory that a conversion needs, besides what the source holds.
+pub fn least_memory(config: &ConvertConfig, archive: &Archive) -> Result<usize> {
+    let plan = Plan::new(config, archive)?;
+    Ok(memory_for(1, config, plan.blocks, archive.sample))
+}
+
+/// Bytes for two batches of samples and two of coded blocks in flight, and each worker's scratch.
+fn memory_for(batch: usize, config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> usize {
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
     let raw = samples * sample.size();
     let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
     let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
-    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY;
-    let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) <= config.memory);
-    fits.ok_or_else(|| {
-        let (least, edge) = (needs(&1).div_ceil(1 << 20), blocks.edge);
-        let window = config.window;
-        Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))
-    })
+    batch * 4 * raw + batch.min(rayon::current_num_threads()) * scratch + FIXED_MEMORY
 }
 
 /// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.

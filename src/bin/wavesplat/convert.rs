@@ -4,9 +4,10 @@ use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow};
-use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
+use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert, least_memory};
 use wavesplat::error::{Error, Result};
 use wavesplat::output::{Output, STANDARD};
+use wavesplat::source::Archive;
 use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
@@ -37,7 +38,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "T")]
     window: Option<usize>,
     /// Largest error as a share of the value range; 0 keeps every bit
-    #[arg(long, value_name = "X", default_value_t = 0.01)]
+    #[arg(long, value_name = "X", default_value_t = 0.01, allow_hyphen_values = true)]
     tolerance: f64,
     /// What is guaranteed: every sample, or the root mean square of each voxel in each window
     #[arg(long, value_enum, default_value = "pointwise")]
@@ -97,6 +98,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;
     let config = args.config()?;
     let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
+    args.check_stream_memory(&config, source.archive())?;
     let mut out = Output::create(&args.output, args.force)?;
     let progress = args.common.progress("blocks");
     let report = convert(source.as_mut(), &config, &args.output, &mut out, &progress)?;
@@ -118,7 +120,6 @@ impl ConvertArgs {
             BasisName::Haar => (Basis::Haar, 32),
             BasisName::Multi => (Basis::Multi, 33),
         };
-        let streamed = self.inputs == [PathBuf::from(STANDARD)];
         Ok(ConvertConfig {
             basis,
             window: self.window.unwrap_or(window),
@@ -135,9 +136,24 @@ impl ConvertArgs {
             missing_value: self.missing_value,
             block: self.block,
             level: self.level,
-            memory: if streamed { self.common.memory.0 - self.common.stream_memory() } else { self.common.memory.0 },
+            memory: self.common.memory.0 - if self.is_streamed() { self.common.stream_memory() } else { 0 },
             settings: self.settings(),
         })
+    }
+
+    fn is_streamed(&self) -> bool {
+        self.inputs == [PathBuf::from(STANDARD)]
+    }
+
+    /// An error if what the stream leaves of the memory is too little, with the whole that is needed.
+    fn check_stream_memory(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
+        let least = if self.is_streamed() { least_memory(config, archive)? } else { 0 };
+        if least > config.memory {
+            let least = (least + least.div_ceil(3)).div_ceil(1 << 20); // the stream has a quarter
+            let what = format!("--memory: windows of {} frames from a pipe need {least}MiB", config.window);
+            return Err(Error::usage(what));
+        }
+        Ok(())
     }
 
     /// What `verify --against` must know to read the same samples again.
