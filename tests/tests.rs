@@ -3,4 +3,5 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
 
+mod cli;
 mod reference;

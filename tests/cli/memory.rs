@@ -1,0 +1,51 @@
+//! The budget holds: archives twenty times its size, under a limit of the system.
+#![cfg(target_os = "linux")]
+
+use super::Work;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+
+/// What the programs may take besides `--memory`: code, stacks, the allocator's slack.
+const SLACK_MIB: usize = 40;
+
+/// A sparse archive with some structure in every frame.
+fn write_sparse(work: &Work, name: &str, [nx, ny, nz, nt]: [usize; 4]) {
+    let file = File::create(work.path(name)).unwrap();
+    file.set_len((nx * ny * nz * nt) as u64).unwrap();
+    let slab: Vec<u8> = (0..nx * ny * 4).map(|i| (100.0 + 90.0 * (i as f32 * 0.001).sin()) as u8).collect();
+    for t in 0..nt {
+        let z = (3 * t) % (nz - 4);
+        file.write_all_at(&slab, ((t * nz + z) * nx * ny) as u64).unwrap();
+    }
+}
+
+#[test]
+fn archives_much_larger_than_the_budget_stay_within_it() {
+    let work = Work::new();
+    work.write("tiny.raw", [0; 16 * 16 * 16 * 2]);
+    let tiny = "tiny.raw --dims 16x16x16x2 --dtype u8";
+    let ask = work.wavesplat(&format!("convert {tiny} -o t.wspl --block 16 --threads 2 --memory 1MiB"));
+    let memory = ask.fails(2, &["--memory"]).mebibytes();
+    let frame_mib = (20 * memory).div_ceil(32);
+    let dims = [256, 256, 16 * frame_mib, 32];
+    write_sparse(&work, "big.raw", dims);
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    let [x, y, z, t] = dims;
+    let options = "--dtype u8 --block 16 --threads 2 --level 1";
+    let files =
+        format!("$WAVESPLAT convert big.raw --dims {x}x{y}x{z}x{t} {options} --memory {memory}MiB -o file.wspl");
+    work.shell(&format!("{limit} exec {files}")).ok();
+    let pipe = format!("$WAVESPLAT convert - --dims {x}x{y}x{z} {options} -o pipe.wspl");
+    let memory = work.shell(&format!("exec {pipe} --memory {memory}MiB < big.raw")).fails(2, &["--memory"]).mebibytes(); // the pipe takes a part
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    work.shell(&format!("{limit} exec {pipe} --memory {memory}MiB < big.raw")).ok();
+    assert!(work.read("file.wspl") == work.read("pipe.wspl"));
+    let ask = work.render("file.wspl --size 96x96 --threads 2 -o v.npy --memory 1MiB").fails(2, &["--memory"]);
+    let memory = memory.max(ask.mebibytes());
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    let common = format!("--threads 2 --memory {memory}MiB");
+    work.shell(&format!("{limit} exec $RENDER file.wspl --size 96x96 --frames 0,31 -o v.npy {common}")).ok();
+    work.shell(&format!("{limit} exec $WAVESPLAT extract file.wspl --frames 5 -o e.raw {common}")).ok();
+    work.shell(&format!("{limit} exec $WAVESPLAT verify file.wspl {common}")).ok();
+    assert_eq!(work.read("e.raw").len(), x * y * z);
+}
