@@ -46,7 +46,7 @@ impl Camera {
             return Err(Error::usage("a view takes finite angles and positions, and a scale above 0"));
         }
         if view.size.iter().any(|n| *n == 0 || *n > MOST_PIXELS) {
-            return Err(Error::usage(format!("a picture is 1 to {MOST_PIXELS} pixels wide and high")));
+            return Err(Error::usage(format!("--size: a picture is 1 to {MOST_PIXELS} pixels wide and high")));
         }
         let [right, up, forward] = axes(view);
         let mut camera = Self { size: view.size, scale: 1.0, right, up, forward, center, nearest: 0.0 };

@@ -34,6 +34,11 @@ pub struct ExtractReport {
     pub bytes: u64,
 }
 
+/// An error if the memory is too small, before anything is written.
+pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()> {
+    Pieces::new(file, config).map(|_| ())
+}
+
 /// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
 pub fn extract(
     file: &CoefficientFile,
@@ -44,8 +49,9 @@ pub fn extract(
 ) -> Result<ExtractReport> {
     progress.start(Some(config.frames.len() as u64));
     let mut report = ExtractReport::default();
-    for piece in Pieces::new(file, config)?.list(file, config) {
-        let bytes = read_piece(file, &piece, &mut report)?;
+    let pieces = Pieces::new(file, config)?;
+    for piece in pieces.list(file, config) {
+        let bytes = read_piece(file, &piece, pieces.blocks, &mut report)?;
         out.write_all(&bytes).map_err(|e| Error::io(name, "writing", e))?;
         report.bytes += bytes.len() as u64;
         if piece.region.end[2] == config.region.end[2] {
@@ -62,6 +68,8 @@ pub fn extract(
 struct Pieces {
     frames: usize,
     slab: usize,
+    /// Blocks that are decoded at a time.
+    blocks: usize,
 }
 
 /// Frames (of one window) and voxels that are decoded together, in the order of the output.
@@ -83,7 +91,8 @@ impl Pieces {
             let least = (2 * plane + FIXED_MEMORY + block_bytes(file)).div_ceil(1 << 20);
             return Err(Error::usage(format!("--memory: extracting from this file needs at least {least}MiB")));
         }
-        Ok(Self { frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })
+        let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
+        Ok(Self { blocks, frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })
     }
 
     fn list(&self, file: &CoefficientFile, config: &ExtractConfig) -> Vec<Piece> {
@@ -103,14 +112,12 @@ impl Pieces {
     }
 }
 
-/// Bytes that decoding one block on each worker takes.
+/// Bytes that decoding one block takes.
 fn block_bytes(file: &CoefficientFile) -> usize {
-    let windows = &file.metadata().windows;
-    let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
-    file.blocks.region(0).voxels() * longest * (4 + 5 + 2 * file.sample().size()) * rayon::current_num_threads()
+    file.largest_block() * (4 + 5 + 2 * file.sample().size())
 }
 
-fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport) -> Result<Vec<u8>> {
+fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mut ExtractReport) -> Result<Vec<u8>> {
     let codec = file.codec(piece.window)?;
     let first = file.window_range(piece.window).start;
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
@@ -124,7 +131,7 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, report: &mut ExtractReport)
         }
         let touches = |e: &BlockEntry| !file.blocks.region(e.id.block as usize).intersect(&piece.region).is_empty();
         let entries: Vec<BlockEntry> = file.leaf(leaf)?.into_iter().filter(touches).collect();
-        for entries in entries.chunks(rayon::current_num_threads()) {
+        for entries in entries.chunks(at_once) {
             let decode =
                 |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;

@@ -74,6 +74,13 @@ impl CoefficientFile {
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 
+    /// Samples or coefficients, whichever are more, of the largest block.
+    pub fn largest_block(&self) -> usize {
+        let windows = &self.metadata().windows;
+        let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
+        self.blocks.region(0).voxels() * longest
+    }
+
     /// The window that holds a frame.
     pub fn window_of(&self, frame: usize) -> u32 {
         self.metadata().windows.partition_point(|w| w.first_frame as usize <= frame) as u32 - 1

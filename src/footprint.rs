@@ -75,7 +75,7 @@ pub struct Footprint {
 
 impl Footprint {
     /// Of a kernel seen at `scale` pixels per world unit, splatted by `method`.
-    pub fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Self {
+    pub fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Result<Self> {
         let Kernel { sigma, tau } = kernel;
         let cell: f64 = grid.spacing.iter().product();
         let in_pixels = sigma * scale;
@@ -83,7 +83,12 @@ impl Footprint {
         let peak = cell * libm::exp(tau * tau * sigma * sigma / 2.0) / (2.0 * std::f64::consts::PI * sigma * sigma);
         // At least a pixel: a voxel far smaller than that must still reach the nearest pixel's centre.
         let reach = (method.radius * in_pixels).max(1.0);
-        Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) }
+        let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0);
+        if !usable {
+            let what = "the kernel's weights are beyond numbers: choose another --sigma, --tau or --scale";
+            return Err(Error::usage(format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
+        }
+        Ok(Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) })
     }
 
     /// The weight w = exp(-tau z) f(0, 0) that a voxel at depth `z` has at its centre.
@@ -125,6 +130,7 @@ mod tests {
 
     fn footprint(scale: f64) -> Footprint {
         Footprint::new(Kernel { sigma: 0.75, tau: 0.1 }, &Grid::unit([4, 4, 4]), scale, Method::EXACT)
+            .expect("sensible numbers")
     }
 
     #[test]

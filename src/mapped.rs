@@ -31,7 +31,8 @@ pub enum Access {
 #[derive(Debug)]
 pub struct FileBytes {
     path: PathBuf,
-    file: File,
+    /// Closed once mapped: an archive may have more files than a process may hold open.
+    file: Option<File>,
     len: u64,
     modified: Option<SystemTime>,
     map: Option<RegisteredMap>,
@@ -51,6 +52,7 @@ impl FileBytes {
             Access::Map if len > 0 => Some(RegisteredMap::new(&file, path).map_err(|e| Error::io(path, "mapping", e))?),
             _ => None,
         };
+        let file = map.is_none().then_some(file);
         Ok(Self { path: path.into(), file, len, modified: meta.modified().ok(), map })
     }
 
@@ -76,9 +78,10 @@ impl FileBytes {
             let what = format!("bytes {offset}.. +{} lie beyond the end at {}", out.len(), self.len);
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
         };
-        match &self.map {
-            Some(map) => out.copy_from_slice(&map.bytes()[offset as usize..end as usize]),
-            None => self.file.read_exact_at(out, offset)?,
+        match (&self.map, &self.file) {
+            (Some(map), _) => out.copy_from_slice(&map.bytes()[offset as usize..end as usize]),
+            (None, Some(file)) => file.read_exact_at(out, offset)?,
+            (None, None) => {} // no bytes at all
         }
         Ok(())
     }
@@ -90,7 +93,7 @@ impl FileBytes {
 
     /// An error if the file's length or modification time is no longer what it was at open.
     pub fn check_unchanged(&self) -> Result<()> {
-        let now = self.file.metadata().map_err(|e| Error::io(&self.path, "checking", e))?;
+        let now = self.path.metadata().map_err(|e| Error::io(&self.path, "checking", e))?;
         if now.len() != self.len {
             let what = format!("changed while it was being read: {} bytes, now {}", self.len, now.len());
             return Err(Error::Changed { path: self.path.clone(), what });

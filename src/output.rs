@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// The name that stands for a standard stream.
@@ -29,11 +30,15 @@ enum Target {
 struct Part {
     path: PathBuf,
     replace: bool,
+    /// Complete, or renamed: no longer to be removed.
+    keep: bool,
 }
 
 impl Drop for Part {
     fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path); // gone already once committed
+        if !self.keep {
+            let _ = fs::remove_file(&self.path); // nobody is left to hear of a failure
+        }
     }
 }
 
@@ -49,13 +54,29 @@ impl Output {
             let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "opening", e))?;
             Target::Special(BufWriter::with_capacity(BUFFER, file))
         } else {
-            if path.exists() && !force {
-                return Err(Error::usage(format!("{}: exists already; --force replaces it", path.display())));
-            }
+            Self::check(path, force)?;
             let (file, part) = Part::create(path, force)?;
             Target::File(BufWriter::with_capacity(BUFFER, file), part)
         };
         Ok(Self { path: path.into(), target })
+    }
+
+    /// An error if a file cannot be made at `path`, as far as can be told without making it.
+    pub fn check(path: &Path, force: bool) -> Result<()> {
+        if path.is_dir() {
+            return Err(Error::usage(format!("{}: is a folder; name a file", path.display())));
+        }
+        if path.exists() && !force {
+            return Err(Error::usage(format!("{}: exists already; --force replaces it", path.display())));
+        }
+        match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            Some(folder) => {
+                let missing =
+                    io::Error::new(io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
+                Err(Error::io(path, "creating", missing))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The name for messages.
@@ -66,9 +87,11 @@ impl Output {
     /// Flushes everything and gives the file its final name.
     pub fn commit(mut self) -> Result<()> {
         self.flush().map_err(|e| Error::io(&self.path, "writing", e))?;
-        let Target::File(file, part) = &self.target else { return Ok(()) };
+        let Target::File(file, part) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
-        part.rename(&self.path).map_err(|e| Error::io(&self.path, "giving the finished file its name", e))
+        part.keep = true; // if its name cannot be given, the work must not be lost
+        let doing = || format!("giving the finished {} this name", part.path.display());
+        part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))
     }
 }
 
@@ -82,17 +105,23 @@ impl Part {
         name.push(".part");
         let part_path = PathBuf::from(name);
         let failed = |e| Error::io(path, "creating", e);
-        let file = File::options().write(true).create(true).truncate(false).open(&part_path).map_err(failed)?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(Error::usage(format!("{}: another program is writing it", path.display())));
+        loop {
+            let file = File::options().write(true).create(true).truncate(false).open(&part_path).map_err(failed)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::usage(format!("{}: another program is writing it", path.display())));
+                }
+                Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
+                Err(TryLockError::Error(e)) => return Err(failed(e)),
             }
-            Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(e)) => return Err(failed(e)),
+            // Between opening and locking, its last owner may have given the file its final name.
+            let is_it = |now: fs::Metadata| file.metadata().is_ok_and(|m| (m.dev(), m.ino()) == (now.dev(), now.ino()));
+            if fs::metadata(&part_path).is_ok_and(is_it) {
+                file.set_len(0).map_err(failed)?;
+                return Ok((file, Self { path: part_path, replace, keep: false }));
+            }
         }
-        file.set_len(0).map_err(failed)?;
-        Ok((file, Self { path: part_path, replace }))
     }
 
     fn rename(&self, path: &Path) -> io::Result<()> {
@@ -101,7 +130,8 @@ impl Part {
         } else {
             match fs::hard_link(&self.path, path) {
                 Err(e) if e.kind() != io::ErrorKind::AlreadyExists => fs::rename(&self.path, path)?, // no hard links here
-                linked => linked?,
+                Err(e) => return Err(e),
+                Ok(()) => fs::remove_file(&self.path)?,
             }
         }
         match path.parent() {

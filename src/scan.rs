@@ -43,23 +43,32 @@ pub(crate) fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Looks at every sample of a window; planes in parallel, joined in order. `declared` stands for a missing sample.
+/// Bytes of the rows that are looked at together. Fixed, since the digest depends on it.
+const RUN_BYTES: usize = 256 << 10;
+
+/// Looks at every sample of a window; runs of rows in parallel, joined in order. `declared` stands for a missing sample.
 pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declared: Option<f64>) -> Result<Scan> {
-    let plane_voxels = grid.dims[0] * grid.dims[1];
-    let planes: Result<Vec<Scan>> = (0..window.frames() * grid.dims[2])
-        .into_par_iter()
-        .map_init(Vec::new, |bytes, index| {
-            let (frame, z) = (index / grid.dims[2], index % grid.dims[2]);
-            let plane = Region { start: [0, 0, z], end: [grid.dims[0], grid.dims[1], z + 1] };
-            bytes.resize(plane_voxels * ty.size(), 0);
-            window.read_box(frame, &plane, bytes)?;
-            Ok(scan_plane(bytes, ty, declared, (frame, z * plane_voxels)))
-        })
-        .collect();
-    Ok(planes?.into_iter().fold(Scan::NOTHING, Scan::then))
+    let [nx, ny, nz] = grid.dims;
+    let rows = (RUN_BYTES / (nx * ty.size())).clamp(1, ny);
+    let runs_in_plane = ny.div_ceil(rows);
+    let mut seen = Scan::NOTHING;
+    for frame in 0..window.frames() {
+        let runs: Result<Vec<Scan>> = (0..nz * runs_in_plane)
+            .into_par_iter()
+            .map_init(Vec::new, |bytes, index| {
+                let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
+                let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
+                bytes.resize(run.voxels() * ty.size(), 0);
+                window.read_box(frame, &run, bytes)?;
+                Ok(scan_run(bytes, ty, declared, (frame, (z * ny + y) * nx)))
+            })
+            .collect();
+        seen = runs?.into_iter().fold(seen, Scan::then);
+    }
+    Ok(seen)
 }
 
-fn scan_plane(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
+fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
     sample::for_each_run(ty, bytes, |first, values| {
         if let Some(range) = sample::range_unless_missing(values, declared) {

@@ -35,15 +35,35 @@ pub struct Comparison {
     pub missing: u64,
     /// The largest error in units of its window's bound; 0 where both are 0.
     pub largest_share_of_bound: f64,
+    /// Where that was, if there was any error.
+    pub worst: Option<Place>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
     #[serde(skip)]
     squares: f64,
 }
 
+/// A sample of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Place {
+    /// The frame, counted from the file's first.
+    pub frame: usize,
+    /// The voxel: x, y, z, counted from the file's first.
+    pub voxel: [usize; 3],
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.voxel;
+        write!(f, "frame {}, x {x}, y {y}, z {z}", self.frame)
+    }
+}
+
 impl Comparison {
     fn join(self, other: Self) -> Self {
+        let worse = other.largest_share_of_bound > self.largest_share_of_bound;
         Self {
+            worst: if worse { other.worst } else { self.worst },
             samples: self.samples + other.samples,
             largest_error: self.largest_error.max(other.largest_error),
             rms_error: 0.0,
@@ -56,16 +76,20 @@ impl Comparison {
 }
 
 /// Checks every byte of the file, and with a source every sample; the source must give the frames and the region that
-/// were converted.
+/// were converted. `memory` is what may be allocated, if it is enough for one block.
 pub fn verify(
     file: &CoefficientFile,
     mut source: Option<&mut dyn FrameSource>,
+    memory: usize,
     progress: &dyn Progress,
 ) -> Result<VerifyReport> {
     progress.start(Some(file.metadata().blocks()));
     if let Some(source) = &source {
         same_shape(file, *source)?;
     }
+    // Codes and payload, both samples in their type and as numbers.
+    let block_bytes = file.largest_block() * (4 + 5 + 2 * (file.sample().size() + 8));
+    let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
     file.check_structure()?;
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
     let mut all = Comparison::default();
@@ -80,8 +104,10 @@ pub fn verify(
         for leaf in file.leaves(window) {
             let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
             let entries = file.leaf(leaf)?;
-            let found = entries.par_iter().map(check).collect::<Result<Vec<_>>>()?;
-            all = found.into_iter().fold(all, Comparison::join);
+            for entries in entries.chunks(at_once) {
+                let found = entries.par_iter().map(check).collect::<Result<Vec<_>>>()?;
+                all = found.into_iter().fold(all, Comparison::join);
+            }
             report.blocks += entries.len() as u64;
             progress.advance(entries.len() as u64);
         }
@@ -94,6 +120,9 @@ pub fn verify(
     }
     Ok(report)
 }
+
+/// Enough blocks to keep workers busy.
+const MOST_BLOCKS: usize = 64;
 
 fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
     let (a, b) = (source.archive(), file);
@@ -127,11 +156,17 @@ fn check_block(
     for (frame, bytes) in original.chunks_exact_mut(frame_bytes).enumerate() {
         source.read_box(frame, &region, bytes)?;
     }
-    Ok(compare(codec, &original, &decoded))
+    let first_frame = file.window_range(entry.id.window).start;
+    let place = |frame: usize, voxel: usize| {
+        let [nx, ny, _] = region.dims();
+        let inside = [voxel % nx, voxel / nx % ny, voxel / (nx * ny)];
+        Place { frame: first_frame + frame, voxel: std::array::from_fn(|a| region.start[a] + inside[a]) }
+    };
+    Ok(compare(codec, &original, &decoded, place))
 }
 
-/// Compares the samples of a block, `frame * voxels + voxel`.
-fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8]) -> Comparison {
+/// Compares the samples of a block, `frame * voxels + voxel`, each of which is at `place(frame, voxel)`.
+fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8], place: impl Fn(usize, usize) -> Place) -> Comparison {
     let size = codec.sample.size();
     let samples = original.len() / size;
     let voxels = samples / codec.frames();
@@ -148,7 +183,7 @@ fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8]) -> Comparison {
                 if same { 0.0 } else { error(x[i], y[i]) }
             })
             .collect();
-        add_series(codec, &errors, &mut found);
+        add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
     }
     found
 }
@@ -159,7 +194,7 @@ fn error(x: f64, y: f64) -> f64 {
     if e.is_nan() { f64::INFINITY } else { e }
 }
 
-fn add_series(codec: &WindowCodec, errors: &[f64], found: &mut Comparison) {
+fn add_series(codec: &WindowCodec, errors: &[f64], place: impl Fn(usize) -> Place, found: &mut Comparison) {
     let largest = errors.iter().copied().fold(0.0, f64::max);
     let squares: f64 = errors.iter().map(|e| e * e).sum();
     let reached = match codec.bound {
@@ -168,8 +203,10 @@ fn add_series(codec: &WindowCodec, errors: &[f64], found: &mut Comparison) {
     };
     found.largest_error = found.largest_error.max(largest);
     found.squares += squares;
-    if reached > 0.0 {
-        found.largest_share_of_bound = found.largest_share_of_bound.max(reached / codec.delta);
+    let share = reached / codec.delta;
+    if reached > 0.0 && share > found.largest_share_of_bound {
+        found.largest_share_of_bound = share;
+        found.worst = errors.iter().position(|e| *e == largest).map(place);
     }
     if !bound::holds(codec.bound, codec.delta, errors.iter().copied()) && largest > 0.0 {
         found.series_outside += 1;

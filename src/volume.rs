@@ -1,8 +1,6 @@
-//! Index arithmetic on lattices of voxels: regions, rows, blocks, windows. No I/O, no samples.
+//! Index arithmetic on lattices of voxels: regions, rows, blocks. No I/O, no samples.
 //!
 //! Triples are in the order x, y, z; arrays have x fastest, then y, z, and time slowest.
-
-use std::ops::Range;
 
 /// A lattice of voxels in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,14 +71,6 @@ impl Region {
     /// Whether every voxel of `other` is inside.
     pub fn contains(&self, other: &Self) -> bool {
         (0..3).all(|a| self.start[a] <= other.start[a] && other.end[a] <= self.end[a])
-    }
-
-    /// The same box with its coordinates counted from `origin`.
-    pub fn relative_to(&self, origin: [usize; 3]) -> Self {
-        Self {
-            start: std::array::from_fn(|a| self.start[a] - origin[a]),
-            end: std::array::from_fn(|a| self.end[a] - origin[a]),
-        }
     }
 
     /// The same box moved by `offset`.
@@ -161,12 +151,6 @@ impl BlockGrid {
     }
 }
 
-/// The frames of window `index` when `frames` are cut into windows of `len`; the last may be shorter.
-pub fn window_frames(index: usize, len: usize, frames: usize) -> Range<usize> {
-    let first = index * len;
-    first..(first + len).min(frames)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -195,11 +179,5 @@ mod tests {
             let slow: Vec<_> = (0..grid.len()).filter(|b| !grid.region(*b).intersect(&region).is_empty()).collect();
             assert_eq!(grid.touching(&region).collect::<Vec<_>>(), slow, "{region:?}");
         }
-    }
-
-    #[test]
-    fn windows_cover_all_frames() {
-        let all: Vec<_> = (0..3).flat_map(|w| window_frames(w, 4, 10)).collect();
-        assert_eq!(all, (0..10).collect::<Vec<_>>());
     }
 }

@@ -60,7 +60,7 @@ impl Case {
         let stored: Stored = stored(&mut memory, &config);
         let file = stored.open();
         let back = extracted(&file);
-        let report = verify(&file, Some(&mut memory), &Silent).unwrap().against.unwrap();
+        let report = verify(&file, Some(&mut memory), 64 << 20, &Silent).unwrap().against.unwrap();
         assert_eq!(report.series_outside, 0, "by verify: {self:?} {report:?}");
         let source = numbers(ty, &bytes);
         let missing: Vec<bool> = source.iter().map(|v| !v.is_finite() || Some(*v) == config.missing_value).collect();

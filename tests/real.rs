@@ -34,7 +34,7 @@ fn the_plate_keeps_its_bound_in_samples_and_pixels() {
             let file = stored(source.as_mut(), &settings(basis, window, tolerance));
             let (lo, hi) = file.report.range;
             assert!(file.report.output_bytes * 4 < file.report.input_bytes, "{:?}", file.report);
-            let against = verify(&file.open(), Some(source.as_mut()), &Silent).unwrap().against.unwrap();
+            let against = verify(&file.open(), Some(source.as_mut()), 64 << 20, &Silent).unwrap().against.unwrap();
             assert_eq!(against.series_outside, 0);
             assert!(against.largest_error <= tolerance * (hi - lo) && against.largest_error > 0.0);
             let mut scene = CoefficientScene::new(file.open(), What::Coefficients);

@@ -18,8 +18,8 @@ pub const MAX_LEVELS: usize = 32;
 /// Parts of one block: every level, outliers, missing samples, exact samples.
 pub const MAX_PARTS: usize = MAX_LEVELS + 3;
 
-/// Frames in one window: a block of one voxel row still fits [`MAX_BLOCK_SAMPLES`].
-pub const MAX_WINDOW_FRAMES: u32 = 4096;
+/// Frames in one window: 1024, and one for bases of an odd number; a basis as a matrix stays near 8 MiB.
+pub const MAX_WINDOW_FRAMES: u32 = 1025;
 
 /// Coefficients of one voxel in one window: a redundant basis has at most a few per frame.
 pub const MAX_COEFFICIENTS: u32 = 4 * MAX_WINDOW_FRAMES;

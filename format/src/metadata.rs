@@ -158,10 +158,11 @@ impl Metadata {
 
     fn check_windows(&self) -> Check {
         let mut next = 0u64;
+        let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));
         for (number, window) in self.windows.iter().enumerate() {
             let place = |what: String| format!("window {number}: {what}");
             ensure(window.first_frame == next, || place(format!("starts at {} not {next}", window.first_frame)))?;
-            window.check(self.largest_box()).map_err(place)?;
+            window.check(self.largest_box(), voxels_in_all).map_err(place)?;
             next = next.saturating_add(window.frames.into());
         }
         ensure(next == self.frames, || format!("windows cover {next} of {} frames", self.frames))
@@ -221,8 +222,8 @@ impl Metadata {
 }
 
 impl Window {
-    /// Whether it is within the limits for boxes of `voxels`.
-    fn check(&self, voxels: u64) -> Check {
+    /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
+    fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
         let Self { frames, coefficients, .. } = *self;
         ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames"))?;
         ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
@@ -231,6 +232,10 @@ impl Window {
         let levels = (1..=MAX_LEVELS).contains(&self.levels.len()) && !self.levels.contains(&0);
         let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
         ensure(levels && sum == coefficients.into(), || format!("{coefficients} coefficients in levels of {sum}"))?;
+        let counted = voxels_in_all.saturating_mul(frames.into());
+        let coded = voxels_in_all.saturating_mul(coefficients.into());
+        let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
+        ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
         let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
         ensure(errors && is_range(self.min, self.max), || "an error or value range out of range".into())
     }

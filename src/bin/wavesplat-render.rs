@@ -50,7 +50,7 @@ struct Cli {
     #[arg(long, value_name = "WxH", default_value = "512x512", help_heading = "View")]
     size: Whole<2>,
     /// Pixels per world unit [default: the whole volume fits]
-    #[arg(long, value_name = "S", help_heading = "View")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "View")]
     scale: Option<f64>,
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
@@ -62,14 +62,14 @@ struct Cli {
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
     /// Attenuation per world unit of depth
-    #[arg(long, value_name = "T", default_value_t = 0.0, help_heading = "Kernel")]
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
     tau: f64,
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
-    #[arg(long, value_name = "S", help_heading = "Kernel")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
     sigma: Option<f64>,
     /// What splatting may add to the error, relative to the range; 0 asks for the exact method
     /// [default: a tenth of the file's tolerance; 1e-4 for frames]
-    #[arg(long, value_name = "E", help_heading = "Kernel")]
+    #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
     /// What a pixel means
     #[arg(long, value_enum, default_value = "mean")]
@@ -133,7 +133,7 @@ impl Cli {
             SinkConfig {
                 format,
                 size: config.view.size,
-                frames: config.frames.len(),
+                frames: config.frames.clone(),
                 fps: self.fps,
                 colours,
                 coloured_array: self.colormap.is_some(),
@@ -163,6 +163,7 @@ impl Cli {
         if let [only] = self.inputs.as_slice()
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
         {
+            self.input.refuse_for_coefficients()?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let tolerance = file.metadata().tolerance;
             let what = if coefficients { What::Coefficients } else { What::Samples };

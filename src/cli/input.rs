@@ -1,7 +1,7 @@
 //! Options that say how an archive is read.
 
 use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mapped::Access;
 use crate::sample::SampleType;
 use crate::source::{self, FrameSource, OpenOptions, Selection};
@@ -50,6 +50,24 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
+    /// An error if any option says how frames are read, which a coefficient file knows itself.
+    pub fn refuse_for_coefficients(&self) -> Result<()> {
+        let given = [
+            (self.dims.is_some(), "--dims"),
+            (self.dtype.is_some(), "--dtype"),
+            (self.endian == Endian::Big, "--endian"),
+            (self.offset > 0, "--offset"),
+            (self.variable.is_some(), "--variable"),
+            (self.spacing.is_some(), "--spacing"),
+            (self.origin.is_some(), "--origin"),
+            (self.allow_gaps, "--allow-gaps"),
+        ];
+        match given.into_iter().find(|(given, _)| *given) {
+            Some((_, name)) => Err(Error::usage(format!("{name}: is for frames; a coefficient file knows it itself"))),
+            None => Ok(()),
+        }
+    }
+
     /// How the bytes of files are reached.
     pub fn access(&self) -> Access {
         if self.no_mmap { Access::Read } else { Access::Map }

@@ -71,8 +71,8 @@ impl WindowReader<'_> {
         self.refuse_missing(window, first, &seen)?;
         let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
         self.range = Some(range);
-        let delta = bound::voxel_bound(config.tolerance, config.range.unwrap_or(range));
-        let delta = if delta.is_finite() { delta.max(0.0) } else { 0.0 }; // nothing but missing samples so far
+        let (lo, hi) = config.range.unwrap_or(range);
+        let delta = if lo <= hi { bound::voxel_bound(config.tolerance, (lo, hi)) } else { 0.0 }; // all missing so far
         let basis = wavelet::basis(config.basis, window.frames());
         let mut codec = WindowCodec::new(basis, ty, config.bound, delta, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
@@ -107,10 +107,10 @@ impl WindowReader<'_> {
         out: &Sender<Batch>,
         busy: &mut Duration,
     ) -> Result<bool> {
-        let all: Vec<usize> = (0..self.plan.blocks.len()).collect();
-        for numbers in all.chunks(self.plan.batch) {
+        let (all, batch) = (self.plan.blocks.len(), self.plan.batch);
+        for first in (0..all).step_by(batch) {
             let started = Instant::now();
-            let blocks: Result<_> = numbers.iter().map(|b| self.gather(window, job, *b)).collect();
+            let blocks: Result<_> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
             let batch = Batch { window: job.clone(), blocks: blocks? };
             *busy += started.elapsed();
             if out.send(batch).is_err() {

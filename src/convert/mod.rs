@@ -167,6 +167,9 @@ impl Plan {
             return Err(Error::usage(format!("--block {edge}: a block holds 1 to {most} samples over a window")));
         }
         let blocks = BlockGrid { dims: archive.grid.dims, edge };
+        if u32::try_from(blocks.len()).is_err() {
+            return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
+        }
         let batch = batch_len(config, blocks, archive.sample)?;
         Ok(Self { blocks, batch })
     }
@@ -179,12 +182,11 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let raw = samples * sample.size();
     let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
     let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
-    let needs = |batch: &usize| {
-        batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY + config.reserved
-    };
-    let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) <= config.memory);
+    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY;
+    let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {
-        let (least, edge) = (needs(&1).div_ceil(1 << 20), blocks.edge);
+        let share = config.memory as f64 / config.memory.saturating_sub(config.reserved).max(1) as f64;
+        let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
         let window = config.window;
         Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))
     })
@@ -192,6 +194,7 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
 
 /// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
+const MIB: f64 = 1_048_576.0;
 /// Program, stacks and directories.
 const FIXED_MEMORY: usize = 8 << 20;
 /// Enough to keep workers busy; more only delays the first output.

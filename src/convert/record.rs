@@ -36,7 +36,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             variable: archive.variable.clone(),
             bound: config.bound,
             tolerance: config.tolerance,
-            range: config.range.unwrap_or((0.0, 0.0)),
+            range: config.range.unwrap_or((f64::INFINITY, f64::NEG_INFINITY)),
             missing_value: config.missing_value,
             windows: Vec::new(),
             settings: config.settings.clone(),

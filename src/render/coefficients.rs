@@ -61,9 +61,9 @@ impl Scene for CoefficientScene {
 
     fn block_bytes(&self) -> usize {
         let windows = &self.file.metadata().windows;
-        let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
-        // Codes, payload and samples, and a term of ten bytes for each.
-        self.file.blocks.region(0).voxels() * longest * (4 + 5 + 8 + 10)
+        // Codes, payload and samples, and a term of ten bytes for each; where samples are missing, a mask and overrides.
+        let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
+        self.file.largest_block() * (4 + 5 + 8 + 10 + missing)
     }
 
     fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>> {
@@ -95,17 +95,14 @@ impl<'a> CoefficientGroup<'a> {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let (mut coded, mut exact) = (0, 0);
-        for leaf in file.leaves(window) {
-            coded += leaf.coded;
-            exact += u64::from(leaf.exact);
-        }
+        let coded = file.leaves(window).iter().any(|leaf| leaf.coded > 0);
+        let exact = file.leaves(window).iter().any(|leaf| leaf.exact > 0);
         let record = &file.metadata().windows[window as usize];
         let samples = what == What::Samples;
         let layout = Layout {
-            coefficients: if samples || coded == 0 { 0 } else { kept.len() },
+            coefficients: if samples || !coded { 0 } else { kept.len() },
             frames: frames.len(),
-            values: samples || exact + record.outliers + record.missing > 0,
+            values: samples || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
         };
         Ok(Self { file, what, window, codec, frames, wanted, kept, layout, leaf: Mutex::default() })

@@ -34,7 +34,7 @@ use scene::{Group, Layout, Terms};
 use serde::Serialize;
 use splat::{Splats, Tile, overlap, rows_reached};
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use weights::Weights;
 
 /// What a pixel means (method.md section 2).
@@ -111,29 +111,36 @@ pub fn render(
     progress: &dyn Progress,
     sink: &mut dyn FnMut(usize, Picture<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
-    let budget = Budget::new(config.memory, config.view.size, scene)?;
+    let started = Instant::now();
+    let mut sink_time = Duration::ZERO;
     let (eye, method) = Eye::new(scene, config)?;
+    let budget = Budget::new(config.memory, config.view.size, scene)?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
     report.stated_splat_error = method.stated_error * mean_factor(config.quantity);
     let mut clock = Instant::now();
-    let weights = Weights::new(&eye, config.kernel, &budget)?;
+    let weights = match config.quantity {
+        Quantity::Mean => Some(Weights::new(&eye, config.kernel, &budget)?),
+        Quantity::Emission => None,
+    };
     lap(&mut clock, &mut report.weight_seconds);
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
         let end = scene.group_end(*first);
         let most = rest.partition_point(|f| *f < end);
         let (now, later) = rest.split_at(budget.frames(scene, most));
-        let pictures = render_group(scene.group(now)?.as_ref(), &eye, &weights, config.quantity, &budget, &mut report)?;
+        let pictures = render_group(scene.group(now)?.as_ref(), &eye, weights.as_ref(), &budget, &mut report)?;
         for (frame, picture) in now.iter().zip(pictures.chunks_exact(eye.pixels())) {
+            let writing = Instant::now();
             sink(*frame, picture)?;
+            sink_time += writing.elapsed();
             progress.advance(1);
         }
         report.frames += now.len();
         rest = later;
     }
     progress.finish();
-    report.seconds = report.weight_seconds + report.decode_seconds + report.splat_seconds + report.inverse_seconds;
+    report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
 }
 
@@ -172,7 +179,7 @@ impl Eye {
         }
         let method = Method::within(config.splat_error / mean_factor(config.quantity));
         let camera = Camera::new(&config.view, &grid)?;
-        let footprint = Footprint::new(config.kernel, &grid, camera.scale, method);
+        let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
         Ok((Self { camera, footprint, grid, blocks, clip }, method))
     }
 
@@ -220,8 +227,7 @@ impl Eye {
 fn render_group(
     group: &dyn Group,
     eye: &Eye,
-    weights: &Weights,
-    quantity: Quantity,
+    weights: Option<&Weights>,
     budget: &Budget,
     report: &mut RenderReport,
 ) -> Result<Vec<f32>> {
@@ -237,7 +243,7 @@ fn render_group(
         let mut tiles = eye.tiles(rows.clone(), layout.planes());
         eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
         let mut clock = Instant::now();
-        tiles.par_iter_mut().for_each(|tile| finish(tile, group, &layout, weights, quantity));
+        tiles.par_iter_mut().for_each(|tile| finish(tile, group, &layout, weights));
         tiles.iter().for_each(|tile| paste(tile, layout.frames, eye, &mut pictures));
         lap(&mut clock, &mut report.inverse_seconds);
     }
@@ -246,7 +252,7 @@ fn render_group(
 }
 
 /// Turns the planes of a tile into its pixels: the first `layout.frames` planes become the frames.
-fn finish(tile: &mut Tile, group: &dyn Group, layout: &Layout, weights: &Weights, quantity: Quantity) {
+fn finish(tile: &mut Tile, group: &dyn Group, layout: &Layout, weights: Option<&Weights>) {
     let pixels = tile.pixels();
     let mut planes = vec![Lane::default(); layout.planes()];
     let mut frames = vec![Lane::default(); layout.frames];
@@ -260,10 +266,9 @@ fn finish(tile: &mut Tile, group: &dyn Group, layout: &Layout, weights: &Weights
         group.reconstruct(&mut planes, &mut frames);
         for (f, emission) in frames.iter().enumerate() {
             for l in 0..count {
-                let at = weights.at(tile, first + l);
-                out[f * pixels + first + l] = match quantity {
-                    Quantity::Mean => at.mean(emission[l], absent[f][l]),
-                    Quantity::Emission => emission[l],
+                out[f * pixels + first + l] = match weights {
+                    Some(weights) => weights.at(tile, first + l).mean(emission[l], absent[f][l]),
+                    None => emission[l],
                 };
             }
         }

@@ -49,10 +49,8 @@ impl Budget {
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
         let fits = |f: &usize| {
-            let planes =
-                self.row_bytes(scene.most_planes(*f)).max(self.size[1].div_ceil(TILE).min(4) * self.row_bytes(1));
-            self.picture_bytes(*f) <= self.available / 3
-                && planes + self.picture_bytes(*f) + self.block_bytes <= self.available
+            let rows = self.row_bytes(scene.most_planes(*f)) * self.size[1].div_ceil(TILE).min(FEW_ROWS);
+            self.picture_bytes(*f) + rows + self.block_bytes <= self.available
         };
         (1..=most).rev().find(fits).unwrap_or(1)
     }
@@ -71,5 +69,7 @@ impl Budget {
     }
 }
 
+/// Rows of tiles that a band should have: blocks that reach over a band's edge are decoded for both.
+const FEW_ROWS: usize = 4;
 /// Enough blocks to keep workers busy.
 const MOST_BLOCKS: usize = 64;

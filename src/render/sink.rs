@@ -4,7 +4,7 @@ use super::Picture;
 use super::colour::ColourMap;
 use crate::error::{Error, Result};
 use crate::npy;
-use crate::output::Output;
+use crate::output::{Output, STANDARD};
 use crate::sample::SampleType;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -37,8 +37,8 @@ pub struct SinkConfig {
     pub format: PictureFormat,
     /// Width and height.
     pub size: [usize; 2],
-    /// How many there will be.
-    pub frames: usize,
+    /// Which frames there will be.
+    pub frames: Vec<usize>,
     /// Frames a second, where the format says it.
     pub fps: u32,
     /// Values to colours.
@@ -51,31 +51,43 @@ pub struct SinkConfig {
 
 /// Where pictures go.
 #[derive(Debug)]
-pub enum Sink {
-    /// To one file or stream.
-    One(Box<Output>, SinkConfig),
-    /// Each to a file of its own, named by [`Numbered`].
-    Many(Numbered, SinkConfig),
+pub struct Sink {
+    target: Target,
+    config: SinkConfig,
+}
+
+#[derive(Debug)]
+enum Target {
+    /// One file or stream; what comes before the first picture is written with it, so that a request that cannot be
+    /// met leaves a pipe empty.
+    One { out: Box<Output>, begun: bool },
+    /// A file for each.
+    Many(Numbered),
 }
 
 impl Sink {
     /// Opens `path`: `-`, a file, or a pattern as `frame_%04d.png` that numbers PNG files.
     pub fn open(path: &Path, config: SinkConfig) -> Result<Self> {
-        if config.format == PictureFormat::Png && path != Path::new(crate::output::STANDARD) {
-            return Ok(Self::Many(Numbered::new(path, config.frames)?, config));
-        }
-        let mut out = Output::create(path, config.force)?;
-        begin(&config, &mut out).map_err(|e| Error::io(path, "writing", e))?;
-        Ok(Self::One(Box::new(out), config))
+        let target = if config.format == PictureFormat::Png && path != Path::new(STANDARD) {
+            let names = Numbered::new(path, config.frames.len())?;
+            config.frames.iter().try_for_each(|frame| Output::check(&names.of(*frame), config.force))?;
+            Target::Many(names)
+        } else {
+            Target::One { out: Box::new(Output::create(path, config.force)?), begun: false }
+        };
+        Ok(Self { target, config })
     }
 
     /// Writes the picture of a frame.
     pub fn picture(&mut self, frame: usize, picture: Picture<'_>) -> Result<()> {
-        match self {
-            Self::One(out, config) => {
-                write(config, picture, out).map_err(|e| Error::io(out.path(), format!("writing frame {frame}"), e))
+        let config = &self.config;
+        match &mut self.target {
+            Target::One { out, begun } => {
+                let header = if std::mem::replace(begun, true) { Ok(()) } else { begin(config, out) };
+                let written = header.and_then(|()| write(config, picture, out));
+                written.map_err(|e| Error::io(out.path(), format!("writing frame {frame}"), e))
             }
-            Self::Many(names, config) => {
+            Target::Many(names) => {
                 let path = names.of(frame);
                 let mut out = Output::create(&path, config.force)?;
                 write(config, picture, &mut out).map_err(|e| Error::io(&path, "writing", e))?;
@@ -86,16 +98,16 @@ impl Sink {
 
     /// Ends the stream and gives the file its final name.
     pub fn finish(self) -> Result<()> {
-        match self {
-            Self::One(out, _) => out.commit(),
-            Self::Many(..) => Ok(()),
+        match self.target {
+            Target::One { out, .. } => out.commit(),
+            Target::Many(_) => Ok(()),
         }
     }
 }
 
 /// Names of numbered files.
 #[derive(Debug)]
-pub struct Numbered {
+struct Numbered {
     before: String,
     after: String,
     /// Digits of the number; none: there is but one file.
@@ -137,9 +149,9 @@ fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
     let [width, height] = config.size;
     match config.format {
         PictureFormat::Npy if config.coloured_array => {
-            npy::write_header(SampleType::U8, &[config.frames, height, width, 3], out)
+            npy::write_header(SampleType::U8, &[config.frames.len(), height, width, 3], out)
         }
-        PictureFormat::Npy => npy::write_header(SampleType::F32, &[config.frames, height, width], out),
+        PictureFormat::Npy => npy::write_header(SampleType::F32, &[config.frames.len(), height, width], out),
         PictureFormat::Y4m => {
             writeln!(out, "YUV4MPEG2 W{width} H{height} F{}:1 Ip A1:1 C444 XCOLORRANGE=FULL", config.fps)
         }
@@ -172,9 +184,17 @@ fn write_png(size: [usize; 2], rgb: &[u8], out: &mut impl Write) -> io::Result<(
     let mut encoder = png::Encoder::new(out, size[0] as u32, size[1] as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb)?;
-    Ok(writer.finish()?)
+    let mut writer = encoder.write_header().map_err(cause)?;
+    writer.write_image_data(rgb).map_err(cause)?;
+    writer.finish().map_err(cause)
+}
+
+/// What the system said, whose kind tells a broken pipe from other failures.
+fn cause(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(e) => e,
+        other => io::Error::other(other),
+    }
 }
 
 /// Full-range BT.601, what players assume of a stream that does not say more.

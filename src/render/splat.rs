@@ -108,9 +108,8 @@ impl Splats {
         footprint: &Footprint,
     ) -> Self {
         let mut voxels = Vec::new();
-        let whole = region.relative_to(region.start);
         for v in region.intersect(clip).iter() {
-            let index = whole.index(std::array::from_fn(|a| v[a] - region.start[a]));
+            let index = region.index(v);
             if !terms.of_voxel(index).0.is_empty() {
                 let [x, y, z] = camera.project(grid.position(v));
                 voxels.push(Splat { index, x, y, weight: footprint.at_depth(z) });

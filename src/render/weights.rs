@@ -40,7 +40,7 @@ impl Weights {
     /// Splats a 1 for every voxel.
     pub(super) fn new(eye: &Eye, kernel: Kernel, budget: &Budget) -> Result<Self> {
         let sums = sums(eye, budget)?;
-        let exact = Footprint::new(kernel, &eye.grid, eye.camera.scale, Method::EXACT);
+        let exact = Footprint::new(kernel, &eye.grid, eye.camera.scale, Method::EXACT)?;
         let uncut = if eye.footprint.reach < exact.reach {
             self::sums(&Eye { footprint: exact, ..eye.clone() }, budget)?
         } else {

@@ -1,107 +1,132 @@
-//! Runs that fail: a message with file, place and reason, the right exit code, nothing under the final name.
+//! Inputs and outputs that fail: the code, a message with file, place and reason, and nothing left behind.
 
-use super::{Bench, raw};
-use std::fs;
+use super::{Archive, Work, npy, npy_ordered, small};
 
-/// Runs, and checks exit code and message; the folder must hold nothing new.
-fn fails(b: &Bench, program: &str, args: &str, code: i32, says: &[&str]) {
-    let before = b.names();
-    let said = b.run(program, args);
-    assert_eq!(said.code, code, "{args}: {}", said.err);
-    for part in says {
-        assert!(said.err.contains(part), "{args}: '{part}' is not in: {}", said.err);
+#[test]
+fn inputs_that_are_not_what_they_say_give_code_3() {
+    let work = Work::new();
+    let archive = small();
+    work.write("a.raw", archive.bytes());
+    work.write("short.npy", &archive.npy()[..20_000]);
+    work.write("header.npy", &archive.npy()[..60]);
+    work.write("fortran.npy", npy_ordered("<f4", "40, 10, 14, 20", "True", &archive.bytes()));
+    work.write("complex.npy", npy("<c8", "20, 10, 14, 20", &archive.bytes()));
+    work.write("flat.npy", npy("<f4", "112000,", &archive.bytes()));
+    work.write("foreign.npy", "not an array at all, but text with this name");
+    work.write("empty.npy", "");
+    let cases: [(&str, &[&str]); 10] = [
+        ("a.raw --dims 20x14x11x40 --dtype f32", &["a.raw", "expected 492800", "found 448000"]),
+        ("a.raw --dims 20x14x10 --dtype f32", &["a.raw", "--dims 20x14x10x40"]),
+        ("a.raw --dims 20x14x10x40 --dtype f64", &["a.raw", "found 448000", "20 whole frame(s)"]),
+        ("short.npy", &["short.npy", "expected 448128", "found 20000"]),
+        ("header.npy", &["header.npy", "header"]),
+        ("fortran.npy", &["fortran.npy", "Fortran", "ascontiguousarray"]),
+        ("complex.npy", &["complex.npy", "f4"]),
+        ("flat.npy", &["flat.npy", "(t, z, y, x)"]),
+        ("foreign.npy", &["foreign.npy", "npy"]),
+        ("empty.npy", &["empty.npy"]),
+    ];
+    let names = work.names();
+    for (input, words) in cases {
+        work.wavesplat(&format!("convert {input} -o out.wspl")).fails(3, words);
+        assert_eq!(work.names(), names, "{input}");
     }
-    assert_eq!(b.names(), before, "{args}");
 }
 
 #[test]
-fn damaged_files_are_refused() {
-    let b = Bench::new(5);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    let whole = b.bytes("a.wspl");
-    for len in [0, 1, 7, 100, 128, 500, whole.len() - 200, whole.len() - 1] {
-        fs::write(b.path("cut.wspl"), &whole[..len]).unwrap();
-        fails(&b, "wavesplat", "info cut.wspl", 3, &["cut.wspl"]);
-        fails(&b, "wavesplat-render", "cut.wspl -o x.npy", 3, &["cut.wspl"]);
+fn frames_that_do_not_belong_together_give_code_3() {
+    let (work, archive) = (Work::new(), Archive::smooth([9, 8, 7], 6));
+    archive.write_frames(&work, "frames");
+    std::fs::remove_file(work.path("frames/f_3.npy")).unwrap();
+    work.wavesplat("convert frames -o out.wspl").fails(3, &["f_2.npy", "f_4.npy", "missing", "--allow-gaps"]);
+    work.wavesplat("convert frames -o out.wspl --allow-gaps").ok();
+    work.write("frames/f_3.npy", Archive::smooth([9, 8, 6], 1).frame_npy(0));
+    work.wavesplat("convert frames -o out.wspl --force").fails(3, &["f_3.npy", "9x8x6", "9x8x7", "f_0.npy"]);
+    work.write("frames/f_3.npy", npy("<f8", "7, 8, 9", &[0; 9 * 8 * 7 * 8]));
+    work.wavesplat("convert frames -o out.wspl --force").fails(3, &["f_3.npy", "f64", "f32"]);
+    work.write("frames/other.raw", "x");
+    assert_eq!(work.names(), ["frames", "out.wspl"]);
+}
+
+#[test]
+fn files_that_are_not_there_give_code_1() {
+    let work = Work::with_file("");
+    work.wavesplat("convert absent.npy -o out.wspl").fails(1, &["absent.npy", "No such file"]);
+    work.wavesplat("convert a.npy absent.npy -o out.wspl").fails(1, &["absent.npy", "No such file"]);
+    for command in ["info absent.wspl", "verify absent.wspl", "extract absent.wspl -o b.npy"] {
+        work.wavesplat(command).fails(1, &["absent.wspl", "No such file"]);
     }
-    for place in (0..whole.len()).step_by(whole.len() / 60) {
-        let mut flipped = whole.clone();
-        flipped[place] ^= 1 << (place % 8);
-        fs::write(b.path("flipped.wspl"), &flipped).unwrap();
-        fails(&b, "wavesplat", "verify flipped.wspl", 3, &["flipped.wspl"]);
+    work.render("absent.wspl -o b.npy").fails(1, &["absent.wspl", "No such file"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
+}
+
+#[test]
+fn outputs_that_cannot_be_written_give_code_1() {
+    let work = Work::with_file("");
+    for place in ["a.npy/out", "absent/out", "/proc/out"] {
+        work.wavesplat(&format!("convert a.npy -o {place}.wspl")).fails(1, &[place]);
+        work.wavesplat(&format!("extract a.wspl -o {place}.npy")).fails(1, &[place]);
+        work.render(&format!("a.wspl --size 20x20 -o {place}.npy")).fails(1, &[place]);
+        work.render(&format!("a.wspl --size 20x20 -o {place}_%d.png")).fails(1, &[place]);
     }
-    fs::write(b.path("foreign.wspl"), "a text, and nothing else").unwrap();
-    fails(&b, "wavesplat", "verify foreign.wspl", 3, &["foreign.wspl", "not a wavesplat coefficient file"]);
-    fails(&b, "wavesplat-render", "frames -o x.npy", 2, &["--method direct"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
 }
 
+#[cfg(target_os = "linux")]
 #[test]
-fn frames_that_do_not_fit_are_refused() {
-    let b = Bench::new(6);
-    fs::write(b.path("all.raw"), raw(6)).unwrap();
-    fails(&b, "wavesplat", "convert all.raw --dims 11x9x8x6 --dtype f32 -o x.wspl", 3, &["all.raw", "bytes"]);
-    fails(&b, "wavesplat", "convert all.raw -o x.wspl", 2, &["all.raw", "--dims"]);
-    fails(&b, "wavesplat", "convert frames/frame_0000.npy no.npy -o x.wspl", 1, &["no.npy", "No such file"]);
-    b.write_npy("frames/frame_0003.npy", &[7, 9, 10], &vec![0.0; 630]);
-    fails(&b, "wavesplat", "convert frames -o x.wspl", 3, &["frame_0003.npy", "10x9x7"]);
-    fs::remove_file(b.path("frames/frame_0003.npy")).unwrap();
-    fails(&b, "wavesplat", "convert frames -o x.wspl", 3, &["frame_0002.npy", "frame_0004.npy", "missing"]);
-    b.done("wavesplat", "convert frames -o gap.wspl --allow-gaps");
-}
-
-#[test]
-fn outputs_that_cannot_be_written_leave_nothing() {
-    let b = Bench::new(2);
-    fails(&b, "wavesplat", "convert frames -o no/x.wspl", 1, &["no/x.wspl", "No such file"]);
-    fails(&b, "wavesplat", "convert frames -o frames/frame_0000.npy/x.wspl", 1, &["x.wspl"]);
-    fails(&b, "wavesplat", "convert frames -o /dev/full", 1, &["/dev/full", "No space left"]);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    fails(&b, "wavesplat", "extract a.wspl -o /dev/full --format raw", 1, &["/dev/full", "No space left"]);
-    fails(&b, "wavesplat-render", "a.wspl -o /dev/full --format npy", 1, &["/dev/full", "No space left"]);
-    fails(&b, "wavesplat", "convert frames -o a.wspl", 2, &["a.wspl", "--force"]);
-    b.done("wavesplat", "convert frames -o a.wspl --force --tolerance 0");
-    fails(&b, "wavesplat-render", "a.wspl -o x.png", 2, &["x.png", "%04d"]);
-}
-
-#[test]
-fn options_that_make_no_sense_are_usage_errors() {
-    let b = Bench::new(2);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    for options in [
-        "--tolerance -1",
-        "--tolerance nan",
-        "--window 30",
-        "--window 0",
-        "--basis multi --window 32",
-        "--range 2,1",
-        "--region 0:99,:,:",
-        "--frames 7:9",
-        "--memory 1KiB",
-        "--memory lots",
-        "--block 0",
-        "--block 999",
-        "--level 99",
-        "--bound l7",
+fn a_full_disk_gives_code_1() {
+    let work = Work::with_file("--tolerance 0");
+    let reason = ["/dev/full", "No space left"];
+    work.wavesplat("convert a.npy -o /dev/full").fails(1, &reason);
+    work.wavesplat("extract a.wspl -o /dev/full --format raw").fails(1, &reason);
+    work.render("a.wspl --size 20x20 -o /dev/full --format npy").fails(1, &reason);
+    for line in [
+        "$WAVESPLAT convert a.npy -o -",
+        "$WAVESPLAT extract a.wspl -o -",
+        "$WAVESPLAT info a.wspl",
+        "$WAVESPLAT verify a.wspl",
+        "$RENDER a.wspl -o -",
     ] {
-        fails(&b, "wavesplat", &format!("convert frames -o x.wspl {options}"), 2, &[]);
+        work.shell(&format!("{line} > /dev/full")).fails(1, &["-: ", "No space left"]);
     }
-    for options in [
-        "--view x",
-        "--view 1,inf",
-        "--size 0x5",
-        "--size 99999x5",
-        "--scale -1",
-        "--sigma 0",
-        "--tau -1",
-        "--splat-error -1",
-        "--colormap no",
-        "--range 1,0",
-        "--background white",
-        "--frames 9",
-        "--region 5:5,:,:",
-        "--memory 1MiB",
-        "--format bmp",
-    ] {
-        fails(&b, "wavesplat-render", &format!("a.wspl -o x_%d.png {options}"), 2, &[]);
+}
+
+#[test]
+fn missing_values_are_refused_with_their_place_or_kept() {
+    let (work, mut archive) = (Work::new(), small());
+    let at = |x: usize, y: usize, z: usize, t: usize| t * 2800 + (z * 14 + y) * 20 + x;
+    archive.values[at(4, 5, 6, 33)] = f32::NAN;
+    archive.values[at(5, 5, 6, 33)] = f32::NEG_INFINITY;
+    archive.values[at(0, 0, 9, 39)] = f32::NAN;
+    work.write("nan.npy", archive.npy());
+    let place = ["nan.npy", "frame 33", "x 4, y 5, z 6", "first of 3", "--missing mask"];
+    work.wavesplat("convert nan.npy -o out.wspl").fails(3, &place);
+    work.piped("convert - -o out.wspl", &archive.npy()).fails(3, &["frame 33", "x 4, y 5, z 6", "first of 3"]);
+    assert_eq!(work.names(), ["nan.npy"]);
+    work.wavesplat("convert nan.npy -o out.wspl --missing mask").ok();
+    let report = work.wavesplat("verify out.wspl --against nan.npy --json").ok().json();
+    assert_eq!(report["against"]["missing"], 3);
+    work.wavesplat("extract out.wspl -o out.raw").ok();
+    let decoded = work.read("out.raw");
+    for i in [at(4, 5, 6, 33), at(5, 5, 6, 33), at(0, 0, 9, 39)] {
+        assert_eq!(decoded[4 * i..][..4], archive.values[i].to_le_bytes(), "the same bits");
     }
+    work.write("all.npy", npy("<f4", "9, 4, 4, 4", &f32::NAN.to_le_bytes().repeat(9 * 64)));
+    work.wavesplat("convert all.npy -o all.wspl --missing mask").ok();
+    work.wavesplat("verify all.wspl --against all.npy").ok();
+    work.wavesplat("info all.wspl --json").ok().json();
+    work.render("all.wspl --size 20x20 -o all_%d.png").ok();
+}
+
+#[test]
+fn a_declared_missing_value_is_kept() {
+    let (work, mut archive) = (Work::new(), small());
+    archive.values[1234] = -999.0;
+    work.write("a.npy", archive.npy());
+    work.wavesplat("convert a.npy -o out.wspl --missing-value -999 --missing error")
+        .fails(3, &["frame 0", "--missing mask"]);
+    work.wavesplat("convert a.npy -o out.wspl --missing-value -999").ok();
+    assert_eq!(work.wavesplat("info out.wspl --json").ok().json()["missing"], 1);
+    assert!(work.wavesplat("info out.wspl --json").ok().json()["value_range"][0].as_f64().unwrap() > -2.0);
+    work.wavesplat("verify out.wspl --against a.npy").ok();
 }

@@ -1,47 +1,51 @@
-//! `--memory` is a promise: programs run under a hard limit of the system on what they allocate.
+//! The budget holds: archives twenty times its size, under a limit of the system.
+#![cfg(target_os = "linux")]
 
-use super::{Bench, program_path};
+use super::Work;
 use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::process::Command;
+use std::os::unix::fs::FileExt;
 
-/// Bytes of the budget, and what a process takes beside it: stacks, the allocator's slack, the program's own data.
-const MEMORY_MIB: usize = 24;
-const BESIDE_MIB: usize = 24;
+/// What the programs may take besides `--memory`: code, stacks, the allocator's slack.
+const SLACK_MIB: usize = 40;
 
-/// Runs a command line in which PROGRAMS stand for paths, with the size of the data segment limited.
-fn limited(b: &Bench, line: &str) {
-    let [wavesplat, render] = ["wavesplat", "wavesplat-render"].map(|p| program_path(p).to_str().unwrap());
-    let line = line.replace("RENDER", render).replace("WAVESPLAT", wavesplat);
-    let kib = (MEMORY_MIB + BESIDE_MIB) * 1024;
-    let script = format!("set -e; ulimit -d {kib}; {line}");
-    let output = Command::new("bash").args(["-c", &script]).current_dir(b.path("")).output().unwrap();
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+/// A sparse archive with some structure in every frame.
+fn write_sparse(work: &Work, name: &str, [nx, ny, nz, nt]: [usize; 4]) {
+    let file = File::create(work.path(name)).unwrap();
+    file.set_len((nx * ny * nz * nt) as u64).unwrap();
+    let slab: Vec<u8> = (0..nx * ny * 4).map(|i| (100.0 + 90.0 * (i as f32 * 0.001).sin()) as u8).collect();
+    for t in 0..nt {
+        let z = (3 * t) % (nz - 4);
+        file.write_all_at(&slab, ((t * nz + z) * nx * ny) as u64).unwrap();
+    }
 }
 
 #[test]
-fn an_archive_twenty_times_the_budget_stays_within_it() {
-    let b = Bench::new(0);
-    let mut out = BufWriter::new(File::create(b.path("all.raw")).unwrap());
-    let [nx, ny, nz] = [64, 64, 32];
-    let frames = ((20 * MEMORY_MIB) << 20) / (nx * ny * nz * 4);
-    for t in 0..frames {
-        let value = |i: usize| ((i / nx % ny + t / 2) % 251) as f32;
-        let frame: Vec<u8> = (0..nx * ny * nz).flat_map(|i| value(i).to_le_bytes()).collect();
-        out.write_all(&frame).unwrap();
-    }
-    drop(out);
-    let options = format!("--threads 2 --memory {MEMORY_MIB}MiB");
-    limited(
-        &b,
-        &format!("WAVESPLAT convert all.raw --dtype f32 --dims {nx}x{ny}x{nz}x{frames} -o a.wspl --block 16 {options}"),
-    );
-    limited(
-        &b,
-        &format!("cat all.raw | WAVESPLAT convert - --dtype f32 --dims {nx}x{ny}x{nz} -o p.wspl --block 16 {options}"),
-    );
-    assert_eq!(b.bytes("a.wspl"), b.bytes("p.wspl"));
-    limited(&b, &format!("RENDER a.wspl -o a.npy --size 100x100 --frames 0:200:3 {options}"));
-    limited(&b, &format!("WAVESPLAT extract a.wspl -o a.raw --frames 0:{frames}:7 {options}"));
-    limited(&b, &format!("WAVESPLAT verify a.wspl {options}"));
+fn archives_much_larger_than_the_budget_stay_within_it() {
+    let work = Work::new();
+    work.write("tiny.raw", [0; 16 * 16 * 16 * 2]);
+    let tiny = "tiny.raw --dims 16x16x16x2 --dtype u8";
+    let ask = work.wavesplat(&format!("convert {tiny} -o t.wspl --block 16 --threads 2 --memory 1MiB"));
+    let memory = ask.fails(2, &["--memory"]).mebibytes();
+    let frame_mib = (20 * memory).div_ceil(32);
+    let dims = [256, 256, 16 * frame_mib, 32];
+    write_sparse(&work, "big.raw", dims);
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    let [x, y, z, t] = dims;
+    let options = "--dtype u8 --block 16 --threads 2 --level 1";
+    let files =
+        format!("$WAVESPLAT convert big.raw --dims {x}x{y}x{z}x{t} {options} --memory {memory}MiB -o file.wspl");
+    work.shell(&format!("{limit} exec {files}")).ok();
+    let pipe = format!("$WAVESPLAT convert - --dims {x}x{y}x{z} {options} -o pipe.wspl");
+    let memory = work.shell(&format!("exec {pipe} --memory {memory}MiB < big.raw")).fails(2, &["--memory"]).mebibytes(); // the pipe takes a part
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    work.shell(&format!("{limit} exec {pipe} --memory {memory}MiB < big.raw")).ok();
+    assert!(work.read("file.wspl") == work.read("pipe.wspl"));
+    let ask = work.render("file.wspl --size 96x96 --threads 2 -o v.npy --memory 1MiB").fails(2, &["--memory"]);
+    let memory = memory.max(ask.mebibytes());
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    let common = format!("--threads 2 --memory {memory}MiB");
+    work.shell(&format!("{limit} exec $RENDER file.wspl --size 96x96 --frames 0,31 -o v.npy {common}")).ok();
+    work.shell(&format!("{limit} exec $WAVESPLAT extract file.wspl --frames 5 -o e.raw {common}")).ok();
+    work.shell(&format!("{limit} exec $WAVESPLAT verify file.wspl {common}")).ok();
+    assert_eq!(work.read("e.raw").len(), x * y * z);
 }

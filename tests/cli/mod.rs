@@ -1,125 +1,241 @@
-//! The programs as programs: what a user types, and what comes of it.
+//! The programs as programs: arguments, files, pipes, messages and exit codes.
 
+mod convert;
+mod damage;
 mod errors;
+mod extract;
+mod help;
 mod memory;
 mod pipes;
-mod runs;
+mod render;
+mod usage;
 
-use assert_cmd::Command;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 use tempfile::TempDir;
-use wavesplat::npy;
-use wavesplat::sample::SampleType;
 
-pub(crate) const DIMS: [usize; 3] = [11, 9, 7];
+const CONVERT: &str = env!("CARGO_BIN_EXE_wavesplat");
+const RENDER: &str = env!("CARGO_BIN_EXE_wavesplat-render");
 
-/// A fresh folder with `frames` frames of a smooth moving wave in `frames/frame_0000.npy` and so on.
-pub(crate) struct Bench {
-    folder: TempDir,
-}
+/// A fresh folder in which programs run.
+struct Work(TempDir);
 
-/// What a program said.
-pub(crate) struct Said {
-    pub(crate) code: i32,
-    pub(crate) out: Vec<u8>,
-    pub(crate) err: String,
-}
-
-impl Bench {
-    pub(crate) fn new(frames: usize) -> Self {
-        let bench = Self { folder: TempDir::new().unwrap() };
-        fs::create_dir(bench.path("frames")).unwrap();
-        for t in 0..frames {
-            bench.write_npy(&format!("frames/frame_{t:04}.npy"), &[DIMS[2], DIMS[1], DIMS[0]], &frame(t));
-        }
-        bench
+impl Work {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
     }
 
-    pub(crate) fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+    fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.0.path().join(name)
     }
 
-    pub(crate) fn write_npy(&self, name: &str, shape: &[usize], values: &[f32]) {
-        let mut bytes = Vec::new();
-        npy::write_header(SampleType::F32, shape, &mut bytes).unwrap();
-        bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-        fs::write(self.path(name), bytes).unwrap();
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
     }
 
-    /// Runs `program` with arguments split at spaces, in the folder.
-    pub(crate) fn run(&self, program: &str, args: &str) -> Said {
-        self.run_with(program, args, Vec::new())
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
-    pub(crate) fn run_with(&self, program: &str, args: &str, input: Vec<u8>) -> Said {
-        let output =
-            command(program).current_dir(self.folder.path()).args(args.split(' ')).write_stdin(input).output().unwrap();
-        let err = String::from_utf8(output.stderr).unwrap();
-        assert!(!err.contains("panicked"), "{args}: {err}");
-        Said { code: output.status.code().expect("an exit code, not a signal"), out: output.stdout, err }
-    }
-
-    /// Runs a program that must succeed.
-    pub(crate) fn done(&self, program: &str, args: &str) -> Said {
-        let said = self.run(program, args);
-        assert_eq!(said.code, 0, "{program} {args}: {}", said.err);
-        said
-    }
-
-    pub(crate) fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap()
-    }
-
-    /// The f32 payload and the shape of an `.npy`.
-    pub(crate) fn array(&self, name: &str) -> (Vec<u64>, Vec<f32>) {
-        let bytes = self.bytes(name);
-        let file = npyz::NpyFile::new(bytes.as_slice()).unwrap();
-        (file.shape().to_vec(), file.into_vec().unwrap())
-    }
-
-    /// The names in the folder.
-    pub(crate) fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(self.folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    /// The names in the folder, sorted.
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
+
+    /// Runs `wavesplat` with the words of `args`.
+    fn wavesplat(&self, args: &str) -> Run {
+        self.run(CONVERT, args, b"")
+    }
+
+    /// Runs `wavesplat` with `input` on its standard input.
+    fn piped(&self, args: &str, input: &[u8]) -> Run {
+        self.run(CONVERT, args, input)
+    }
+
+    /// Runs `wavesplat-render`.
+    fn render(&self, args: &str) -> Run {
+        self.run(RENDER, args, b"")
+    }
+
+    fn run(&self, program: impl AsRef<OsStr>, args: &str, input: &[u8]) -> Run {
+        let mut command = assert_cmd::Command::new(program);
+        command.current_dir(self.0.path()).args(args.split_whitespace());
+        command.write_stdin(input).timeout(Duration::from_secs(120));
+        Run::of(args, command.output().unwrap())
+    }
+
+    /// A shell that finds the programs as `$WAVESPLAT` and `$RENDER`.
+    fn shell(&self, line: &str) -> Run {
+        Run::of(line, self.command("sh").args(["-c", line]).output().unwrap())
+    }
+
+    /// A command in the folder, all its streams piped.
+    fn command(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(self.0.path()).env("WAVESPLAT", CONVERT).env("RENDER", RENDER);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    /// Converts the small archive to `a.wspl`, with more arguments.
+    fn with_file(more: &str) -> Self {
+        let work = Self::new();
+        work.write("a.npy", small().npy());
+        work.wavesplat(&format!("convert a.npy -o a.wspl {more}")).ok();
+        work
+    }
 }
 
-pub(crate) fn command(program: &str) -> Command {
-    Command::new(program_path(program))
+/// What a program left.
+#[derive(Debug)]
+struct Run {
+    args: String,
+    code: Option<i32>,
+    out: Vec<u8>,
+    err: String,
 }
 
-pub(crate) fn program_path(program: &str) -> &'static Path {
-    Path::new(match program {
-        "wavesplat" => env!("CARGO_BIN_EXE_wavesplat"),
-        _ => env!("CARGO_BIN_EXE_wavesplat-render"),
-    })
+impl Run {
+    fn of(args: &str, output: std::process::Output) -> Self {
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert!(!err.contains("panicked"), "{args}: {err}");
+        Self { args: args.into(), code: output.status.code(), out: output.stdout, err }
+    }
+
+    #[track_caller]
+    fn ok(self) -> Self {
+        assert_eq!(self.code, Some(0), "{}: {}", self.args, self.err);
+        self
+    }
+
+    /// It failed with this code, said all these words on standard error and nothing on standard output.
+    #[track_caller]
+    fn fails(self, code: i32, words: &[&str]) -> Self {
+        let Self { args, err, out, .. } = &self;
+        assert_eq!(self.code, Some(code), "{args}: {err}");
+        assert!(out.is_empty(), "{args}: {} bytes on standard output", out.len());
+        for word in words {
+            assert!(err.contains(word), "{args}: the message lacks '{word}': {err}");
+        }
+        self
+    }
+
+    fn text(&self) -> &str {
+        std::str::from_utf8(&self.out).unwrap()
+    }
+
+    fn json(&self) -> serde_json::Value {
+        serde_json::from_slice(&self.out).unwrap()
+    }
+
+    /// The MiB that a message about `--memory` asks for.
+    #[track_caller]
+    fn mebibytes(&self) -> usize {
+        let digits = self.err.split("MiB").next().unwrap().rsplit(' ').next().unwrap();
+        digits.parse().unwrap_or_else(|_| panic!("no number of MiB in: {}", self.err))
+    }
 }
 
-/// One frame of the wave.
-pub(crate) fn frame(t: usize) -> Vec<f32> {
-    let [nx, ny, nz] = DIMS;
-    let value = |i: usize| {
-        let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)].map(|n| n as f64);
-        ((x * 0.5 + y * 0.3 - z * 0.2 + t as f64 * 0.17).sin() * (1.0 + 0.02 * t as f64)) as f32
-    };
-    (0..nx * ny * nz).map(value).collect()
+/// An archive of f32 samples, x fastest, then y, z, frames.
+#[derive(Debug, Clone)]
+struct Archive {
+    dims: [usize; 3],
+    frames: usize,
+    values: Vec<f32>,
 }
 
-/// All frames as little-endian bytes.
-pub(crate) fn raw(frames: usize) -> Vec<u8> {
-    (0..frames).flat_map(frame).flat_map(f32::to_le_bytes).collect()
+/// Two windows, the second one short, of a volume with no two lengths the same.
+fn small() -> Archive {
+    Archive::smooth([20, 14, 10], 40)
 }
 
-/// The largest difference; infinite where only one is NaN.
-pub(crate) fn largest_difference(a: &[f32], b: &[f32]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let difference = |(a, b): (&f32, &f32)| match (a.is_nan(), b.is_nan()) {
-        (true, true) => 0.0,
-        (false, false) => (f64::from(*a) - f64::from(*b)).abs(),
-        _ => f64::INFINITY,
-    };
-    a.iter().zip(b).map(difference).fold(0.0, f64::max)
+impl Archive {
+    /// Waves that travel and grow.
+    fn smooth(dims: [usize; 3], frames: usize) -> Self {
+        Self::of(dims, frames, |x, y, z, t| {
+            let [x, y, z, t] = [x, y, z, t].map(|n| n as f32);
+            (0.31 * x + 0.11 * t).sin() * (0.23 * y - 0.07 * t).cos() + 0.04 * z + 0.01 * t
+        })
+    }
+
+    fn of(dims: [usize; 3], frames: usize, value: impl Fn(usize, usize, usize, usize) -> f32) -> Self {
+        let [nx, ny, nz] = dims;
+        let at = |i: usize| value(i % nx, i / nx % ny, i / (nx * ny) % nz, i / (nx * ny * nz));
+        Self { dims, frames, values: (0..nx * ny * nz * frames).map(at).collect() }
+    }
+
+    fn frame_len(&self) -> usize {
+        self.dims.iter().product()
+    }
+
+    fn at(&self, [x, y, z]: [usize; 3], frame: usize) -> f32 {
+        self.values[frame * self.frame_len() + (z * self.dims[1] + y) * self.dims[0] + x]
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        self.values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    }
+
+    fn frame_bytes(&self, frame: usize) -> Vec<u8> {
+        self.bytes()[frame * 4 * self.frame_len()..][..4 * self.frame_len()].into()
+    }
+
+    fn npy(&self) -> Vec<u8> {
+        let [x, y, z] = self.dims;
+        npy("<f4", &format!("{}, {z}, {y}, {x}", self.frames), &self.bytes())
+    }
+
+    fn frame_npy(&self, frame: usize) -> Vec<u8> {
+        let [x, y, z] = self.dims;
+        npy("<f4", &format!("{z}, {y}, {x}"), &self.frame_bytes(frame))
+    }
+
+    /// Writes one `.npy` a frame, named with the frame's number.
+    fn write_frames(&self, work: &Work, folder: &str) {
+        for frame in 0..self.frames {
+            work.write(&format!("{folder}/f_{frame}.npy"), self.frame_npy(frame)); // natural order, no zeros
+        }
+    }
+
+    /// Largest less smallest value.
+    fn range(&self) -> f32 {
+        let [lo, hi] = [f32::min, f32::max].map(|pick| self.values.iter().copied().reduce(pick).unwrap());
+        hi - lo
+    }
+}
+
+/// An `.npy` file by hand.
+fn npy(descr: &str, shape: &str, samples: &[u8]) -> Vec<u8> {
+    npy_ordered(descr, shape, "False", samples)
+}
+
+fn npy_ordered(descr: &str, shape: &str, fortran: &str, samples: &[u8]) -> Vec<u8> {
+    let text = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': ({shape}), }}");
+    let text = format!("{text:<117}\n");
+    let mut file = b"\x93NUMPY\x01\x00".to_vec();
+    file.extend((text.len() as u16).to_le_bytes());
+    file.extend(text.as_bytes());
+    file.extend(samples);
+    file
+}
+
+/// The header and the samples of an `.npy` file.
+fn read_npy(file: &[u8]) -> (String, Vec<u8>) {
+    assert_eq!(&file[..8], b"\x93NUMPY\x01\x00");
+    let len = usize::from(u16::from_le_bytes([file[8], file[9]]));
+    let header = String::from_utf8(file[10..10 + len].into()).unwrap();
+    assert!((10 + len).is_multiple_of(64) && header.ends_with('\n'), "{header}");
+    (header.replace(", )", ")"), file[10 + len..].into())
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
 }

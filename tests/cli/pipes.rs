@@ -1,136 +1,167 @@
-//! Standard streams, early ends, and files that change.
+//! Pipes that end early, late or never; inputs that change; programs that are killed.
 
-use super::{Bench, frame, program_path, raw};
+use super::{Archive, CONVERT, Run, Work, small};
 use std::fs::{self, File};
 use std::io::{Read, Write};
-use std::process::{Command, Stdio};
-use std::time::Duration;
-use wavesplat::npy;
-use wavesplat::sample::SampleType;
+use std::process::Child;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
-const FRAMES: usize = 70;
+/// Noise, which compresses to its own size: 32 MiB in one window.
+fn noise() -> Archive {
+    Archive::of([64, 64, 64], 32, |x, y, z, t| {
+        let i = (x + 64 * (y + 64 * (z + 64 * t))) as u32;
+        f32::from_bits(0x3f80_0000 | (i.wrapping_mul(2_654_435_761).rotate_left(13).wrapping_mul(40_503) >> 9))
+    })
+}
+
+fn finish(args: &str, child: Child) -> Run {
+    Run::of(args, child.wait_with_output().unwrap())
+}
 
 #[test]
-fn a_pipe_gives_the_bytes_of_the_files() {
-    let b = Bench::new(FRAMES);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    let mut npy = Vec::new();
-    npy::write_header(SampleType::F32, &[FRAMES, 7, 9, 11], &mut npy).unwrap();
-    npy.extend(raw(FRAMES));
-    for (args, input) in [("--dims 11x9x7 --dtype f32", raw(FRAMES)), ("--threads 1", npy)] {
-        let said = b.run_with("wavesplat", &format!("convert - -o - {args}"), input);
-        assert_eq!((said.code, said.out == b.bytes("a.wspl")), (0, true), "{args}: {}", said.err);
+fn a_shell_pipe_works_from_end_to_end() {
+    let work = Work::with_file("");
+    work.write("a.raw", small().bytes());
+    work.shell("cat a.npy | $WAVESPLAT convert - -o - | cat > b.wspl").ok();
+    work.shell("$WAVESPLAT convert - -o - --dims 20x14x10 --dtype f32 < a.raw > c.wspl").ok();
+    assert!(work.read("a.wspl") == work.read("b.wspl") && work.read("a.wspl") == work.read("c.wspl"));
+    work.shell("$WAVESPLAT extract a.wspl -o - | $WAVESPLAT convert - -q -o d.wspl --tolerance 0").ok();
+    work.wavesplat("extract a.wspl -o e.npy").ok();
+    work.wavesplat("verify d.wspl --against e.npy").ok();
+}
+
+#[test]
+fn a_consumer_that_closes_early_ends_programs_quietly() {
+    let work = Work::new();
+    work.write("a.npy", noise().npy());
+    work.wavesplat("convert a.npy -o a.wspl --tolerance 0").ok();
+    let commands = [
+        ("sh", "exec $WAVESPLAT convert a.npy -o - --tolerance 0"),
+        ("sh", "exec $WAVESPLAT extract a.wspl -o -"),
+        ("sh", "exec $RENDER a.wspl -o - --size 200x200 --format npy"),
+        ("sh", "exec $RENDER a.wspl -o - --size 200x200 --format y4m"),
+        ("sh", "exec $RENDER a.wspl -o - --size 200x200 --format png"),
+    ];
+    for (shell, line) in commands {
+        let mut child = work.command(shell).args(["-c", line]).spawn().unwrap();
+        let mut out = child.stdout.take().unwrap();
+        out.read_exact(&mut [0; 10]).unwrap();
+        drop(out);
+        let run = finish(line, child).ok();
+        assert!(run.err.is_empty(), "{line}: {}", run.err);
     }
+    work.shell("$WAVESPLAT info a.wspl --json | head -c 1").ok();
+    work.shell("$WAVESPLAT convert --help | head -c 1").ok();
 }
 
 #[test]
-fn a_window_that_does_not_fit_in_memory_is_spooled() {
-    let b = Bench::new(0);
-    let frames: Vec<u8> = (0..40).flat_map(|t| (0..512 * 300u32).map(move |i| (i / 7 + t * 3) as u8)).collect();
-    fs::write(b.path("all.raw"), &frames).unwrap();
-    b.done("wavesplat", "convert all.raw --dims 512x300x1x40 --dtype u8 -o a.wspl");
-    let said = b.run_with("wavesplat", "convert - --dims 512x300x1 --dtype u8 -o p.wspl --memory 18MiB", frames);
-    assert_eq!(said.code, 0, "{}", said.err);
-    assert_eq!(b.bytes("a.wspl"), b.bytes("p.wspl"));
+fn a_producer_that_dies_within_a_frame_leaves_no_file() {
+    let (work, archive) = (Work::new(), small());
+    let bytes = archive.bytes();
+    let options = "convert - -o out.wspl --dims 20x14x10 --dtype f32";
+    work.piped(options, &bytes[..35 * 11_200 + 100]).fails(3, &["-: ", "frame 35", "11200", "100"]);
+    work.piped("convert - -o out.wspl", &archive.npy()[..9 * 11_200]).fails(3, &["-: ", "frame 8"]);
+    work.piped("convert - -o out.wspl", &archive.npy()[..128 + 32 * 11_200]).fails(3, &["-: ", "32 of 40 frames"]);
+    work.piped("convert - -o out.wspl", &archive.npy()[..50]).fails(3, &["-: ", "header"]);
+    work.piped("convert - -o out.wspl", &[archive.npy(), archive.npy()].concat()).fails(3, &["-: ", "40 frame(s)"]);
+    work.piped(options, b"").fails(3, &["-: ", "empty"]);
+    assert_eq!(work.names(), [""; 0]);
 }
 
 #[test]
-fn a_reader_that_has_seen_enough_is_no_error() {
-    let b = Bench::new(FRAMES);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    for (program, args) in [("wavesplat", "extract a.wspl -o -"), ("wavesplat-render", "a.wspl -o - --format rgb24")] {
-        let mut child = Command::new(program_path(program))
-            .args(args.split(' '))
-            .current_dir(b.path(""))
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        child.stdout.take().unwrap().read_exact(&mut [0; 10]).unwrap();
-        let output = child.wait_with_output().unwrap();
-        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{args}");
+fn a_killed_conversion_leaves_no_file_under_the_final_name() {
+    let (work, archive) = (Work::new(), small());
+    let mut command = work.command(CONVERT);
+    command.args("convert - -o out.wspl --window 8 --dims 20x14x10 --dtype f32".split(' '));
+    let mut child = command.spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(&archive.bytes()[..20 * 11_200]).unwrap(); // two windows and a half
+    let started = Instant::now();
+    while !work.path("out.wspl.part").exists() && started.elapsed() < Duration::from_secs(20) {
+        sleep(Duration::from_millis(5));
     }
-}
-
-#[test]
-fn a_producer_that_dies_mid_frame_leaves_no_file() {
-    let b = Bench::new(0);
-    let mut input = raw(5);
-    input.truncate(input.len() - 100);
-    let said = b.run_with("wavesplat", "convert - --dims 11x9x7 --dtype f32 -o a.wspl", input);
-    assert_eq!(said.code, 3);
-    assert!(said.err.contains("frame 4"), "{}", said.err);
-    assert_eq!(b.names(), ["frames"]);
-}
-
-#[test]
-fn a_killed_conversion_leaves_no_file_and_does_not_block_the_next() {
-    let b = Bench::new(FRAMES);
-    let mut child = Command::new(program_path("wavesplat"))
-        .args("convert - --dims 11x9x7 --dtype f32 -o a.wspl".split(' '))
-        .current_dir(b.path(""))
-        .stdin(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child.stdin.as_mut().unwrap().write_all(&raw(40)).unwrap();
-    while !b.path("a.wspl.part").exists() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let said = b.run("wavesplat", "convert frames -o a.wspl");
-    assert_eq!(said.code, 2, "while the first one is at it: {}", said.err);
+    work.wavesplat("info out.wspl").fails(1, &["out.wspl"]);
+    let args = "convert - -o out.wspl --window 8 --dims 20x14x10 --dtype f32";
+    work.piped(args, &archive.bytes()).fails(2, &["out.wspl", "another program"]);
     child.kill().unwrap();
     child.wait().unwrap();
-    assert!(!b.path("a.wspl").exists());
-    b.done("wavesplat", "convert frames -o a.wspl");
-    b.done("wavesplat", "verify a.wspl --against frames");
-    assert_eq!(b.names(), ["a.wspl", "frames"]);
+    assert!(!work.path("out.wspl").exists());
+    work.piped(args, &archive.bytes()).ok();
+    assert_eq!(work.names(), ["out.wspl"]);
+    work.wavesplat("verify out.wspl").ok();
 }
 
+#[cfg(unix)]
 #[test]
-fn an_input_cut_while_it_is_mapped_ends_with_its_name() {
-    let b = Bench::new(0);
-    let frames = 64;
-    let file = File::create(b.path("all.raw")).unwrap();
-    file.set_len(frames * 64 * 64 * 64 * 4).unwrap();
-    assert!(Command::new("mkfifo").arg(b.path("out")).status().unwrap().success());
-    let child = Command::new(program_path("wavesplat"))
-        .args("convert all.raw --dims 64x64x64x64 --dtype f32 -o out --memory 64MiB".split(' '))
-        .current_dir(b.path(""))
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_millis(300)); // it waits for a reader of its output, with the input seen
-    file.set_len(4096).unwrap();
-    let mut reader = File::open(b.path("out")).unwrap();
-    let _ = reader.read_to_end(&mut Vec::new());
-    let output = child.wait_with_output().unwrap();
-    let err = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(4), "{err}");
-    assert!(err.contains("all.raw"), "{err}");
-}
-
-#[test]
-fn a_source_that_differs_is_told_by_verify() {
-    let b = Bench::new(4);
-    b.done("wavesplat", "convert frames -o a.wspl");
-    let mut values = frame(2);
-    values[100] += 1.0;
-    b.write_npy("frames/frame_0002.npy", &[7, 9, 11], &values);
-    let said = b.run("wavesplat", "verify a.wspl --against frames");
-    assert_eq!(said.code, 4);
-    assert!(said.err.contains("1 series"), "{}", said.err);
-}
-
-#[test]
-fn ffmpeg_reads_the_video() {
-    let b = Bench::new(3);
-    if Command::new("ffmpeg").arg("-version").output().is_err() {
-        return; // not on this machine
+fn an_input_that_shrinks_under_a_map_is_named_and_gives_code_4() {
+    let work = Work::new();
+    for (name, frames) in [("one.npy", 1), ("many", 32)] {
+        let archive = noise();
+        if frames == 1 {
+            work.write(name, archive.npy());
+        } else {
+            archive.write_frames(&work, name);
+        }
+        let line = format!("exec $WAVESPLAT convert {name} -o - --tolerance 0 --block 16 --memory 24MiB");
+        let mut child = work.command("sh").args(["-c", &line]).spawn().unwrap();
+        // Once a byte came out, a window is being gathered; it cannot be done before its 32 MiB are taken from the pipe.
+        child.stdout.as_mut().unwrap().read_exact(&mut [0]).unwrap();
+        let victim = if frames == 1 { work.path(name) } else { work.path("many/f_20.npy") };
+        File::options().write(true).open(&victim).unwrap().set_len(200).unwrap();
+        let run = finish(&line, child);
+        assert_eq!(run.code, Some(4), "{}", run.err);
+        assert!(run.err.contains(if frames == 1 { "one.npy" } else { "many/f_20.npy" }), "{}", run.err);
+        assert!(run.err.contains("shorter") || run.err.contains("changed"), "{}", run.err);
     }
-    b.done("wavesplat", "convert frames -o a.wspl");
-    let video = b.done("wavesplat-render", "a.wspl -o - --format y4m --size 64x48").out;
-    fs::write(b.path("v.y4m"), video).unwrap();
-    let status =
-        Command::new("ffmpeg").args(["-v", "error", "-i", "v.y4m", "v.mp4"]).current_dir(b.path("")).status().unwrap();
-    assert!(status.success());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_input_that_is_rewritten_is_noticed_and_leaves_no_file() {
+    let work = Work::new();
+    for access in ["", "--no-mmap"] {
+        noise().write_frames(&work, "many");
+        assert!(work.shell("mkfifo slow.fifo").ok().out.is_empty());
+        let line =
+            format!("exec $WAVESPLAT convert many -o slow.fifo --tolerance 0 --block 16 --memory 24MiB {access}");
+        let child = work.command("sh").args(["-c", &line]).spawn().unwrap();
+        let mut out = File::open(work.path("slow.fifo")).unwrap();
+        out.read_exact(&mut [0]).unwrap();
+        fs::write(work.path("many/f_9.npy"), noise().frame_npy(8)).unwrap();
+        std::io::copy(&mut out, &mut std::io::sink()).unwrap();
+        let run = finish(&line, child).fails(4, &["f_9.npy"]);
+        assert!(run.err.contains("shorter") || run.err.contains("changed"), "{}", run.err);
+        fs::remove_file(work.path("slow.fifo")).unwrap();
+    }
+    assert_eq!(work.names(), ["many"]);
+}
+
+#[test]
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
+fn ffmpeg_reads_the_video() {
+    let work = Work::with_file("");
+    if work.shell("ffmpeg -version").code != Some(0) {
+        eprintln!("skipped: no ffmpeg here");
+        return;
+    }
+    let line = "$RENDER a.wspl --size 64x48 -o - --format y4m | ffmpeg -v error -nostdin -i - -c:v mpeg4 out.mp4";
+    work.shell(line).ok();
+    let probe = work.shell("ffmpeg -i out.mp4 -f null - 2>&1").ok();
+    assert!(probe.text().contains("64x48") && probe.text().contains("frame=   40"), "{}", probe.text());
+}
+
+#[test]
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
+fn binary_data_is_not_written_to_a_terminal() {
+    let work = Work::with_file("");
+    if work.shell("script --version").code != Some(0) {
+        eprintln!("skipped: no script here");
+        return;
+    }
+    for line in ["$WAVESPLAT convert a.npy -o -", "$WAVESPLAT extract a.wspl -o -", "$RENDER a.wspl -o -"] {
+        let run = work.shell(&format!("script -qec '{line}' log < /dev/null"));
+        assert_eq!(run.code, Some(2), "{line}: {run:?}");
+        assert!(run.text().contains("not written to a terminal"), "{}", run.text());
+    }
 }

@@ -120,7 +120,7 @@ fn by_coefficients(files: &Files, name: &'static str, basis: Basis, window: usiz
     let report = convert(open_frames(files)?.as_mut(), &config, &path, &mut out, &Silent)?;
     out.commit()?;
     let open = || CoefficientFile::open(&path, Access::Map);
-    let compared = verify(&open()?, Some(open_frames(files)?.as_mut()), &Silent)?.against.unwrap_or_default();
+    let compared = verify(&open()?, Some(open_frames(files)?.as_mut()), MEMORY, &Silent)?.against.unwrap_or_default();
     let (pictures, render) = pictures(&mut CoefficientScene::new(open()?, What::Coefficients))?;
     Ok(Run { name, pictures, render, converted: Some((report, compared)) })
 }

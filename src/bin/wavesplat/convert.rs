@@ -37,7 +37,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "T")]
     window: Option<usize>,
     /// Largest error as a share of the value range; 0 keeps every bit
-    #[arg(long, value_name = "X", default_value_t = 0.01)]
+    #[arg(long, value_name = "X", default_value_t = 0.01, allow_hyphen_values = true)]
     tolerance: f64,
     /// What is guaranteed: every sample, or the root mean square of each voxel in each window
     #[arg(long, value_enum, default_value = "pointwise")]
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let progress = args.common.progress("blocks");
     let report = convert(source.as_mut(), &config, &args.output, &mut out, &progress)?;
     out.commit()?;
-    args.common.note(summary(&report));
+    args.common.note(summary(&report, config.bound));
     args.common.report(&report, args.output == Path::new(STANDARD))
 }
 
@@ -110,6 +110,9 @@ impl ConvertArgs {
     fn config(&self) -> Result<ConvertConfig> {
         if !(self.tolerance.is_finite() && self.tolerance >= 0.0) {
             return Err(Error::usage("--tolerance: takes a number of 0 or more"));
+        }
+        if self.tolerance > 1.0 {
+            return Err(Error::usage("--tolerance: a share of the value range, at most 1; 2 % is 0.02"));
         }
         let range = self.range.map(|r| (r.0[0], r.0[1]));
         if range.is_some_and(|(lo, hi)| lo > hi) {
@@ -151,12 +154,17 @@ impl ConvertArgs {
     }
 }
 
-fn summary(r: &ConvertReport) -> String {
+fn summary(r: &ConvertReport, bound: Bound) -> String {
     let ratio = r.input_bytes as f64 / r.output_bytes as f64;
     let rate = r.input_bytes as f64 / r.seconds / 1e6;
+    let errors = match bound {
+        Bound::Pointwise => format!("largest error {:.4e} of {:.4e} allowed", r.reached, r.delta),
+        Bound::Rms => {
+            format!("rms error of every series within {:.4e}, largest single error {:.4e}", r.delta, r.reached)
+        }
+    };
     format!(
-        "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; \
-         largest error {:.4e} of {:.4e} allowed",
-        r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample, r.reached, r.delta
+        "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}",
+        r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample
     )
 }

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec};
 use wavesplat::error::{Error, Result};
-use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::extract::{ExtractConfig, check_memory, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
 use wavesplat::npy;
@@ -61,6 +61,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
         region: args.region.map_or(Ok(file.grid.whole()), |r| r.resolve(&file.grid))?,
         memory: args.common.memory.0,
     };
+    check_memory(&file, &config)?;
     let mut out = Output::create(&args.output, args.force)?;
     if format == Format::Npy {
         let [x, y, z] = config.region.dims();

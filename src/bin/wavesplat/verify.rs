@@ -36,7 +36,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         Some(source) => Some(source.as_mut()),
         None => None,
     };
-    let report = verify(&file, source, &args.common.progress("blocks"))?;
+    let report = verify(&file, source, args.common.memory.0, &args.common.progress("blocks"))?;
     if args.common.json {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {
@@ -44,8 +44,9 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     }
     match report.against {
         Some(c) if c.series_outside > 0 => {
-            let share = c.largest_share_of_bound;
-            let what = format!("{} series are outside the bound, by up to {share} times", c.series_outside);
+            let (outside, share) = (c.series_outside, c.largest_share_of_bound);
+            let place = c.worst.map_or(String::new(), |p| format!(" at {p}"));
+            let what = format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound");
             Err(Error::BoundMissed { path: args.file.clone(), what })
         }
         _ => Ok(()),

@@ -1,0 +1,147 @@
+//! Pictures in every format, and the two methods against each other.
+
+use super::{Work, floats, read_npy, small};
+use std::collections::HashSet;
+
+const SIZE: &str = "--size 48x40";
+
+#[test]
+fn a_pattern_numbers_png_files() {
+    let work = Work::with_file("");
+    work.render(&format!("a.wspl {SIZE} --frames 2,38 -o frame_%04d.png")).ok();
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "frame_0002.png", "frame_0038.png"]);
+    let picture = decode_png(&work.read("frame_0002.png"));
+    assert_eq!(picture.len(), 48 * 40 * 3);
+    assert_eq!(picture[..3], [0; 3], "the corner is background");
+    let colours: HashSet<&[u8]> = picture.chunks(3).collect();
+    assert!(colours.len() > 20, "{} colours", colours.len());
+    work.render(&format!("a.wspl {SIZE} --frames 2 -o one.png")).ok();
+    assert!(work.read("one.png") == work.read("frame_0002.png"));
+    work.render(&format!("a.wspl {SIZE} --frames 2 -o white.png --background ffffff")).ok();
+    assert_eq!(decode_png(&work.read("white.png"))[..3], [255; 3]);
+}
+
+fn decode_png(bytes: &[u8]) -> Vec<u8> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    pixels
+}
+
+#[test]
+fn one_png_takes_one_frame() {
+    let work = Work::with_file("");
+    work.render("a.wspl -o one.png").fails(2, &["one.png", "40 frames", "frame_%04d.png"]);
+    work.render("a.wspl -o frame_%x.png").fails(2, &["frame_%x.png", "%04d"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
+}
+
+#[test]
+fn arrays_hold_values_with_nan_for_background() {
+    let work = Work::with_file("");
+    work.render(&format!("a.wspl {SIZE} --frames 1:4 -o v.npy")).ok();
+    let (header, values) = read_npy(&work.read("v.npy"));
+    assert!(header.contains("'<f4'") && header.contains("(3, 40, 48)"), "{header}");
+    let values = floats(&values);
+    assert!(values[0].is_nan());
+    let inside: Vec<f32> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+    assert!(inside.len() > values.len() / 4);
+    assert!(inside.iter().all(|v| (-1.1..=1.9).contains(v)), "a mean leaves the range of the samples");
+    work.render(&format!("a.wspl {SIZE} --frames 1:4 --colormap turbo -o c.npy")).ok();
+    let (header, colours) = read_npy(&work.read("c.npy"));
+    assert!(header.contains("'|u1'") && header.contains("(3, 40, 48, 3)"), "{header}");
+    assert_eq!(colours.len(), 3 * 40 * 48 * 3);
+    work.render(&format!("a.wspl {SIZE} --frames 1:4 --quantity emission -o e.npy")).ok();
+    let emission = floats(&read_npy(&work.read("e.npy")).1);
+    assert!(emission.iter().all(|v| !v.is_nan()) && emission[0] == 0.0, "emission is 0 in the background");
+}
+
+#[test]
+fn streams_have_the_sizes_that_readers_expect() {
+    let work = Work::with_file("");
+    let video = work.render(&format!("a.wspl {SIZE} --frames :3 --fps 30 -o - --format y4m")).ok().out;
+    let header = b"YUV4MPEG2 W48 H40 F30:1 Ip A1:1 C444 XCOLORRANGE=FULL\n";
+    assert!(video.starts_with(header));
+    assert_eq!(video.len(), header.len() + 3 * (6 + 48 * 40 * 3));
+    for frame in 0..3 {
+        assert_eq!(&video[header.len() + frame * (6 + 48 * 40 * 3)..][..6], b"FRAME\n");
+    }
+    let rgb = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format rgb24")).ok().out;
+    assert_eq!(rgb.len(), 3 * 48 * 40 * 3);
+    let gray = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format gray16")).ok().out;
+    assert_eq!(gray.len(), 3 * 48 * 40 * 2);
+    let pngs = work.render(&format!("a.wspl {SIZE} --frames :3 -o -")).ok().out;
+    let starts = pngs.windows(8).filter(|w| w == b"\x89PNG\r\n\x1a\n").count();
+    assert_eq!(starts, 3, "png is the default of a pipe");
+    assert!(decode_png(&pngs) == rgb[..48 * 40 * 3]);
+    for (name, stream) in [("v.y4m", video), ("v.rgb24", rgb), ("v.gray16", gray)] {
+        work.render(&format!("a.wspl {SIZE} --frames :3 --fps 30 -o {name}")).ok();
+        assert!(work.read(name) == stream, "{name}");
+    }
+    let npy = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format npy")).ok().out;
+    work.render(&format!("a.wspl {SIZE} --frames :3 -o v.npy")).ok();
+    assert!(npy == work.read("v.npy"));
+}
+
+#[test]
+fn coefficients_and_frames_give_the_same_pictures() {
+    let tolerance = 0.004;
+    let work = Work::with_file(&format!("--tolerance {tolerance}"));
+    small().write_frames(&work, "frames");
+    let bound = tolerance * small().range();
+    for options in ["", "--view -70,50 --roll 20", "--tau 0.2", "--region 3:15,2:12,1:8", "--sigma 1.5 --scale 2.2"] {
+        let image = |input: &str| {
+            work.render(&format!("{input} {SIZE} --frames 0,9,35 --splat-error 0 {options} -o i.npy --force")).ok();
+            floats(&read_npy(&work.read("i.npy")).1)
+        };
+        let ours = image("a.wspl");
+        for (input, bound) in [("a.wspl --method direct", 1e-5), ("frames --method direct", bound * 1.001)] {
+            let theirs = image(input);
+            assert_eq!(ours.len(), theirs.len());
+            let worst = ours.iter().zip(&theirs).map(|(a, b)| {
+                assert_eq!(a.is_nan(), b.is_nan(), "background differs: {input} {options}");
+                if a.is_nan() { 0.0 } else { (a - b).abs() }
+            });
+            let worst = worst.fold(0.0, f32::max);
+            assert!(worst <= bound, "{input} {options}: {worst:e} of {bound:e}");
+            assert!(worst > 0.0 || !input.starts_with("frames"), "nothing was compressed");
+        }
+    }
+}
+
+#[test]
+fn options_of_the_view_change_the_picture() {
+    let work = Work::with_file("");
+    let image =
+        |options: &str| work.render(&format!("a.wspl --size 40x30 --frames 5 -o - --format npy {options}")).ok().out;
+    let usual = image("");
+    let others =
+        ["--view 45,20", "--roll 30", "--tau 0.3", "--sigma 2", "--scale 1", "--center 3,3,3", "--region :9,:,:"];
+    for other in others {
+        assert!(image(other) != usual, "{other}");
+    }
+    assert!(image("--view 30,30 --roll 0 --tau 0 --no-mmap --memory 64MiB") == usual, "the defaults, said");
+    let exact = floats(&read_npy(&image("--splat-error 0")).1);
+    let near = floats(&read_npy(&usual).1);
+    let worst = exact.iter().zip(&near).map(|(a, b)| (a - b).abs()).filter(|d| !d.is_nan()).fold(0.0, f32::max);
+    assert!(worst <= 0.001 * small().range(), "{worst:e}");
+}
+
+#[test]
+fn memory_changes_no_pixel() {
+    let work = Work::with_file("--block 8");
+    let options = "a.wspl --size 150x130 -o - --format npy";
+    let least = work.render(&format!("{options} --memory 1MiB")).fails(2, &["--memory"]).mebibytes();
+    let tight = work.render(&format!("{options} --memory {least}MiB")).ok().out;
+    assert!(tight == work.render(options).ok().out);
+}
+
+#[test]
+fn the_report_is_json() {
+    let work = Work::with_file("");
+    let report = work.render(&format!("a.wspl {SIZE} -o v.npy --json")).ok().json();
+    assert_eq!(report["frames"], 40);
+    let run = work.render(&format!("a.wspl {SIZE} -o - --format rgb24 --json")).ok();
+    assert_eq!(run.out.len(), 40 * 48 * 40 * 3, "data alone");
+    assert!(run.err.contains("\"stated_splat_error\""));
+}

@@ -1,0 +1,110 @@
+//! Requests that make no sense: code 2, a message that names the option, nothing written.
+
+use super::{Work, small};
+
+#[test]
+fn bad_values_of_convert_are_named() {
+    let work = Work::new();
+    work.write("a.npy", small().npy());
+    let cases: [(&str, &[&str]); 22] = [
+        ("--tolerance -1", &["--tolerance", "0 or more"]),
+        ("--tolerance nan", &["--tolerance", "0 or more"]),
+        ("--tolerance much", &["--tolerance"]),
+        ("--window 30", &["--window 30", "haar", "32"]),
+        ("--window 0", &["--window 0"]),
+        ("--basis multi --window 32", &["--window 32", "multi", "33"]),
+        ("--basis fourier", &["--basis", "haar", "multi"]),
+        ("--range 2,1", &["--range", "lower"]),
+        ("--range 1", &["--range", "2 numbers"]),
+        ("--region 0:21,:,:", &["--region", "20x14x10"]),
+        ("--region 4:4,:,:", &["--region", "20x14x10"]),
+        ("--region 0:4", &["--region", "x0:x1"]),
+        ("--frames 40:50", &["--frames", "40"]),
+        ("--frames 5:2", &["--frames"]),
+        ("--frames x", &["--frames", "a:b"]),
+        ("--memory 1KiB", &["--memory", "MiB"]),
+        ("--memory much", &["--memory", "512MiB"]),
+        ("--block 0", &["--block"]),
+        ("--level 99", &["--level", "19"]),
+        ("--threads 0", &["--threads"]),
+        ("--dims 3x3x3", &["a.npy", "--dims"]),
+        ("--spacing 0,1,1", &["spacing", "positive"]),
+    ];
+    for (options, words) in cases {
+        work.wavesplat(&format!("convert a.npy -o a.wspl {options}")).fails(2, words);
+        assert_eq!(work.names(), ["a.npy"], "{options}");
+    }
+}
+
+#[test]
+fn bad_values_of_render_are_named() {
+    let work = Work::with_file("");
+    let cases: [(&str, &[&str]); 18] = [
+        ("--view x", &["--view", "2 numbers"]),
+        ("--size 0x5", &["--size", "1 to"]),
+        ("--size 5", &["--size", "512x512"]),
+        ("--size 90000x90000", &["pixels"]),
+        ("--memory 1KiB", &["--memory", "MiB"]),
+        ("--colormap jet", &["--colormap jet", "viridis", "turbo", "rainbow"]),
+        ("--range 2,1", &["--range", "lower"]),
+        ("--frames 99", &["--frames", "40"]),
+        ("--region 0:21,:,:", &["--region", "20x14x10"]),
+        ("--tau -1", &["--tau", "0 or more"]),
+        ("--sigma 0", &["--sigma"]),
+        ("--scale 0", &["scale"]),
+        ("--roll nan", &["finite"]),
+        ("--splat-error -1", &["--splat-error", "0 or more"]),
+        ("--background red", &["--background", "ffffff"]),
+        ("--format gif", &["--format", "png npy y4m rgb24 gray16"]),
+        ("--fps 0", &["--fps"]),
+        ("--center 1,2", &["--center", "3 numbers"]),
+    ];
+    for (options, words) in cases {
+        work.render(&format!("a.wspl -o out.npy {options}")).fails(2, words);
+        assert_eq!(work.names(), ["a.npy", "a.wspl"], "{options}");
+    }
+}
+
+#[test]
+fn an_ending_that_says_no_format_is_refused_with_those_that_do() {
+    let work = Work::with_file("");
+    work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", "png npy y4m rgb24 gray16"]);
+    work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);
+    work.write("in.xyz", [7; 300]);
+    work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", "--dims", ".npy", ".nrrd", ".vti"]);
+    work.piped("convert - -o b.wspl", &[7; 300]).fails(2, &["-:", "--dims"]);
+    work.wavesplat("convert a.wspl -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "in.xyz"]);
+}
+
+#[test]
+fn an_existing_file_is_replaced_only_when_forced() {
+    let work = Work::with_file("");
+    let before = work.read("a.wspl");
+    work.wavesplat("convert a.npy -o a.wspl --tolerance 0.1").fails(2, &["a.wspl", "exists", "--force"]);
+    assert!(work.read("a.wspl") == before);
+    work.wavesplat("convert a.npy -o a.wspl --tolerance 0.1 --force").ok();
+    assert!(work.read("a.wspl") != before);
+    work.write("b.npy", "mine");
+    work.write("f_03.png", "mine");
+    work.wavesplat("extract a.wspl -o b.npy").fails(2, &["b.npy", "--force"]);
+    work.render("a.wspl -o b.npy").fails(2, &["b.npy", "--force"]);
+    work.render("a.wspl --size 20x20 --frames 3 -o f_%02d.png").fails(2, &["f_03.png", "--force"]);
+    assert!(work.read("b.npy") == b"mine" && work.read("f_03.png") == b"mine");
+    work.render("a.wspl --size 20x20 --frames 3 -o f_%02d.png --force").ok();
+    work.wavesplat("extract a.wspl -o b.npy --force").ok();
+    assert!(work.read("b.npy").len() > 1000 && work.read("f_03.png").len() > 100);
+    work.wavesplat("convert a.npy -o . --force").fails(2, &["folder"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "b.npy", "f_03.png"]);
+}
+
+#[test]
+fn inputs_that_contradict_each_other_are_refused() {
+    let work = Work::with_file("");
+    work.wavesplat("convert a.npy ./a.npy -o b.wspl").fails(2, &["a.npy", "twice"]);
+    work.wavesplat("convert a.npy - -o b.wspl").fails(2, &["-", "only input"]);
+    work.wavesplat("convert no*.npy -o b.wspl").fails(2, &["no*.npy", "no file"]);
+    work.render("a.npy a.wspl -o b.npy").fails(2, &["--method direct"]);
+    work.render("- --method direct -o b.npy --dims 2x2x2 --dtype u8").fails(2, &["standard input"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
+}
