@@ -54,7 +54,14 @@ pub struct SinkConfig {
 pub enum Sink {
     /// To one file or stream; what comes before the first picture is written with it, so that a request that cannot be
     /// met leaves a pipe empty.
-    One { out: Box<Output>, config: SinkConfig, begun: bool },
+    One {
+        /// Where to.
+        out: Box<Output>,
+        /// How.
+        config: SinkConfig,
+        /// Whether the first picture was written.
+        begun: bool,
+    },
     /// Each to a file of its own, named by [`Numbered`].
     Many(Numbered, SinkConfig),
 }
