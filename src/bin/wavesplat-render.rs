@@ -10,6 +10,7 @@ use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
 use wavesplat::output::STANDARD;
+use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, What, render};
@@ -28,7 +29,8 @@ Examples:
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render frames/ --method direct -o frame_%04d.png
 An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours.
-The view looks along -y with z up at 0,0; azimuth turns about z, counter-clockwise seen from above."
+The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks
+along x. A tau of about 1 / the volume's depth lets the near side stand out."
 )]
 struct Cli {
     /// Coefficient file; for --method direct also frames
@@ -61,7 +63,7 @@ struct Cli {
     /// Only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
-    /// Attenuation per world unit of depth
+    /// Attenuation per world unit of depth; where weights sum to less than 1 % of the view's largest is background
     #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
     tau: f64,
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
@@ -77,7 +79,7 @@ struct Cli {
     /// Colour map: viridis turbo rainbow grey plasma inferno magma [default: viridis]
     #[arg(long, value_name = "NAME", help_heading = "Colour")]
     colormap: Option<String>,
-    /// Values of the first and the last colour [default: the range of all frames]
+    /// Values of the first and the last colour [default: those of the pictures]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     range: Option<Pair>,
     /// Colour of the background, as ffffff
@@ -163,6 +165,9 @@ impl Cli {
         if let [only] = self.inputs.as_slice()
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
         {
+            if only == Path::new(STANDARD) {
+                return Err(Error::usage("-: a coefficient file is read from its end, so not from a pipe"));
+            }
             self.input.refuse_for_coefficients()?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let tolerance = file.metadata().tolerance;
@@ -208,21 +213,17 @@ impl Cli {
         })
     }
 
-    /// Colours over the given range, or over the range that any frame can reach, so that a video does not flicker.
+    /// Colours over the given range, or over that of small pictures of frames spread over all: the same for every
+    /// frame, so that a video does not flicker.
     fn colours(&self, scene: &mut dyn Scene, config: &RenderConfig, format: PictureFormat) -> Result<ColourMap> {
         let values_only = format == PictureFormat::Npy && self.colormap.is_none();
         let range = match self.range {
             Some(range) => (range.0[0], range.0[1]),
             None if values_only => (0.0, 1.0),
             None => {
-                let (lo, hi) = scene.range(&config.frames)?;
-                match config.quantity {
-                    Quantity::Mean => (lo, hi),
-                    Quantity::Emission => {
-                        let length = longest_path(scene);
-                        (lo.min(0.0) * length, hi.max(0.0) * length)
-                    }
-                }
+                let (lo, hi) = picture_range(scene, config)?;
+                self.common.note(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+                (lo, hi)
             }
         };
         ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)
@@ -241,10 +242,23 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     error
 }
 
-/// The volume's diagonal: no ray stays in it for longer.
-fn longest_path(scene: &dyn Scene) -> f64 {
-    let grid = scene.grid();
-    (0..3).map(|a| (grid.dims[a] as f64 * grid.spacing[a]).powi(2)).sum::<f64>().sqrt()
+/// The range of small pictures of a few frames; (0, 1) if they show nothing.
+fn picture_range(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(f64, f64)> {
+    const PIXELS: f64 = 64.0;
+    const FRAMES: usize = 32;
+    let mut small = config.clone();
+    let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
+    small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+    small.view.scale = small.view.scale.map(|s| s * shrink);
+    let last = config.frames.len().saturating_sub(1);
+    small.frames = (0..FRAMES).map(|i| config.frames[i * last / (FRAMES - 1)]).collect();
+    small.frames.dedup();
+    let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
+    render(scene, &small, &Silent, &mut |_, picture| {
+        (lo, hi) = picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+        Ok(())
+    })?;
+    Ok(if lo <= hi { (f64::from(lo), f64::from(hi)) } else { (0.0, 1.0) })
 }
 
 fn parse_colour(text: &str) -> std::result::Result<colour::Rgb, String> {

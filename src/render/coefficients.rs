@@ -46,10 +46,6 @@ impl Scene for CoefficientScene {
         Some(self.file.frames())
     }
 
-    fn range(&mut self, _frames: &[usize]) -> Result<(f64, f64)> {
-        Ok(self.file.value_range())
-    }
-
     fn group_end(&self, frame: usize) -> usize {
         self.file.window_range(self.file.window_of(frame)).end
     }

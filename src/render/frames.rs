@@ -3,7 +3,7 @@
 use super::scene::{Group, Layout, Scene, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing};
-use crate::scan::{join_ranges, scan};
+use crate::scan::scan;
 use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
@@ -40,17 +40,6 @@ impl Scene for FrameScene {
 
     fn frames(&self) -> Option<usize> {
         self.archive.frames
-    }
-
-    fn range(&mut self, frames: &[usize]) -> Result<(f64, f64)> {
-        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
-        let declared = self.missing_value;
-        for frame in frames {
-            let window = self.source.window(*frame, 1)?;
-            let seen = scan(window.as_ref(), &self.archive.grid, self.archive.sample, declared)?;
-            range = join_ranges(range, seen.range);
-        }
-        Ok(range)
     }
 
     fn group_end(&self, frame: usize) -> usize {

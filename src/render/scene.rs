@@ -19,9 +19,6 @@ pub trait Scene {
     /// Number of frames, if it is known before they are read.
     fn frames(&self) -> Option<usize>;
 
-    /// Range of the values of all frames asked for, as far as it is known without rendering.
-    fn range(&mut self, frames: &[usize]) -> Result<(f64, f64)>;
-
     /// Where the frames end that can be rendered together with `frame`.
     fn group_end(&self, frame: usize) -> usize;
 

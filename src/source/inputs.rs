@@ -17,6 +17,9 @@ pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files>
     };
     refuse_twice(&files.paths)?;
     if files.times.is_empty() && !options.allow_gaps {
+        if inputs.len() == 1 {
+            numbering::check_one_series(&files.paths)?;
+        }
         numbering::check(&files.paths)?;
     }
     Ok(files)

@@ -18,6 +18,21 @@ pub(super) fn check(paths: &[PathBuf]) -> Result<()> {
     }
 }
 
+/// An error if numbered names differ in more than their numbers: a folder with frames of two variables, say.
+pub(super) fn check_one_series(paths: &[PathBuf]) -> Result<()> {
+    let words = |p: &PathBuf| pieces(p).map(|(words, _)| words).filter(|w| w.contains(MARK));
+    let Some((first, other)) = paths.first().zip(paths.iter().find(|p| words(p) != words(&paths[0]))) else {
+        return Ok(());
+    };
+    if paths.iter().all(|p| words(p).is_none()) {
+        return Ok(());
+    }
+    let names = [first, other].map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned());
+    let what = format!("{} and {} look like two series", names[0], names[1]);
+    let hint = "choose one by a pattern in quotes, or take the files as they are with --allow-gaps";
+    Err(Error::input(other, format!("{what}; {hint}")))
+}
+
 fn irregular(before: &Path, after: &Path, step: i64, usual: i64) -> Error {
     let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let (a, b) = if before.parent() == after.parent() {

@@ -11,27 +11,27 @@ const SLACK_MIB: usize = 40;
 /// A sparse archive with some structure in every frame.
 fn write_sparse(work: &Work, name: &str, [nx, ny, nz, nt]: [usize; 4]) {
     let file = File::create(work.path(name)).unwrap();
-    file.set_len((nx * ny * nz * nt) as u64).unwrap();
-    let slab: Vec<u8> = (0..nx * ny * 4).map(|i| (100.0 + 90.0 * (i as f32 * 0.001).sin()) as u8).collect();
+    file.set_len((4 * nx * ny * nz * nt) as u64).unwrap();
+    let slab: Vec<u8> = (0..nx * ny * 4).flat_map(|i| (2.0 + (i as f32 * 0.001).sin()).to_le_bytes()).collect();
     for t in 0..nt {
         let z = (3 * t) % (nz - 4);
-        file.write_all_at(&slab, ((t * nz + z) * nx * ny) as u64).unwrap();
+        file.write_all_at(&slab, (4 * (t * nz + z) * nx * ny) as u64).unwrap();
     }
 }
 
 #[test]
 fn archives_much_larger_than_the_budget_stay_within_it() {
     let work = Work::new();
-    work.write("tiny.raw", [0; 16 * 16 * 16 * 2]);
-    let tiny = "tiny.raw --dims 16x16x16x2 --dtype u8";
+    work.write("tiny.raw", [0; 16 * 16 * 16 * 2 * 4]);
+    let tiny = "tiny.raw --dims 16x16x16x2 --dtype f32";
     let ask = work.wavesplat(&format!("convert {tiny} -o t.wspl --block 16 --threads 2 --memory 1MiB"));
     let memory = ask.fails(2, &["--memory"]).mebibytes();
     let frame_mib = (20 * memory).div_ceil(32);
-    let dims = [256, 256, 16 * frame_mib, 32];
+    let dims = [128, 128, 16 * frame_mib, 32]; // f32
     write_sparse(&work, "big.raw", dims);
     let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
     let [x, y, z, t] = dims;
-    let options = "--dtype u8 --block 16 --threads 2 --level 1";
+    let options = "--dtype f32 --block 16 --threads 2 --level 1";
     let files =
         format!("$WAVESPLAT convert big.raw --dims {x}x{y}x{z}x{t} {options} --memory {memory}MiB -o file.wspl");
     work.shell(&format!("{limit} exec {files}")).ok();
@@ -47,5 +47,5 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
     work.shell(&format!("{limit} exec $RENDER file.wspl --size 96x96 --frames 0,31 -o v.npy {common}")).ok();
     work.shell(&format!("{limit} exec $WAVESPLAT extract file.wspl --frames 5 -o e.raw {common}")).ok();
     work.shell(&format!("{limit} exec $WAVESPLAT verify file.wspl {common}")).ok();
-    assert_eq!(work.read("e.raw").len(), x * y * z);
+    assert_eq!(work.read("e.raw").len(), 4 * x * y * z);
 }

@@ -119,9 +119,9 @@ impl Info {
         let [promised, reached] = [largest(&self.windows, |w| w.promised), largest(&self.windows, |w| w.reached)];
         let mut text = format!(
             "volume     {x} x {y} x {z} voxels, spacing {:?}, origin {:?}\n\
-             samples    {} ({name}), {} frames, values {:.4e} to {:.4e}\n\
+             samples    {} ({name}), {} frames, decoded values {:.4e} to {:.4e}\n\
              size       {} bytes, {ratio:.1}x smaller than raw; {} blocks of {} voxels a side\n\
-             promise    {} error <= {:e} x {:.4e} = {promised:.4e}; largest sample error reached {reached:.4e}\n\
+             promise    {} error <= {:e} x ({:.4e} to {:.4e}), {promised:.4e} at most; largest sample error reached {reached:.4e}\n\
              content    {per_sample:.4} coefficients per sample, {} outliers, {} missing samples\n\
              id         {} ({})\n",
             self.spacing,
@@ -135,7 +135,8 @@ impl Info {
             self.block_edge,
             self.bound,
             self.tolerance,
-            self.range.1 - self.range.0,
+            self.range.0,
+            self.range.1,
             self.outliers,
             self.missing,
             self.id,
