@@ -79,7 +79,8 @@ struct Cli {
     /// Colour map: viridis turbo rainbow grey plasma inferno magma [default: viridis]
     #[arg(long, value_name = "NAME", help_heading = "Colour")]
     colormap: Option<String>,
-    /// Values of the first and the last colour [default: those of the pictures]
+    /// Values of the first and the last colour [default: those of small pictures
+    /// of 16 frames of the archive]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     range: Option<Pair>,
     /// Colour of the background, as ffffff
@@ -213,8 +214,8 @@ impl Cli {
         })
     }
 
-    /// Colours over the given range, or over that of small pictures of frames spread over all: the same for every
-    /// frame, so that a video does not flicker.
+    /// Colours over the given range, or over that of small pictures of frames spread over the archive: the same for
+    /// every frame, whichever are asked for.
     fn colours(&self, scene: &mut dyn Scene, config: &RenderConfig, format: PictureFormat) -> Result<ColourMap> {
         let values_only = format == PictureFormat::Npy && self.colormap.is_none();
         let range = match self.range {
@@ -222,7 +223,7 @@ impl Cli {
             None if values_only => (0.0, 1.0),
             None => {
                 let (lo, hi) = picture_range(scene, config)?;
-                self.common.note(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+                self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
                 (lo, hi)
             }
         };
@@ -245,13 +246,13 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
 /// The range of small pictures of a few frames; (0, 1) if they show nothing.
 fn picture_range(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(f64, f64)> {
     const PIXELS: f64 = 64.0;
-    const FRAMES: usize = 32;
+    const FRAMES: usize = 16;
     let mut small = config.clone();
     let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
     small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
     small.view.scale = small.view.scale.map(|s| s * shrink);
-    let last = config.frames.len().saturating_sub(1);
-    small.frames = (0..FRAMES).map(|i| config.frames[i * last / (FRAMES - 1)]).collect();
+    let last = scene.frames().unwrap_or(1).saturating_sub(1);
+    small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
     small.frames.dedup();
     let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
     render(scene, &small, &Silent, &mut |_, picture| {

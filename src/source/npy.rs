@@ -115,7 +115,7 @@ fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
 
 fn sample_type(dtype: &DType) -> Parsed<(SampleType, bool)> {
     let refused = || {
-        let hint = "supported are integers of 8 to 32 bits and floats of 16 to 64; convert with .astype(np.int32), say";
+        let hint = "supported are u1 i1 u2 i2 u4 i4 f2 f4 f8 (bytes, not bits); convert with .astype(np.int32), say";
         format!("its samples are {}; {hint}", dtype.descr())
     };
     let DType::Plain(ty) = dtype else { return Err(refused()) };
