@@ -6,8 +6,8 @@
 //! gather its blocks        of blocks                 window by window
 //! ```
 //!
-//! Batches keep their order, so the bytes do not depend on the number of threads; their size comes from the memory
-//! budget alone. The bound of a window follows from the value range of all frames up to its end, which never exceeds
+//! Batches keep their order, so the bytes depend neither on the number of threads nor on the memory budget, which fix the
+//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from the value range of all frames up to its end, which never exceeds
 //! that of the archive: no first pass over the data is needed, and a pipe gives the same bytes as files.
 
 mod gather;
