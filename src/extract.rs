@@ -124,14 +124,8 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mu
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
     let mut out = vec![0; frames.len() * piece.region.voxels() * size];
-    for leaf in file.leaves(piece.window) {
-        let numbers = leaf.first_block as usize..leaf.first_block as usize + usize::from(leaf.count);
-        if !numbers.into_iter().any(|b| !file.blocks.region(b).intersect(&piece.region).is_empty()) {
-            continue;
-        }
-        let touches = |e: &BlockEntry| !file.blocks.region(e.id.block as usize).intersect(&piece.region).is_empty();
-        let entries: Vec<BlockEntry> = file.leaf(leaf)?.into_iter().filter(touches).collect();
-        for entries in entries.chunks(at_once) {
+    for entries in file.entries(piece.window, &piece.region) {
+        for entries in entries?.chunks(at_once) {
             let decode =
                 |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;

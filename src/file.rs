@@ -5,7 +5,7 @@ use crate::codec::decode::Block;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
-use crate::volume::{BlockGrid, Grid};
+use crate::volume::{BlockGrid, Grid, Region};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wavesplat_format::{BlockEntry, FileId, LeafEntry, Metadata, Reader};
@@ -105,6 +105,18 @@ impl CoefficientFile {
     /// The entries of a leaf's blocks.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         self.reader.leaf(leaf).map_err(|e| self.failed(e))
+    }
+
+    /// The entries of a window's blocks that touch a region, in order, a leaf of the directory at a time.
+    pub fn entries<'a>(
+        &'a self,
+        window: u32,
+        region: &'a Region,
+    ) -> impl Iterator<Item = Result<Vec<BlockEntry>>> + use<'a> {
+        let touches = |block: u32| !self.blocks.region(block as usize).intersect(region).is_empty();
+        let leaves = self.leaves(window).iter();
+        let reached = leaves.filter(move |l| (l.first_block..).take(l.count.into()).any(touches));
+        reached.map(move |l| Ok(self.leaf(l)?.into_iter().filter(|entry| touches(entry.id.block)).collect()))
     }
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.

@@ -170,15 +170,9 @@ impl Group for CoefficientGroup<'_> {
 
     fn blocks(&self, region: &Region) -> Result<Vec<usize>> {
         let mut found = Vec::new();
-        for leaf in self.file.leaves(self.window) {
-            let numbers = leaf.first_block as usize..leaf.first_block as usize + usize::from(leaf.count);
-            let touching: Vec<usize> =
-                numbers.clone().filter(|b| !self.file.blocks.region(*b).intersect(region).is_empty()).collect();
-            if touching.is_empty() {
-                continue;
-            }
-            let entries = self.file.leaf(leaf)?;
-            found.extend(touching.into_iter().filter(|b| !entries[b - numbers.start].parts.is_empty()));
+        for entries in self.file.entries(self.window, region) {
+            let holding = entries?.into_iter().filter(|entry| !entry.parts.is_empty());
+            found.extend(holding.map(|entry| entry.id.block as usize));
         }
         Ok(found)
     }
