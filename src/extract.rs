@@ -3,6 +3,7 @@
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
+use crate::memory;
 use crate::progress::Progress;
 use crate::volume::Region;
 use rayon::prelude::*;
@@ -79,16 +80,13 @@ struct Piece {
     region: Region,
 }
 
-/// Program, stacks, directories.
-const FIXED_MEMORY: usize = 8 << 20;
-
 impl Pieces {
     fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
         let plane = config.region.dims()[0] * config.region.dims()[1] * file.sample().size();
         let frame = plane * config.region.dims()[2];
-        let available = config.memory.saturating_sub(FIXED_MEMORY + block_bytes(file)) / 2;
+        let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
         if available < plane {
-            let least = (2 * plane + FIXED_MEMORY + block_bytes(file)).div_ceil(1 << 20);
+            let least = (2 * plane + memory::FIXED + block_bytes(file)).div_ceil(1 << 20);
             return Err(Error::usage(format!("--memory: extracting from this file needs at least {least}MiB")));
         }
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());

@@ -5,6 +5,7 @@ use crate::codec::decode::Block;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
+use crate::scan::join_ranges;
 use crate::volume::{BlockGrid, Grid, Region};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -69,8 +70,8 @@ impl CoefficientFile {
 
     /// Range of the decoded samples of all windows; (0, 0) if all are missing.
     pub fn value_range(&self) -> (f64, f64) {
-        let join = |a: (f64, f64), w: &wavesplat_format::Window| (a.0.min(w.min), a.1.max(w.max));
-        let range = self.metadata().windows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), join);
+        let ranges = self.metadata().windows.iter().map(|w| (w.min, w.max));
+        let range = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), join_ranges);
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 

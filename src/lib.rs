@@ -64,6 +64,7 @@ pub mod extract;
 pub mod file;
 pub mod footprint;
 pub mod mapped;
+mod memory;
 pub mod npy;
 pub mod output;
 pub mod progress;

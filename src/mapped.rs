@@ -27,6 +27,13 @@ pub enum Access {
     Read,
 }
 
+impl Access {
+    /// What `--no-mmap` asks for, or the default.
+    pub fn unless(no_mmap: bool) -> Self {
+        if no_mmap { Self::Read } else { Self::Map }
+    }
+}
+
 /// An open file, its length and modification time as they were at open.
 #[derive(Debug)]
 pub struct FileBytes {

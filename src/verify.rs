@@ -4,9 +4,10 @@ use crate::bound::{self, difference_up};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
+use crate::memory::MOST_BLOCKS;
 use crate::progress::Progress;
 use crate::sample;
-use crate::source::{FrameSource, FrameWindow};
+use crate::source::{FrameSource, FrameWindow, read_frames};
 use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_format::BlockEntry;
@@ -121,9 +122,6 @@ pub fn verify(
     Ok(report)
 }
 
-/// Enough blocks to keep workers busy.
-const MOST_BLOCKS: usize = 64;
-
 fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
     let (a, b) = (source.archive(), file);
     if a.grid.dims != b.grid.dims || a.sample != b.sample() || a.frames.is_some_and(|f| f != b.frames()) {
@@ -151,17 +149,9 @@ fn check_block(
     let Some(source) = source else { return Ok(Comparison::default()) };
     let region = file.blocks.region(entry.id.block as usize);
     let decoded = block.samples(codec);
-    let frame_bytes = region.voxels() * codec.sample.size();
-    let mut original = vec![0; decoded.len()];
-    for (frame, bytes) in original.chunks_exact_mut(frame_bytes).enumerate() {
-        source.read_box(frame, &region, bytes)?;
-    }
+    let original = read_frames(source, 0..codec.frames(), &region, codec.sample)?;
     let first_frame = file.window_range(entry.id.window).start;
-    let place = |frame: usize, voxel: usize| {
-        let [nx, ny, _] = region.dims();
-        let inside = [voxel % nx, voxel / nx % ny, voxel / (nx * ny)];
-        Place { frame: first_frame + frame, voxel: std::array::from_fn(|a| region.start[a] + inside[a]) }
-    };
+    let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel) };
     Ok(compare(codec, &original, &decoded, place))
 }
 

@@ -99,6 +99,13 @@ impl Region {
         let [x, y, z] = std::array::from_fn(|a| voxel[a] - self.start[a]);
         (z * d[1] + y) * d[0] + x
     }
+
+    /// The voxel that stands at `index` in the region's own array.
+    pub fn voxel(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.dims();
+        let inside = [index % nx, index / nx % ny, index / (nx * ny)];
+        std::array::from_fn(|a| self.start[a] + inside[a])
+    }
 }
 
 /// A volume cut into boxes of `edge` voxels a side; those at the upper faces may be smaller.
@@ -166,6 +173,14 @@ mod tests {
             }
         }
         assert!(seen.iter().all(|n| *n == 1));
+    }
+
+    #[test]
+    fn a_voxel_and_its_place_in_the_array_are_inverse() {
+        let region = Region { start: [2, 0, 5], end: [5, 4, 7] };
+        for (i, v) in region.iter().enumerate() {
+            assert_eq!((region.index(v), region.voxel(i)), (i, v));
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The library's rooms from the lowest to the highest; a room may use those on lower floors only.
 const FLOORS: [&[&str]; 7] = [
-    &["error", "progress"],
+    &["error", "progress", "memory"],
     &["sample", "volume", "mapped", "output"],
     &["bound", "wavelet", "camera", "footprint", "source", "npy"],
     &["codec", "scan"],

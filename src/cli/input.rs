@@ -70,7 +70,7 @@ impl InputArgs {
 
     /// How the bytes of files are reached.
     pub fn access(&self) -> Access {
-        if self.no_mmap { Access::Read } else { Access::Map }
+        Access::unless(self.no_mmap)
     }
 
     /// Opens an archive.

@@ -55,9 +55,7 @@ impl Tally {
         self.reached = self.reached.max(error);
         self.squared_error += error * error;
     }
-}
 
-impl Tally {
     /// Adds a group of present samples whose errors are clearly within the bound, by vector code and with one
     /// rounding up at the end. False if they are not, so that each must be looked at; nothing is added then.
     fn add_clearly_within(&mut self, codec: &WindowCodec, group: &Group) -> bool {

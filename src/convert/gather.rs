@@ -5,7 +5,7 @@ use crate::bound::{self, Bound};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
 use crate::scan::{Scan, join_ranges, scan};
-use crate::source::{Archive, FrameSource, FrameWindow};
+use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::Grid;
 use crate::wavelet;
 use crossbeam::channel::Sender;
@@ -85,8 +85,7 @@ impl WindowReader<'_> {
         let (MissingPolicy::Error, Some((frame, voxel))) = (self.config.missing, seen.first_missing) else {
             return Ok(());
         };
-        let [nx, ny, _] = self.archive.grid.dims;
-        let [x, y, z] = [voxel % nx, voxel / nx % ny, voxel / (nx * ny)];
+        let [x, y, z] = self.archive.grid.whole().voxel(voxel);
         Err(Error::input(
             window.name(frame),
             format!(
@@ -123,11 +122,7 @@ impl WindowReader<'_> {
     /// The samples of one block, frame by frame.
     fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let region = self.plan.blocks.region(block);
-        let frame_bytes = region.voxels() * self.archive.sample.size();
-        let mut samples = vec![0; frame_bytes * window.frames()];
-        for (frame, bytes) in samples.chunks_exact_mut(frame_bytes).enumerate() {
-            window.read_box(frame, &region, bytes)?;
-        }
+        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
     }
 }

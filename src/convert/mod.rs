@@ -17,6 +17,7 @@ use crate::bound::Bound;
 use crate::codec::WindowCodec;
 use crate::codec::encode::{Encoded, Encoder};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::progress::Progress;
 use crate::sample::{self, SampleType};
 use crate::source::{Archive, FrameSource};
@@ -182,8 +183,8 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let raw = samples * sample.size();
     let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
     let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
-    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + FIXED_MEMORY;
-    let fits = (1..=MOST_BLOCKS_IN_FLIGHT).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
+    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + memory::FIXED;
+    let fits = (1..=memory::MOST_BLOCKS).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(config.reserved).max(1) as f64;
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
@@ -195,10 +196,6 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
 /// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
-/// Program, stacks and directories.
-const FIXED_MEMORY: usize = 8 << 20;
-/// Enough to keep workers busy; more only delays the first output.
-const MOST_BLOCKS_IN_FLIGHT: usize = 64;
 
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
 fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {

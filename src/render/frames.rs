@@ -4,7 +4,7 @@ use super::scene::{Group, Layout, Scene, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing};
 use crate::scan::scan;
-use crate::source::{Archive, FrameSource, FrameWindow};
+use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
 
@@ -90,11 +90,8 @@ impl Group for FrameGroup<'_> {
 
     fn terms(&self, block: usize) -> Result<Terms> {
         let (archive, region) = (self.archive, self.blocks.region(block));
-        let frame_bytes = region.voxels() * archive.sample.size();
-        let mut samples = vec![0; frame_bytes * self.frames.len()];
-        for (frame, bytes) in self.frames.iter().zip(samples.chunks_exact_mut(frame_bytes)) {
-            self.window.read_box(*frame, &region, bytes)?;
-        }
+        let frames = self.frames.iter().copied();
+        let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
         let declared = self.missing_value;
         Ok(Terms::of_samples(&self.layout, archive.sample, &samples, |_, v| is_missing(v, declared)))
     }

@@ -191,6 +191,17 @@ impl Eye {
         Tile::cover(self.camera.size[0], rows, planes)
     }
 
+    /// Copies the first planes of a tile to their places in as many whole pictures.
+    fn paste<T>(&self, tile: &Tile, planes: usize, pictures: &mut [T], convert: impl Fn(f64) -> T) {
+        let width = tile.x.len();
+        for (plane, pixels) in tile.planes.chunks_exact(tile.pixels()).take(planes).enumerate() {
+            for (y, line) in tile.y.clone().zip(pixels.chunks_exact(width)) {
+                let at = plane * self.pixels() + y * self.camera.size[0] + tile.x.start;
+                pictures[at..at + width].iter_mut().zip(line).for_each(|(to, from)| *to = convert(*from));
+            }
+        }
+    }
+
     /// Whether any voxel of a block can reach these rows of the picture.
     fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
         let region = self.blocks.region(block).intersect(&self.clip);
@@ -232,10 +243,12 @@ fn render_group(
     report: &mut RenderReport,
 ) -> Result<Vec<f32>> {
     let layout = group.layout();
-    let blocks = group.blocks(&eye.clip)?;
+    let mut blocks = group.blocks(&eye.clip)?;
+    let held = blocks.len();
+    blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
     report.blocks += eye.blocks.len() as u64;
-    report.blocks_empty += (eye.blocks.len() - blocks.len()) as u64;
-    report.blocks_outside += blocks.iter().filter(|b| !eye.sees(**b, &(0..eye.camera.size[1]))).count() as u64;
+    report.blocks_empty += (eye.blocks.len() - held) as u64;
+    report.blocks_outside += (held - blocks.len()) as u64;
     let mut pictures = vec![f32::NAN; layout.frames * eye.pixels()];
     for rows in budget.bands(&layout) {
         let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
@@ -244,7 +257,7 @@ fn render_group(
         eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
         let mut clock = Instant::now();
         tiles.par_iter_mut().for_each(|tile| finish(tile, group, &layout, weights));
-        tiles.iter().for_each(|tile| paste(tile, layout.frames, eye, &mut pictures));
+        tiles.iter().for_each(|tile| eye.paste(tile, layout.frames, &mut pictures, |pixel| pixel as f32));
         lap(&mut clock, &mut report.inverse_seconds);
     }
     group.finish()?;
@@ -283,15 +296,4 @@ fn absent_weight(layout: &Layout, planes: &[Lane], frame: usize) -> Lane {
     }
     let (one, all) = (planes[layout.absent(frame)], planes[layout.absent_in_all()]);
     std::array::from_fn(|l| one[l] + all[l])
-}
-
-/// Copies the frames of a finished tile to their places in the pictures.
-fn paste(tile: &Tile, frames: usize, eye: &Eye, pictures: &mut [f32]) {
-    let width = tile.x.len();
-    for (f, pixels) in tile.planes.chunks_exact(tile.pixels()).take(frames).enumerate() {
-        for (y, line) in tile.y.clone().zip(pixels.chunks_exact(width)) {
-            let at = f * eye.pixels() + y * eye.camera.size[0] + tile.x.start;
-            pictures[at..at + width].iter_mut().zip(line).for_each(|(to, from)| *to = *from as f32);
-        }
-    }
 }

@@ -5,6 +5,7 @@
 use super::scene::{Layout, Scene};
 use super::splat::TILE;
 use crate::error::{Error, Result};
+use crate::memory;
 use std::ops::Range;
 
 /// What is allocated at once.
@@ -16,15 +17,13 @@ pub(super) struct Budget {
     block_bytes: usize,
 }
 
-/// Program, stacks, directories.
-const FIXED_MEMORY: usize = 8 << 20;
 /// The weights' sum, and that of uncut footprints, for every pixel.
 const WEIGHT_BYTES: usize = 16;
 
 impl Budget {
     /// For pictures of `size` pixels of a scene.
     pub(super) fn new(memory: usize, size: [usize; 2], scene: &dyn Scene) -> Result<Self> {
-        let fixed = FIXED_MEMORY + size[0] * size[1] * WEIGHT_BYTES;
+        let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
         let budget = Self { available: memory.saturating_sub(fixed), size, block_bytes: scene.block_bytes() };
         let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1)) + budget.block_bytes;
         if least > budget.available {
@@ -65,11 +64,9 @@ impl Budget {
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let used = self.picture_bytes(layout.frames) + self.row_bytes(layout.planes()) * rows.div_ceil(TILE);
-        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, MOST_BLOCKS)
+        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, memory::MOST_BLOCKS)
     }
 }
 
 /// Rows of tiles that a band should have: blocks that reach over a band's edge are decoded for both.
 const FEW_ROWS: usize = 4;
-/// Enough blocks to keep workers busy.
-const MOST_BLOCKS: usize = 64;

@@ -67,12 +67,7 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
         let mut tiles = eye.tiles(rows.clone(), 1);
         let ones = |b: usize| Ok(Terms::ones(eye.blocks.region(b).voxels()));
         eye.splat(&mut tiles, &blocks, budget.batch(&layout, rows.len()), ones, &mut RenderReport::default())?;
-        for tile in &tiles {
-            let width = tile.x.len();
-            for (y, line) in tile.y.clone().zip(tile.planes.chunks_exact(width)) {
-                out[y * eye.camera.size[0] + tile.x.start..][..width].copy_from_slice(line);
-            }
-        }
+        tiles.iter().for_each(|tile| eye.paste(tile, 1, &mut out, |sum| sum));
     }
     Ok(out)
 }

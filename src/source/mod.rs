@@ -134,6 +134,21 @@ pub trait FrameSource: Send {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>>;
 }
 
+/// The samples of a region of some frames of a window, frame after frame, each of `ty.size()` bytes.
+pub fn read_frames(
+    window: &dyn FrameWindow,
+    frames: impl ExactSizeIterator<Item = usize>,
+    region: &Region,
+    ty: SampleType,
+) -> Result<Vec<u8>> {
+    let frame_bytes = region.voxels() * ty.size();
+    let mut samples = vec![0; frame_bytes * frames.len()];
+    for (frame, bytes) in frames.zip(samples.chunks_exact_mut(frame_bytes)) {
+        window.read_box(frame, region, bytes)?;
+    }
+    Ok(samples)
+}
+
 /// Some consecutive frames, readable from several threads.
 pub trait FrameWindow: Send + Sync {
     /// Number of frames.

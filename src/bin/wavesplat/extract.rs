@@ -54,7 +54,7 @@ enum Format {
 pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
-    let access = if args.no_mmap { Access::Read } else { Access::Map };
+    let access = Access::unless(args.no_mmap);
     let file = CoefficientFile::open(&args.file, access)?;
     let config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,

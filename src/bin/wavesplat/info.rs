@@ -71,7 +71,7 @@ struct WindowInfo {
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {
-    let access = if args.no_mmap { Access::Read } else { Access::Map };
+    let access = Access::unless(args.no_mmap);
     let info = Info::of(&CoefficientFile::open(&args.file, access)?);
     if args.common.json { args.common.report(&info, false) } else { print(&info.text(args.common.verbose)) }
 }
