@@ -53,6 +53,9 @@ impl Method {
     /// The slow exact method: the oracle of the others, and what a splat error of 0 asks for.
     pub const EXACT: Self = Self { name: "exact", radius: 6.0, stated_error: 1.53e-8 };
 
+    /// What certificates measure a cut against: beyond it is less than rounding leaves of a picture. Never splats values.
+    pub const WHOLE: Self = Self { name: "whole", radius: 8.0, stated_error: 1.27e-14 };
+
     /// The cheapest method within `error`; the exact one if none is.
     pub fn within(error: f64) -> Self {
         METHODS.into_iter().find(|m| m.stated_error <= error).unwrap_or(Self::EXACT)
@@ -96,6 +99,14 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
+    /// How far rounding can move a weight, as a share of it, if its place may be off by so many pixels along each axis
+    /// and its depth, at most `depth`, by so many world units.
+    pub fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {
+        let across = 2.0 * self.decay * (self.reach + 1.0) * pixels;
+        let along = self.tau * (off + 4.0 * f64::EPSILON * depth);
+        libm::expm1(2.0 * across + along) + EXPONENTIALS
+    }
+
     /// The pixels along one axis whose centres are within reach of `centre`; `pixels` are there.
     pub fn span(&self, centre: f64, pixels: usize) -> Range<usize> {
         let first = (centre - self.reach - 0.5).ceil().max(0.0);
@@ -123,6 +134,8 @@ impl Footprint {
 
 /// Pixels over which quotients are multiplied up; rounding grows with its square, to 3e-13.
 const RUN: usize = 64;
+/// More than the exponentials of both axes and of the peak, and the quotients of a run, can be off together.
+const EXPONENTIALS: f64 = 2e-12;
 
 #[cfg(test)]
 mod tests {

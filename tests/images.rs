@@ -173,7 +173,7 @@ pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config
     let mut count = 0;
     for memory in [MEMORY, 32 << 20, 24 << 20, 18 << 20, 16 << 20, 14 << 20, 12 << 20, 11 << 20, 10 << 20, 9 << 20] {
         let config = RenderConfig { memory, ..config.clone() };
-        match render(scene, &config, &Silent, &mut |_, _| Ok(())) {
+        match render(scene, &config, &Silent, &mut |_| Ok(())) {
             Err(Error::Usage(_)) => continue,
             other => drop(other.unwrap()),
         }

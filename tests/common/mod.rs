@@ -84,16 +84,26 @@ pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
 pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, frames: usize) -> RenderConfig {
     let kernel = Kernel::new(None, tau, grid).unwrap();
     let frames = (0..frames).collect();
-    RenderConfig { view, kernel, quantity, frames, region: None, splat_error: 0.0, memory: MEMORY }
+    RenderConfig {
+        view,
+        kernel,
+        quantity,
+        frames,
+        region: None,
+        splat_error: 0.0,
+        allowed: None,
+        certify: false,
+        memory: MEMORY,
+    }
 }
 
 /// The pictures, one after another.
 pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, RenderReport) {
     let mut out = Vec::new();
     let mut numbers = Vec::new();
-    let report = render(scene, config, &Silent, &mut |frame, picture| {
-        numbers.push(frame);
-        out.extend_from_slice(picture);
+    let report = render(scene, config, &Silent, &mut |rendered| {
+        numbers.push(rendered.frame);
+        out.extend_from_slice(rendered.picture);
         Ok(())
     });
     assert_eq!(numbers, config.frames);
