@@ -204,6 +204,7 @@ impl Cli {
 
     fn config(&self, scene: &dyn Scene, file: Option<&Metadata>) -> Result<RenderConfig> {
         let grid = scene.grid();
+        let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
         let splat_error = self.splat_error.unwrap_or(tolerance.map_or(1e-4, |t| t / 10.0));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
@@ -227,7 +228,7 @@ impl Cli {
             frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
             region: self.region.map(|r| r.resolve(grid)).transpose()?,
             splat_error,
-            allowed: self.tolerance.map(|t| self.allowed(t, file)).transpose()?,
+            allowed,
             certify: self.error_image.is_some(),
             memory: self.common.memory.0,
         })
@@ -332,7 +333,6 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
         return Ok(PictureFormat::Png);
     }
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    parse_format(ending).map_err(|names| {
-        Error::usage(format!("-o {}: the ending says no format; give --format, {names}", path.display()))
-    })
+    parse_format(ending)
+        .map_err(|names| Error::usage(format!("{}: the ending says no format: {names}", path.display())))
 }

@@ -142,7 +142,10 @@ pub fn render(
     let budget = Budget::new(config, scene)?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = method.stated_error * mean_factor(config.quantity);
+    report.stated_splat_error = match config.quantity {
+        Quantity::Emission => method.stated_error,
+        Quantity::Mean => method.stated_error / weights::BACKGROUND, // weights there are down to so much of the largest
+    };
     let mut clock = Instant::now();
     let weights = Weights::new(&eye, config, &budget)?;
     lap(&mut clock, &mut report.weight_seconds);
@@ -165,14 +168,6 @@ pub fn render(
     progress.finish();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
-}
-
-/// How much a splat error in the sums can grow in their quotient, where weights are down to 1 % of the largest.
-fn mean_factor(quantity: Quantity) -> f64 {
-    match quantity {
-        Quantity::Mean => 1.0 / weights::BACKGROUND,
-        Quantity::Emission => 1.0,
-    }
 }
 
 /// Adds the seconds since `clock` to a stage, and restarts it.
@@ -200,7 +195,11 @@ impl Eye {
             let d = grid.dims;
             return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
         }
-        let method = Method::within(config.splat_error / mean_factor(config.quantity));
+        let method = match config.quantity {
+            Quantity::Emission => Method::within(config.splat_error),
+            // A pixel that is not background must keep some of its weights.
+            Quantity::Mean => Method::within((config.splat_error * weights::BACKGROUND).min(weights::BACKGROUND / 2.0)),
+        };
         let camera = Camera::new(&config.view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
         Ok((Self { camera, footprint, grid, blocks, clip }, method))

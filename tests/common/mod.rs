@@ -99,15 +99,22 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
 
 /// The pictures, one after another.
 pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, RenderReport) {
-    let mut out = Vec::new();
-    let mut numbers = Vec::new();
+    let (pictures, _, report) = rendered(scene, config);
+    (pictures, report)
+}
+
+/// The pictures, and their certified errors if those are asked for.
+pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, Vec<f32>, RenderReport) {
+    let (mut pictures, mut errors, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
     let report = render(scene, config, &Silent, &mut |rendered| {
         numbers.push(rendered.frame);
-        out.extend_from_slice(rendered.picture);
+        pictures.extend_from_slice(rendered.picture);
+        errors.extend_from_slice(rendered.error.unwrap_or_default());
         Ok(())
     });
     assert_eq!(numbers, config.frames);
-    (out, report.unwrap())
+    assert_eq!(errors.len(), if config.certify { pictures.len() } else { 0 });
+    (pictures, errors, report.unwrap())
 }
 
 /// The frames of `memory` as they are.
