@@ -15,13 +15,15 @@
 //!  ===== the .wspl file: the only meeting point of the two halves =====                          file.rs
 //!    |
 //!    v
-//!  blocks that the picture needs            render/     plan: what fits in memory; scene: what is splatted
+//!  blocks that the picture needs            render/     plan: what fits in memory; reading: what the error allows to
+//!    |                                                  leave out; scene: what is splatted
 //!    |  terms: (plane, amount) per voxel    codec/      the same decoder
 //!    v
 //!  planes of tiles                          camera.rs, footprint.rs, render/splat.rs (eq 4 and 9)
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
-//!  pictures                                 render/weights.rs (eq 12), colour.rs, sink.rs; output.rs
+//!  pictures, and bounds on their errors     render/finish.rs, weights.rs (eq 12), certificate.rs, colour.rs, sink.rs;
+//!                                           output.rs
 //! ```
 //!
 //! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source. The programs in `bin/`
