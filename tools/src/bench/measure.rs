@@ -80,7 +80,7 @@ impl<'a> Bench<'a> {
             synth.fill(frame, bytes);
             range = values(bytes).iter().fold(range, |(low, high), v| (low.min(*v), high.max(*v)));
         })?;
-        let compared = compared_frames(Contender::Best.frames(frames));
+        let compared = compared_frames(Contender::Shared.frames(frames));
         let compared: Vec<(usize, Vec<f64>)> = compared.into_iter().map(|f| (f, frame(&synth, f))).collect();
         let truth = Truth::new(synth.shape.dims, &self.look, &compared, range.1 - range.0);
         write_json(&self.truth(), &truth)?;
@@ -134,7 +134,7 @@ impl<'a> Bench<'a> {
     fn rendering(&self, group: &Group, number: usize, contender: &Contender) -> Render {
         let (input, way) = match contender {
             Contender::Coefficients(..) => (self.file(number), Way::Coefficients),
-            Contender::Best => (self.frames(), Way::Best),
+            Contender::Shared => (self.frames(), Way::Shared),
             Contender::Textbook(radius) => (self.frames(), Way::Textbook(*radius)),
         };
         let frames = contender.frames(self.config.sweep.dims[3]);

@@ -5,7 +5,7 @@
 //! look      from where pictures are taken, and which of their pixels are compared
 //! truth     those pixels by brute force
 //! step      one measured stage in a process of its own: conversion, or rendering of two views
-//!   stages    ... by the library: conversion, coefficients, the conventional method's best form
+//!   stages    ... by the library: conversion, coefficients, the conventional method with shared footprints
 //!   textbook  ... the conventional method's textbook form
 //! measure   a group: stages in turns (A B A B ...), and the check of every sample
 //! point     what is recorded

@@ -46,8 +46,8 @@ pub const BOUNDS: [BoundRow; 2] = [
 
 /// Where textbooks cut the footprint, in standard deviations.
 pub const TEXTBOOK_CUT: f64 = 3.0;
-/// Frames that the conventional method's best form splats together.
-const BEST_GROUP: usize = 32;
+/// Frames that the conventional method with shared footprints splats together.
+const SHARED_GROUP: usize = 32;
 /// The program's default: what splatting may add, as a share of the tolerance.
 const SPLAT_SHARE: f64 = 0.1;
 /// Splat errors of means are judged where weights are down to 1 % of the largest.
@@ -95,7 +95,7 @@ impl Sweep {
 
     /// An error if a window does not fit, or nothing would be measured.
     pub fn check(&self) -> Result<()> {
-        let least = BASES.iter().map(|b| b.window).fold(BEST_GROUP, usize::max);
+        let least = BASES.iter().map(|b| b.window).fold(SHARED_GROUP, usize::max);
         if self.dims[3] < least {
             return Err(Error::usage(format!("--dims: a window has up to {least} frames, so take as many or more")));
         }
@@ -114,7 +114,7 @@ impl Sweep {
     fn by_tolerance(&self, kind: Kind) -> impl Iterator<Item = Group> {
         self.tolerances.iter().map(move |tolerance| {
             let coefficients = BOUNDS.iter().flat_map(|bound| BASES.iter().map(|b| Contender::Coefficients(b, bound)));
-            let contenders = coefficients.chain([Contender::Best, Contender::Textbook(TEXTBOOK_CUT)]).collect();
+            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(TEXTBOOK_CUT)]).collect();
             Group { kind, tolerance: *tolerance, splat_error: SPLAT_SHARE * tolerance, splat: None, contenders }
         })
     }
@@ -123,7 +123,7 @@ impl Sweep {
     fn by_splat(&self, kind: Kind) -> impl Iterator<Item = Group> {
         self.splats.iter().map(move |method| {
             let coefficients = BASES.iter().map(|b| Contender::Coefficients(b, &BOUNDS[0]));
-            let contenders = coefficients.chain([Contender::Best, Contender::Textbook(method.radius)]).collect();
+            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(method.radius)]).collect();
             let splat_error = MEAN_FACTOR * method.stated_error * (1.0 + 1e-9);
             Group { kind, tolerance: self.fine, splat_error, splat: Some(method.name), contenders }
         })
@@ -157,7 +157,7 @@ pub enum Contender {
     /// By a coefficient file.
     Coefficients(&'static BasisRow, &'static BoundRow),
     /// The conventional method with footprints shared by 32 frames.
-    Best,
+    Shared,
     /// The conventional method with a table of footprints, cut at so many standard deviations.
     Textbook(f64),
 }
@@ -167,7 +167,7 @@ impl Contender {
     pub fn method(&self) -> &'static str {
         match self {
             Self::Coefficients(basis, _) => basis.name,
-            Self::Best => "best",
+            Self::Shared => "shared",
             Self::Textbook(_) => "textbook",
         }
     }
@@ -187,7 +187,7 @@ impl Contender {
 
     /// How many of an archive's frames are rendered: whole windows, so that times per frame compare.
     pub fn frames(&self, all: usize) -> usize {
-        let window = if let Self::Coefficients(basis, _) = self { basis.window } else { BEST_GROUP };
+        let window = if let Self::Coefficients(basis, _) = self { basis.window } else { SHARED_GROUP };
         all - all % window
     }
 }
@@ -255,7 +255,7 @@ mod tests {
         let frames = |c: Contender| c.frames(66);
         assert_eq!(frames(Contender::Coefficients(&BASES[0], &BOUNDS[0])), 64);
         assert_eq!(frames(Contender::Coefficients(&BASES[1], &BOUNDS[0])), 66);
-        assert_eq!(frames(Contender::Best), 64);
+        assert_eq!(frames(Contender::Shared), 64);
         assert!(Sweep { dims: [8, 8, 8, 32], ..Sweep::quick() }.check().is_err());
     }
 }

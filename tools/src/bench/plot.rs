@@ -32,7 +32,7 @@ fn time(results: &Results) -> Figure {
         line("coefficients, Haar", BLUE, Marker::Disc),
         line("coefficients, multiwavelet", ORANGE, Marker::Square),
         line("frame by frame, textbook", GREY, Marker::Diamond),
-        line("frame by frame, best", GREEN, Marker::Triangle),
+        line("frame by frame, shared footprints", GREEN, Marker::Triangle),
     ];
     let at = |p: &Point| (p.rendering.image_error.largest, p.rendering.milliseconds_per_frame);
     let of = |kind: &str, method: &str, bound: Option<&str>, sweep: &str| {
@@ -47,7 +47,7 @@ fn time(results: &Results) -> Figure {
             of(kind, "haar", first, "tolerance"),
             of(kind, "multi", first, "tolerance"),
             of(kind, "textbook", None, "splat"),
-            of(kind, "best", None, "splat"),
+            of(kind, "shared", None, "splat"),
         ];
         each.into_iter().enumerate().map(|(line, points)| Curve { line, points }).collect()
     };

@@ -28,7 +28,7 @@ pub struct Point {
     pub kind: String,
     /// The tolerance of the group; the conventional method itself has none.
     pub tolerance: f64,
-    /// `haar` or `multi` for coefficients; `best` or `textbook` for the conventional method.
+    /// `haar` or `multi` for coefficients; `shared` or `textbook` for the conventional method.
     pub method: String,
     /// What coefficients promise.
     pub bound: Option<String>,
@@ -141,7 +141,7 @@ impl Point {
             peak_bytes: Some(1),
         };
         let (group, sweep) = ("tolerance/smooth/1e-1".into(), "tolerance".into());
-        let (kind, method) = ("smooth".into(), "best".into());
+        let (kind, method) = ("smooth".into(), "shared".into());
         let (tolerance, bound, frames, conversion) = (0.1, None, 32, None);
         Self { key: key.into(), group, sweep, kind, tolerance, method, bound, frames, conversion, rendering }
     }

@@ -10,7 +10,7 @@ use wavesplat::error::{Error, Result};
 const HEAD: &str = "\
 Every stage ran in a process of its own, the contenders of a group in turns. Errors are shares of the value range.
 Pictures of other bounds than the first are rendered once, for their errors.
-*textbook*: a table of 32 x 32 footprints, one look-up for each voxel and frame. *best*: the conventional method with
+*textbook*: a table of 32 x 32 footprints, one look-up for each voxel and frame. *shared*: the conventional method with
 footprints shared by 32 frames. *first*: from opening the input; *further*: another view. Milliseconds for each frame, the
 median and in brackets the least. Memory is the peak of the process, pages of mapped files included. Image errors are
 against brute force, at every fifth pixel along each axis of four frames of the first view.
@@ -59,7 +59,7 @@ pub(super) fn kinds(points: &[Point]) -> Vec<&str> {
 }
 
 const RENDER_HEAD: &str = "\
-| tolerance | method | bound | splat | first, ms | further, ms | textbook / this | best / this | largest error | rms error | promised | certified / true | MB |
+| tolerance | method | bound | splat | first, ms | further, ms | textbook / this | shared / this | largest error | rms error | promised | certified / true | MB |
 |---|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
@@ -87,7 +87,7 @@ fn rendered(point: &Point, all: &[Point]) -> String {
         time(&r.first_view),
         time(&r.further_view),
         against("textbook"),
-        against("best"),
+        against("shared"),
         r.image_error.largest,
         r.image_error.rms,
         share(r.promised),

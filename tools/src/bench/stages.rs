@@ -109,7 +109,7 @@ impl Method {
                 let file = CoefficientFile::open(&step.input, Access::Map)?;
                 Self::Library(Box::new(CoefficientScene::new(file, What::Coefficients)))
             }
-            Way::Best => Self::Library(Box::new(FrameScene::new(frames()?, None))),
+            Way::Shared => Self::Library(Box::new(FrameScene::new(frames()?, None))),
             Way::Textbook(radius) => Self::Textbook(frames()?, radius),
         })
     }

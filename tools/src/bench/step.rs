@@ -65,7 +65,7 @@ pub(super) struct Render {
 pub(super) enum Way {
     Coefficients,
     /// Footprints shared by 32 frames.
-    Best,
+    Shared,
     /// A table of footprints, cut at so many standard deviations.
     Textbook(f64),
 }
