@@ -57,6 +57,10 @@ pub(super) struct Curve {
 const PANEL: (u32, u32) = (460, 380);
 const HEAD: u32 = 80;
 const ENTRY: u32 = 32;
+/// Pixels on the left of a panel's axis.
+const LEFT: i32 = 84;
+/// Pixels around a panel.
+const MARGIN: i32 = 10;
 /// Names side by side in the legend.
 const NAMES: usize = 4;
 /// Panels side by side.
@@ -129,21 +133,23 @@ fn legend(figure: &Figure, area: &Area<'_>) -> Drawn {
 }
 
 fn draw_panel(figure: &Figure, panel: &Panel, area: &Area<'_>, root: &Area<'_>) -> Drawn {
+    let title = ("sans-serif", TITLE).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Center));
+    area.draw(&Text::new(panel.title.clone(), (MARGIN + LEFT, 24), title))?;
     let level = figure.level.as_ref().map(|(level, _)| *level);
     let (x, y) = (figure.range(|p| p.0, None), figure.range(|p| p.1, level));
     let mut chart = ChartBuilder::on(area)
-        .margin(10)
+        .margin(MARGIN)
+        .margin_top(44)
         .margin_right(24)
         .x_label_area_size(58)
-        .y_label_area_size(84)
-        .caption(&panel.title, ("sans-serif", TITLE))
+        .y_label_area_size(LEFT)
         .build_cartesian_2d(x.clone().log_scale(), y.log_scale())?;
     axes(figure, &mut chart)?;
     if let Some((level, name)) = &figure.level {
         let style = BLACK.stroke_width(2);
         chart.draw_series(DashedLineSeries::new([(x.start, *level), (x.end, *level)], 3, 5, style))?;
-        let text = ("sans-serif", TEXT).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Top));
-        chart.draw_series([Text::new(name.clone(), (1.3 * x.start, 0.85 * level), text)])?;
+        let text = ("sans-serif", TEXT).into_font().color(&BLACK).pos(Pos::new(HPos::Left, VPos::Bottom));
+        chart.draw_series([Text::new(name.clone(), (1.3 * x.start, 1.1 * level), text)])?;
     }
     panel.curves.iter().try_for_each(|curve| draw_curve(&figure.lines[curve.line], curve, &mut chart, root))
 }

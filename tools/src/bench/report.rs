@@ -13,7 +13,8 @@ Pictures of other bounds than the first are rendered once, for their errors.
 *textbook*: a table of 32 x 32 footprints, one look-up for each voxel and frame. *shared*: the conventional method with
 footprints shared by 32 frames. *first*: from opening the input; *further*: another view. Milliseconds for each frame, the
 median and in brackets the least. Memory is the peak of the process, pages of mapped files included. Image errors are
-against brute force, at every fifth pixel along each axis of four frames of the first view.
+against brute force, at every fifth pixel along each axis of four frames of the first view. In the figure of times,
+coefficients run over tolerances with the default splat error, the conventional forms over splat methods.
 ";
 
 /// Writes both.
