@@ -1,4 +1,5 @@
-//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets.
+//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets, the benchmark.
+pub mod bench;
 pub mod demo;
 pub mod eddy;
 pub mod lattice;

@@ -1,10 +1,12 @@
-//! The program: the demo and synthetic archives.
+//! The program: the demo, synthetic archives and the benchmark.
 
 use clap::{Args, Parser, Subcommand};
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
+use wavesplat_tools::bench::{self, plan::Sweep, sanity};
 use wavesplat_tools::demo;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
@@ -16,8 +18,10 @@ Examples:
   wavesplat-tools synth sparse --dims 256x256x256x500 --dtype u8 -o frames/
   wavesplat-tools synth noise --dims 64x64x64x10 --format raw -o - | wc -c
   wavesplat-tools demo --frames-only -o eddy/
+  wavesplat-tools bench -o bench-output
+  wavesplat-tools bench --quick -o quick
 
-wavesplat's own instruments: the demo and synthetic archives.";
+wavesplat's own instruments: the demo, synthetic archives and the benchmark.";
 
 #[derive(Parser)]
 #[command(version, about = EXAMPLES, long_about = None, subcommand_required = true)]
@@ -32,6 +36,14 @@ enum Command {
     Demo(Demo),
     /// Write a synthetic archive
     Synth(SynthArgs),
+    /// Measure run time against error, beside the conventional method; an interrupted run goes on where it was
+    Bench(BenchArgs),
+    /// One measured stage of the benchmark
+    #[command(hide = true)]
+    BenchStep {
+        /// What to do, as JSON
+        step: String,
+    },
 }
 
 #[derive(Args)]
@@ -41,7 +53,7 @@ struct Demo {
     frames_only: bool,
     /// The folder to write to
     #[arg(short, long, value_name = "DIR", default_value = "demo-output")]
-    output: std::path::PathBuf,
+    output: PathBuf,
 }
 
 #[derive(Args)]
@@ -65,6 +77,57 @@ struct SynthArgs {
     output: String,
 }
 
+#[derive(Args)]
+struct BenchArgs {
+    /// The folder of results.json, results.md and the figures
+    #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
+    output: PathBuf,
+    /// Small volumes and few points: whether everything works, in seconds
+    #[arg(long)]
+    quick: bool,
+    /// Begin anew where there are results already
+    #[arg(long)]
+    force: bool,
+    /// Voxels along x, y, z and the number of frames, 33 or more [default: 64x64x64x33]
+    #[arg(long, value_name = "NXxNYxNZxNT", value_parser = parse_dims)]
+    dims: Option<[usize; 4]>,
+    /// Pixels a side of the pictures [default: 256]
+    #[arg(long, value_name = "N")]
+    size: Option<usize>,
+    /// What the archives show, with commas between them [default: all]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Option<Vec<Kind>>,
+    /// Tolerances, with commas between them [default: 1e-1 to 1e-6 by tens]
+    #[arg(long, value_name = "E", value_delimiter = ',', value_parser = parse_tolerance)]
+    tolerances: Option<Vec<f64>>,
+    /// How often every time is taken [default: 3]
+    #[arg(long, value_name = "N")]
+    repeats: Option<usize>,
+    /// The day to write into the results [default: the clock's]
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    date: Option<String>,
+}
+
+impl BenchArgs {
+    fn sweep(&self) -> Sweep {
+        let usual = if self.quick { Sweep::quick() } else { Sweep::default() };
+        Sweep {
+            dims: self.dims.unwrap_or(usual.dims),
+            size: self.size.unwrap_or(usual.size),
+            kinds: self.kinds.clone().unwrap_or(usual.kinds),
+            tolerances: self.tolerances.clone().unwrap_or(usual.tolerances),
+            repeats: self.repeats.unwrap_or(usual.repeats),
+            ..usual
+        }
+    }
+}
+
+/// Reads a tolerance that leaves something to measure.
+fn parse_tolerance(text: &str) -> std::result::Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|t| t.is_finite() && *t > 0.0);
+    number.ok_or_else(|| format!("{text:?} is not a number above 0"))
+}
+
 /// Reads `NXxNYxNZxNT`.
 fn parse_dims(text: &str) -> std::result::Result<[usize; 4], String> {
     let wrong = || format!("{text:?} is not four positive numbers like 64x64x32x100");
@@ -79,14 +142,17 @@ fn parse_dims(text: &str) -> std::result::Result<[usize; 4], String> {
     }
 }
 
+/// Progress on standard error; that nobody reads it is no error.
+fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
 fn demo(args: &Demo) -> Result<()> {
     if args.frames_only {
         return demo::write_frames(&args.output, demo::FRAMES);
     }
     let files = demo::Files { folder: args.output.clone() };
-    let table = demo::run(&files, &mut |step| {
-        let _ = writeln!(io::stderr().lock(), "{step} ..."); // progress that nobody reads is no error
-    })?;
+    let table = demo::run(&files, &mut |step| say(&format!("{step} ...")))?;
     let figure = files.figure();
     wavesplat::cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
 }
@@ -96,6 +162,18 @@ fn synth(args: &SynthArgs) -> Result<()> {
     let shape = Shape { dims: [nx, ny, nz], frames, ty: args.dtype };
     let synth = Synth { kind: args.kind, shape, seed: args.seed };
     Target::parse(&args.output, args.format)?.write(&shape, |frame, bytes| synth.fill(frame, bytes))
+}
+
+fn bench(args: &BenchArgs) -> Result<()> {
+    let program = std::env::current_exe().map_err(|e| Error::io("wavesplat-tools", "finding this program", e))?;
+    let (output, date) = (args.output.clone(), args.date.clone());
+    let config = bench::Config { sweep: args.sweep(), output, program, force: args.force, date };
+    let results = bench::run(&config, &mut say)?;
+    let wrong = sanity::complaints(&results.points);
+    if !wrong.is_empty() {
+        return Err(Error::BoundMissed { path: args.output.clone(), what: wrong.join("\n") });
+    }
+    wavesplat::cli::print(&format!("{}\n", args.output.join("results.md").display()))
 }
 
 fn report(error: &Error) -> ExitCode {
@@ -108,6 +186,8 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo(&args),
         Command::Synth(args) => synth(&args),
+        Command::Bench(args) => bench(&args),
+        Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),
     };
     result.map_or_else(|e| report(&e), |()| ExitCode::SUCCESS)
 }

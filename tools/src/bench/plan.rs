@@ -1,0 +1,261 @@
+//! Which groups of contenders are measured side by side.
+
+use crate::synth::Kind;
+use clap::ValueEnum;
+use std::fmt;
+use std::iter::successors;
+use wavesplat::bound::Bound;
+use wavesplat::error::{Error, Result};
+use wavesplat::footprint::Method;
+use wavesplat::wavelet::Basis;
+
+/// A basis, and the window it is measured with.
+#[derive(Debug, PartialEq)]
+pub struct BasisRow {
+    /// Its name.
+    pub name: &'static str,
+    /// What the library calls it.
+    pub basis: Basis,
+    /// Frames of a window.
+    pub window: usize,
+}
+
+/// All bases.
+pub const BASES: [BasisRow; 2] = [
+    BasisRow { name: "haar", basis: Basis::Haar, window: 32 },
+    BasisRow { name: "multi", basis: Basis::Multi, window: 33 },
+];
+
+/// A promise.
+#[derive(Debug)]
+pub struct BoundRow {
+    /// Its name.
+    pub name: &'static str,
+    /// What the library calls it.
+    pub bound: Bound,
+    /// How far one sample, and so one pixel, may be off in a window of so many frames, in units of the voxel bound;
+    /// nothing where the mode is no guarantee.
+    pub worst: fn(f64) -> Option<f64>,
+}
+
+/// All promises; a further one is a further line. The first is the one whose splat methods are compared.
+pub const BOUNDS: [BoundRow; 2] = [
+    BoundRow { name: "pointwise", bound: Bound::Pointwise, worst: |_| Some(1.0) },
+    BoundRow { name: "rms", bound: Bound::Rms, worst: |window| Some(window.sqrt()) },
+];
+
+/// Where textbooks cut the footprint, in standard deviations.
+pub const TEXTBOOK_CUT: f64 = 3.0;
+/// Frames that the conventional method with shared footprints splats together.
+const SHARED_GROUP: usize = 32;
+/// The program's default: what splatting may add, as a share of the tolerance.
+const SPLAT_SHARE: f64 = 0.1;
+/// Splat errors of means are judged where weights are down to 1 % of the largest.
+const MEAN_FACTOR: f64 = 100.0;
+
+/// What to measure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// Voxels along x, y, z and the number of frames.
+    pub dims: [usize; 4],
+    /// Pixels a side of a picture.
+    pub size: usize,
+    /// What the archives show.
+    pub kinds: Vec<Kind>,
+    /// The tolerances of the first sweep.
+    pub tolerances: Vec<f64>,
+    /// The tolerance of the second sweep, that of splat methods.
+    pub fine: f64,
+    /// The splat methods of the second sweep.
+    pub splats: Vec<Method>,
+    /// How often every time is taken.
+    pub repeats: usize,
+}
+
+impl Default for Sweep {
+    fn default() -> Self {
+        Self {
+            dims: [64, 64, 64, 33],
+            size: 256,
+            kinds: Kind::value_variants().to_vec(),
+            tolerances: vec![1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
+            fine: 1e-6,
+            splats: splat_methods(),
+            repeats: 3,
+        }
+    }
+}
+
+impl Sweep {
+    /// A sweep of seconds that shows whether everything works.
+    pub fn quick() -> Self {
+        let splats = [Method::within(1.0), Method::EXACT].to_vec();
+        Self { dims: [12, 10, 8, 33], size: 40, tolerances: vec![1e-1, 1e-3], splats, repeats: 1, ..Self::default() }
+    }
+
+    /// An error if a window does not fit, or nothing would be measured.
+    pub fn check(&self) -> Result<()> {
+        let least = BASES.iter().map(|b| b.window).fold(SHARED_GROUP, usize::max);
+        if self.dims[3] < least {
+            return Err(Error::usage(format!("--dims: a window has up to {least} frames, so take as many or more")));
+        }
+        if self.repeats == 0 || self.kinds.is_empty() || self.tolerances.is_empty() {
+            return Err(Error::usage("--repeats, --kinds, --tolerances: nothing is left to measure"));
+        }
+        Ok(())
+    }
+
+    /// All that is to be measured, archive by archive.
+    pub fn groups(&self) -> Vec<Group> {
+        self.kinds.iter().flat_map(|kind| self.by_tolerance(*kind).chain(self.by_splat(*kind))).collect()
+    }
+
+    /// Every basis and bound at each tolerance, with the default splat error.
+    fn by_tolerance(&self, kind: Kind) -> impl Iterator<Item = Group> {
+        self.tolerances.iter().map(move |tolerance| {
+            let coefficients = BOUNDS.iter().flat_map(|bound| BASES.iter().map(|b| Contender::Coefficients(b, bound)));
+            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(TEXTBOOK_CUT)]).collect();
+            Group { kind, tolerance: *tolerance, splat_error: SPLAT_SHARE * tolerance, splat: None, contenders }
+        })
+    }
+
+    /// Every splat method at the fine tolerance; the textbook form cuts its footprints where they do.
+    fn by_splat(&self, kind: Kind) -> impl Iterator<Item = Group> {
+        self.splats.iter().map(move |method| {
+            let coefficients = BASES.iter().map(|b| Contender::Coefficients(b, &BOUNDS[0]));
+            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(method.radius)]).collect();
+            let splat_error = MEAN_FACTOR * method.stated_error * (1.0 + 1e-9);
+            Group { kind, tolerance: self.fine, splat_error, splat: Some(method.name), contenders }
+        })
+    }
+}
+
+/// All splat methods of the library, cheapest first.
+fn splat_methods() -> Vec<Method> {
+    let next = |m: &Method| (*m != Method::EXACT).then(|| Method::within(m.stated_error.next_down()));
+    successors(Some(Method::within(1.0)), next).collect()
+}
+
+/// What is measured in turns, so that what happens to the machine happens to all.
+#[derive(Debug)]
+pub struct Group {
+    /// What the archive shows.
+    pub kind: Kind,
+    /// Of conversions.
+    pub tolerance: f64,
+    /// What splatting may add.
+    pub splat_error: f64,
+    /// The splat method if the group belongs to the second sweep.
+    pub splat: Option<&'static str>,
+    /// Who is measured.
+    pub contenders: Vec<Contender>,
+}
+
+/// A way from frames to pictures.
+#[derive(Debug, Clone, Copy)]
+pub enum Contender {
+    /// By a coefficient file.
+    Coefficients(&'static BasisRow, &'static BoundRow),
+    /// The conventional method with footprints shared by 32 frames.
+    Shared,
+    /// The conventional method with a table of footprints, cut at so many standard deviations.
+    Textbook(f64),
+}
+
+impl Contender {
+    /// The name of the method.
+    pub fn method(&self) -> &'static str {
+        match self {
+            Self::Coefficients(basis, _) => basis.name,
+            Self::Shared => "shared",
+            Self::Textbook(_) => "textbook",
+        }
+    }
+
+    /// The promise, where there is one.
+    pub fn bound(&self) -> Option<&'static str> {
+        if let Self::Coefficients(_, bound) = self { Some(bound.name) } else { None }
+    }
+
+    /// How often its pictures are timed: but for the first bound, pictures are there for their errors.
+    pub fn rounds(&self, repeats: usize) -> usize {
+        match self {
+            Self::Coefficients(_, bound) if bound.name != BOUNDS[0].name => 1,
+            _ => repeats,
+        }
+    }
+
+    /// How many of an archive's frames are rendered: whole windows, so that times per frame compare.
+    pub fn frames(&self, all: usize) -> usize {
+        let window = if let Self::Coefficients(basis, _) = self { basis.window } else { SHARED_GROUP };
+        all - all % window
+    }
+}
+
+impl Group {
+    /// How often its conversions are timed: the second sweep repeats those of the first.
+    pub fn rounds(&self, repeats: usize) -> usize {
+        if self.splat.is_some() { 1 } else { repeats }
+    }
+
+    /// Its name: sweep, kind, tolerance and, in the second sweep, the splat method.
+    pub fn name(&self) -> String {
+        let kind = kind_name(self.kind);
+        match self.splat {
+            Some(splat) => format!("splat/{kind}/{:e}/{splat}", self.tolerance),
+            None => format!("tolerance/{kind}/{:e}", self.tolerance),
+        }
+    }
+
+    /// The names of the points, contender by contender.
+    pub fn keys(&self) -> Vec<String> {
+        let group = self.name();
+        let of =
+            |c: &Contender| format!("{group}/{}{}", c.method(), c.bound().map_or(String::new(), |b| format!("/{b}")));
+        self.contenders.iter().map(of).collect()
+    }
+}
+
+impl fmt::Display for Group {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, tolerance {:e}", kind_name(self.kind), self.tolerance)?;
+        self.splat.map_or(Ok(()), |splat| write!(f, ", {splat}"))
+    }
+}
+
+/// The name of a kind as the command line has it.
+pub fn kind_name(kind: Kind) -> String {
+    kind.to_possible_value().map_or(String::new(), |v| v.get_name().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_point_has_a_name_of_its_own() {
+        let keys: Vec<String> = Sweep::default().groups().iter().flat_map(Group::keys).collect();
+        assert_eq!(keys.iter().collect::<HashSet<_>>().len(), keys.len());
+        assert!(keys.contains(&"tolerance/smooth/1e-3/haar/rms".into()), "{keys:?}");
+        assert!(keys.contains(&"splat/noise/1e-6/footprint-4/textbook".into()), "{keys:?}");
+    }
+
+    #[test]
+    fn all_splat_methods_are_found_and_asked_for() {
+        let methods = splat_methods();
+        assert_eq!((methods[0].name, methods[methods.len() - 1]), ("footprint-3", Method::EXACT));
+        for group in Sweep::default().by_splat(Kind::Smooth) {
+            assert_eq!(Method::within(group.splat_error / MEAN_FACTOR).name, group.splat.unwrap_or_default());
+        }
+    }
+
+    #[test]
+    fn only_whole_windows_are_rendered() {
+        let frames = |c: Contender| c.frames(66);
+        assert_eq!(frames(Contender::Coefficients(&BASES[0], &BOUNDS[0])), 64);
+        assert_eq!(frames(Contender::Coefficients(&BASES[1], &BOUNDS[0])), 66);
+        assert_eq!(frames(Contender::Shared), 64);
+        assert!(Sweep { dims: [8, 8, 8, 32], ..Sweep::quick() }.check().is_err());
+    }
+}

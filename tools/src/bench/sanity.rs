@@ -1,0 +1,123 @@
+//! What must hold of every point, on any machine and however fast it is.
+
+use super::point::{Conversion, Point};
+
+/// Rounding of pictures to f32, and of the comparison.
+const ROUNDING: f64 = 1e-6;
+
+/// A sentence for everything that cannot be right.
+pub fn complaints(points: &[Point]) -> Vec<String> {
+    points.iter().flat_map(alone).chain(order(points)).collect()
+}
+
+/// What is wrong with a point by itself.
+fn alone(point: &Point) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let mut expect = |holds: bool, what: &str| {
+        if !holds {
+            wrong.push(format!("{}: {what}", point.key));
+        }
+    };
+    if let Some(c) = &point.conversion {
+        expect(c.series_outside == 0 && c.share_of_bound <= 1.0, "the bound is missed");
+        expect(c.file_bytes > 0 && c.ratio.is_finite(), "the file is empty");
+        expect(c.rms_voxel_error <= c.largest_voxel_error, "errors contradict each other");
+        expect(c.promised <= point.tolerance * (1.0 + 1e-9), "more than the tolerance is promised");
+    }
+    let (r, error) = (&point.rendering, point.rendering.image_error);
+    expect(error.rms <= error.largest && error.largest.is_finite(), "a pixel is background that should not be");
+    expect(r.promised.is_none_or(|p| error.largest <= p + ROUNDING), "a pixel is further off than promised");
+    expect(r.certified_error.is_none_or(|c| error.largest <= c + ROUNDING), "a pixel is further off than certified");
+    expect(r.first_view.min > 0.0 && r.further_view.min > 0.0, "it took no time");
+    wrong
+}
+
+/// What is wrong with how points of one sweep follow each other.
+fn order(points: &[Point]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (i, a) in points.iter().enumerate() {
+        for b in &points[i + 1..] {
+            if let (true, Some(x), Some(y)) = (alike(a, b), &a.conversion, &b.conversion) {
+                let (loose, tight) = if a.tolerance > b.tolerance { (x, y) } else { (y, x) };
+                if !falls(loose, tight) {
+                    wrong.push(format!("{}, {}: more is kept at a larger tolerance", a.key, b.key));
+                }
+            }
+        }
+    }
+    wrong
+}
+
+/// Whether two points differ in tolerance alone.
+fn alike(a: &Point, b: &Point) -> bool {
+    a.sweep == "tolerance" && b.sweep == a.sweep && (&a.kind, &a.method, &a.bound) == (&b.kind, &b.method, &b.bound)
+}
+
+/// Whether a larger tolerance keeps no more. Blocks that are stored exactly have no coefficients, so that a smaller
+/// tolerance may have fewer, but then its file is larger.
+fn falls(loose: &Conversion, tight: &Conversion) -> bool {
+    loose.coefficients_per_sample <= tight.coefficients_per_sample || loose.file_bytes < tight.file_bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::point::Spread;
+
+    fn converted(tolerance: f64, coefficients_per_sample: f64, file_bytes: u64) -> Point {
+        let conversion = Conversion {
+            seconds: Spread::of(vec![1.0]),
+            megabytes_per_second: 1.0,
+            file_bytes,
+            ratio: 2.0,
+            bytes_per_sample: 2.0,
+            coefficients_per_sample,
+            coefficients_per_voxel: 1.0,
+            outliers: 0,
+            promised: tolerance,
+            largest_voxel_error: tolerance,
+            rms_voxel_error: 0.5 * tolerance,
+            share_of_bound: 1.0,
+            series_outside: 0,
+            peak_bytes: None,
+        };
+        Point { tolerance, conversion: Some(conversion), ..Point::example(&format!("at {tolerance}")) }
+    }
+
+    fn wrong(points: &[Point]) -> usize {
+        complaints(points).len()
+    }
+
+    #[test]
+    fn points_that_may_be_are_accepted() {
+        assert_eq!(complaints(&[converted(0.1, 0.2, 10), converted(0.01, 0.3, 20)]), [""; 0]);
+        assert_eq!(wrong(&[converted(0.1, 0.2, 10), converted(0.01, 0.0, 20)]), 0, "stored exactly");
+    }
+
+    #[test]
+    fn a_larger_tolerance_must_not_keep_more() {
+        assert_eq!(wrong(&[converted(0.1, 0.2, 10), converted(0.01, 0.1, 9)]), 1);
+        assert_eq!(wrong(&[converted(0.01, 0.1, 9), converted(0.1, 0.2, 10)]), 1);
+    }
+
+    #[test]
+    fn broken_promises_are_noticed() {
+        let broken = |change: fn(&mut Point)| {
+            let mut point = converted(0.1, 0.2, 10);
+            change(&mut point);
+            wrong(&[point])
+        };
+        assert_eq!(broken(|p| p.rendering.promised = Some(0.4)), 1);
+        assert_eq!(broken(|p| p.rendering.promised = Some(0.5)), 0);
+        assert_eq!(broken(|p| p.rendering.certified_error = Some(0.4)), 1);
+        assert_eq!(broken(|p| p.rendering.image_error.largest = f64::INFINITY), 1);
+        assert_eq!(broken(|p| p.rendering.further_view.min = 0.0), 1);
+        let of_conversion: [fn(&mut Conversion); 3] =
+            [|c| c.series_outside = 1, |c| c.file_bytes = 0, |c| c.promised = 0.11];
+        for change in of_conversion {
+            let mut point = converted(0.1, 0.2, 10);
+            point.conversion.as_mut().into_iter().for_each(change);
+            assert_eq!(wrong(&[point]), 1);
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! The conventional method as textbooks have it (Westover, Footprint Evaluation for Volume Rendering, 1990): the
+//! projected kernel is computed once into a table of 32 x 32 positions within a pixel; then every frame adds, for
+//! each of its voxels, value times table to the picture.
+//!
+//! Where voxels are in the picture is computed once a view. Voxels of value 0 add nothing and are passed over. All
+//! is f32. Frames are rendered in parallel, each by one thread. There is no attenuation: weights do not depend on depth.
+
+use super::look::{Look, SIGMA};
+use rayon::prelude::*;
+use wavesplat::camera::Camera;
+use wavesplat::error::Result;
+use wavesplat::source::FrameSource;
+use wavesplat::volume::Grid;
+
+/// Positions within a pixel along each axis.
+const POSITIONS: usize = 32;
+/// A pixel is background where its weights sum to less than this share of the largest.
+const BACKGROUND: f32 = 0.01;
+
+/// Renders the first `frames` frames of a source of f32 samples, giving each to `sink`.
+pub(super) fn render(
+    source: &mut dyn FrameSource,
+    frames: usize,
+    look: &Look,
+    radius: f64,
+    sink: &mut dyn FnMut(usize, &[f32]),
+) -> Result<()> {
+    let grid = source.archive().grid;
+    let splatter = Splatter::new(&grid, look, radius)?;
+    let weights = splatter.splat(&vec![1.0; grid.whole().voxels()]);
+    let at_once = rayon::current_num_threads();
+    for first in (0..frames).step_by(at_once) {
+        let window = source.window(first, at_once.min(frames - first))?;
+        let picture = |frame: usize| -> Result<Vec<f32>> {
+            let mut bytes = vec![0; grid.whole().voxels() * size_of::<f32>()];
+            window.read_box(frame, &grid.whole(), &mut bytes)?;
+            Ok(splatter.mean(&splatter.splat(&samples(&bytes)), &weights))
+        };
+        let pictures = (0..window.frames()).into_par_iter().map(picture).collect::<Result<Vec<_>>>()?;
+        pictures.iter().zip(first..).for_each(|(picture, frame)| sink(frame, picture));
+    }
+    Ok(())
+}
+
+fn samples(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+/// All that is the same for every frame of a view.
+struct Splatter {
+    table: Table,
+    places: Vec<Place>,
+    size: usize,
+}
+
+/// Where a voxel's footprint goes.
+struct Place {
+    /// The first pixel of the first row, in a picture with a margin.
+    start: u32,
+    /// Which of the table's footprints.
+    footprint: u32,
+}
+
+impl Splatter {
+    fn new(grid: &Grid, look: &Look, radius: f64) -> Result<Self> {
+        let (camera, table) = (Camera::new(&look.view(), grid)?, Table::new(SIGMA * look.scale, radius));
+        let width = look.size + table.side;
+        let place = |voxel: [usize; 3]| {
+            let [x, y, _] = camera.project(grid.position(voxel));
+            let part = |c: f64| ((c - c.floor()) * POSITIONS as f64) as usize;
+            // The margin is as wide as a footprint reaches, so that column 0 is where that of pixel 0 begins.
+            let start = y.floor() as usize * width + x.floor() as usize;
+            Place { start: start as u32, footprint: (part(y) * POSITIONS + part(x)) as u32 }
+        };
+        Ok(Self { places: grid.whole().iter().map(place).collect(), table, size: look.size })
+    }
+
+    /// The sums of value times footprint, in a picture with a margin.
+    fn splat(&self, values: &[f32]) -> Vec<f32> {
+        let (side, width) = (self.table.side, self.size + self.table.side);
+        let mut picture = vec![0.0; width * width];
+        for (place, value) in self.places.iter().zip(values).filter(|(_, value)| **value != 0.0) {
+            let footprint = self.table.footprint(place.footprint as usize);
+            for (row, weights) in footprint.chunks_exact(side).enumerate() {
+                let line = &mut picture[place.start as usize + row * width..][..side];
+                line.iter_mut().zip(weights).for_each(|(pixel, weight)| *pixel += value * weight);
+            }
+        }
+        picture
+    }
+
+    /// The weighted mean without the margin; NaN is background.
+    fn mean(&self, sums: &[f32], weights: &[f32]) -> Vec<f32> {
+        let threshold = BACKGROUND * weights.iter().copied().fold(0.0, f32::max);
+        let (reach, width) = (self.table.side / 2, self.size + self.table.side);
+        let row = |y: usize| (y + reach) * width + reach;
+        let mean = |i: usize| if weights[i] < threshold { f32::NAN } else { sums[i] / weights[i] };
+        (0..self.size).flat_map(|y| (row(y)..row(y) + self.size).map(mean)).collect()
+    }
+}
+
+/// The footprint for every position of a voxel within a pixel.
+struct Table {
+    /// Pixels a side, odd; the voxel is in the middle one.
+    side: usize,
+    weights: Vec<f32>,
+}
+
+impl Table {
+    /// Of a Gaussian of `sigma` pixels, cut at a square of `radius` standard deviations.
+    fn new(sigma: f64, radius: f64) -> Self {
+        let reach = (radius * sigma).ceil() as usize;
+        let side = 2 * reach + 1;
+        let line = |position: usize| {
+            let centre = reach as f64 + (position as f64 + 0.5) / POSITIONS as f64;
+            let gaussian = move |pixel: usize| (-0.5 * ((pixel as f64 + 0.5 - centre) / sigma).powi(2)).exp();
+            (0..side).map(gaussian).collect::<Vec<f64>>()
+        };
+        let lines: Vec<Vec<f64>> = (0..POSITIONS).map(line).collect();
+        let footprint = |y: &Vec<f64>, x: &Vec<f64>| {
+            y.iter().flat_map(|a| x.iter().map(move |b| (a * b) as f32)).collect::<Vec<f32>>()
+        };
+        let weights = lines.iter().flat_map(|y| lines.iter().flat_map(move |x| footprint(y, x))).collect();
+        Self { side, weights }
+    }
+
+    fn footprint(&self, position: usize) -> &[f32] {
+        let pixels = self.side * self.side;
+        &self.weights[position * pixels..][..pixels]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_voxel_is_a_gaussian_in_the_middle() {
+        let look = Look { azimuth: 0.0, elevation: 0.0, size: 9, scale: 2.0 };
+        let splatter = Splatter::new(&Grid::unit([1; 3]), &look, 2.0).expect("a view");
+        let (reach, width) = (splatter.table.side / 2, 9 + splatter.table.side);
+        assert_eq!(reach, 3, "two sigma of one and a half pixels");
+        let sums = splatter.splat(&[10.0]);
+        let at = |x: usize, y: usize| sums[(y + reach) * width + x + reach];
+        // The voxel is at 4.5, the table's position nearest to it at 4.5 + 1/64.
+        let weight = |d: f64| (-0.5 * ((d - 1.0 / 64.0) / 1.5).powi(2)).exp();
+        for (x, d) in [(4, 0.0), (6, 2.0), (2, -2.0)] {
+            assert!((f64::from(at(x, 4)) - 10.0 * weight(d) * weight(0.0)).abs() < 1e-5, "column {x}: {}", at(x, 4));
+        }
+        assert_eq!((at(0, 4), at(8, 4)), (0.0, 0.0), "cut");
+        let mean = splatter.mean(&sums, &splatter.splat(&[1.0]));
+        assert!((mean[4 * 9 + 4] - 10.0).abs() < 1e-5 && mean[0].is_nan());
+    }
+}
