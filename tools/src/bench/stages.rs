@@ -83,7 +83,7 @@ pub(super) fn render(step: &Render) -> Result<Rendered> {
         splat: first.splat,
         stated_splat_error: first.stated_error,
         error: Truth::error(&differences),
-        certified_error: None,
+        certified_error: method.certified(step)?.map(|e| e / truth.range),
     })
 }
 
@@ -99,6 +99,8 @@ struct Viewed {
     seconds: f64,
     splat: String,
     stated_error: Option<f64>,
+    /// The largest certified error of a pixel, in the samples' unit, if that was asked for.
+    certified: Option<f64>,
 }
 
 impl Method {
@@ -116,8 +118,18 @@ impl Method {
 
     fn view(&mut self, step: &Render, look: &Look, sink: &mut dyn FnMut(usize, &[f32])) -> Result<Viewed> {
         match self {
-            Self::Library(scene) => by_library(scene.as_mut(), step, look, sink),
+            Self::Library(scene) => by_library(scene.as_mut(), step, look, false, sink),
             Self::Textbook(source, radius) => by_textbook(source.as_mut(), step, look, *radius, sink),
+        }
+    }
+}
+
+impl Method {
+    /// The largest certified error of the first view's pixels.
+    fn certified(&mut self, step: &Render) -> Result<Option<f64>> {
+        match self {
+            Self::Library(scene) => Ok(by_library(scene.as_mut(), step, &step.look, true, &mut |_, _| {})?.certified),
+            Self::Textbook(..) => Ok(None),
         }
     }
 }
@@ -126,6 +138,7 @@ fn by_library(
     scene: &mut dyn Scene,
     step: &Render,
     look: &Look,
+    certify: bool,
     sink: &mut dyn FnMut(usize, &[f32]),
 ) -> Result<Viewed> {
     let config = RenderConfig {
@@ -135,14 +148,16 @@ fn by_library(
         frames: (0..step.frames).collect(),
         region: None,
         splat_error: step.splat_error,
+        allowed: None,
+        certify,
         memory: MEMORY,
     };
-    let report = wavesplat::render::render(scene, &config, &Silent, &mut |frame, picture| {
-        sink(frame, picture);
+    let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
+        sink(rendered.frame, rendered.picture);
         Ok(())
     })?;
     let stated_error = Some(report.stated_splat_error);
-    Ok(Viewed { seconds: report.seconds, splat: report.method.into(), stated_error })
+    Ok(Viewed { seconds: report.seconds, splat: report.method.into(), stated_error, certified: report.certified_error })
 }
 
 fn by_textbook(
@@ -159,5 +174,5 @@ fn by_textbook(
         in_sink += clock.elapsed().as_secs_f64();
     })?;
     let seconds = clock.elapsed().as_secs_f64() - in_sink;
-    Ok(Viewed { seconds, splat: format!("table-{radius}"), stated_error: None })
+    Ok(Viewed { seconds, splat: format!("table-{radius}"), stated_error: None, certified: None })
 }

@@ -22,7 +22,7 @@ pub(super) struct Truth {
     /// Frame by frame, pixel by pixel.
     means: Vec<f64>,
     /// Highest less lowest value of the archive.
-    range: f64,
+    pub(super) range: f64,
 }
 
 /// Errors of pictures as shares of the value range.
