@@ -3,7 +3,7 @@
 use super::RenderConfig;
 use super::certificate::magnitude;
 use super::reading::{Reader, Reading};
-use super::scene::{Contents, FrameErrors, Group, Layout, SampleErrors, Scene, Terms};
+use super::scene::{Contents, FrameErrors, Group, Layout, Order, SampleErrors, Scene, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::error::Result;
@@ -12,7 +12,7 @@ use crate::sample::SampleType;
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::BlockEntry;
+use wavesplat_format::{BlockEntry, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +84,11 @@ fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     }
 }
 
+/// Whether most coefficients are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
+fn is_dense(window: &Window, voxels: usize) -> bool {
+    2 * window.coded > voxels as u64 * u64::from(window.coefficients)
+}
+
 /// Some frames of one window of a file.
 struct CoefficientGroup<'a> {
     file: &'a CoefficientFile,
@@ -123,6 +128,7 @@ impl<'a> CoefficientGroup<'a> {
             values: samples || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
             errors: error_planes(config, codec.parts.len()),
+            order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
         // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
         let reader = Reader::new(&codec, config.allowed.filter(|_| !samples));

@@ -30,9 +30,7 @@ impl Finish<'_> {
         let mut out = vec![0.0; self.planes() * pixels];
         for first in (0..pixels).step_by(LANES) {
             let count = LANES.min(pixels - first);
-            for (p, lane) in planes.iter_mut().enumerate() {
-                lane[..count].copy_from_slice(&tile.planes[p * pixels + first..][..count]);
-            }
+            tile.load(first, count, &mut planes);
             let sums: Vec<(Lane, Lane)> = (0..self.layout.frames).map(|f| self.absent_and_errors(&planes, f)).collect();
             self.group.reconstruct(&mut planes, &mut frames);
             for (f, (emission, (absent, errors))) in frames.iter().zip(&sums).enumerate() {
@@ -45,7 +43,7 @@ impl Finish<'_> {
                 }
             }
         }
-        tile.planes = out;
+        tile.replace(out);
     }
 
     /// The weights that are missing in a frame, and the sums of weighted errors.

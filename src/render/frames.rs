@@ -2,7 +2,7 @@
 
 use super::RenderConfig;
 use super::certificate::magnitude;
-use super::scene::{Contents, FrameErrors, Group, Layout, SampleErrors, Scene, Terms};
+use super::scene::{Contents, FrameErrors, Group, Layout, Order, SampleErrors, Scene, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing};
 use crate::scan::{Scan, scan_frame};
@@ -68,7 +68,8 @@ impl Scene for FrameScene {
         let looked_at = if can_miss || config.certify { frames } else { &[] };
         let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
         let absent = seen.iter().any(|s| s.missing > 0);
-        let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent, errors: 0 };
+        let layout =
+            Layout { coefficients: 0, frames: frames.len(), values: true, absent, errors: 0, order: Order::Pixels };
         let errors = seen.iter().map(|s| FrameErrors { largest: 0.0, range: s.range, terms: magnitude(s.range) });
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();

@@ -34,7 +34,7 @@ use certificate::Certificate;
 use finish::Finish;
 use plan::Budget;
 use rayon::prelude::*;
-use scene::{Contents, Group, Terms};
+use scene::{Contents, Group, Layout, Terms};
 use serde::Serialize;
 use splat::{Splats, Tile, overlap, rows_reached};
 use std::ops::Range;
@@ -209,14 +209,14 @@ impl Eye {
         self.camera.size[0] * self.camera.size[1]
     }
 
-    fn tiles(&self, rows: Range<usize>, planes: usize) -> Vec<Tile> {
-        Tile::cover(self.camera.size[0], rows, planes)
+    fn tiles(&self, rows: Range<usize>, layout: &Layout) -> Vec<Tile> {
+        Tile::cover(self.camera.size[0], rows, layout.planes(), layout.order)
     }
 
     /// Copies the first planes of a tile to their places in as many whole pictures.
     fn paste<T>(&self, tile: &Tile, planes: usize, pictures: &mut [T], convert: impl Fn(f64) -> T) {
         let width = tile.x.len();
-        for (plane, pixels) in tile.planes.chunks_exact(tile.pixels()).take(planes).enumerate() {
+        for (plane, pixels) in tile.planes().take(planes).enumerate() {
             for (y, line) in tile.y.clone().zip(pixels.chunks_exact(width)) {
                 let at = plane * self.pixels() + y * self.camera.size[0] + tile.x.start;
                 pictures[at..at + width].iter_mut().zip(line).for_each(|(to, from)| *to = convert(*from));
@@ -292,7 +292,7 @@ fn render_group(
     for rows in budget.bands(&layout) {
         let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
         report.blocks_read += seen.len() as u64;
-        let mut tiles = eye.tiles(rows.clone(), layout.planes());
+        let mut tiles = eye.tiles(rows.clone(), &layout);
         eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
         let mut clock = Instant::now();
         tiles.par_iter_mut().for_each(|tile| finish.tile(tile));

@@ -4,6 +4,7 @@
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
 use super::RenderConfig;
+pub(super) use super::splat::Order;
 use crate::error::Result;
 use crate::sample::{self, SampleType};
 use crate::volume::{BlockGrid, Grid, Region};
@@ -122,6 +123,8 @@ pub struct Layout {
     pub absent: bool,
     /// Planes of errors; none unless pictures are certified.
     pub errors: usize,
+    /// How tiles should keep the planes.
+    pub order: Order,
 }
 
 impl Layout {
@@ -251,7 +254,7 @@ mod tests {
 
     #[test]
     fn planes_follow_one_another() {
-        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true, errors: 2 };
+        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true, errors: 2, order: Order::Planes };
         assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all()), (5, 8, 11));
         assert_eq!((layout.first_error(), layout.planes()), (12, 14));
         let plain = Layout { values: false, absent: false, errors: 0, ..layout };
@@ -260,7 +263,7 @@ mod tests {
 
     #[test]
     fn missing_samples_take_weights_instead_of_values() {
-        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true, errors: 0 };
+        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true, errors: 0, order: Order::Planes };
         let samples: Vec<u8> = [f32::NAN, 1.0, 3.0, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         let terms = Terms::of_samples(&layout, SampleType::F32, &samples, &[], |_, v| v.is_nan());
         assert_eq!(terms.of_voxel(0), (&[1u16, 2][..], &[3.0, 1.0][..]));

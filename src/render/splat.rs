@@ -7,10 +7,21 @@ use super::scene::Terms;
 use crate::camera::Camera;
 use crate::footprint::Footprint;
 use crate::volume::{Grid, Region};
+use crate::wavelet::Lane;
+use multiversion::multiversion;
 use std::ops::Range;
 
 /// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
 pub(super) const TILE: usize = 64;
+
+/// How the planes of a tile lie in memory. No sum depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Plane by plane: fast where voxels have terms in few planes, a row of pixels at a time.
+    Planes,
+    /// Pixel by pixel: fast where voxels have terms in most planes, all planes of a pixel at a time.
+    Pixels,
+}
 
 /// A rectangle of pixels with its planes.
 #[derive(Debug)]
@@ -19,18 +30,44 @@ pub(super) struct Tile {
     pub(super) x: Range<usize>,
     /// Rows of the picture.
     pub(super) y: Range<usize>,
-    /// Plane by plane, row by row.
-    pub(super) planes: Vec<f64>,
+    /// Number of planes.
+    count: usize,
+    order: Order,
+    sums: Vec<f64>,
 }
 
 impl Tile {
     /// The tiles of the rows `y` of a picture `width` pixels wide, with all planes at zero.
-    pub(super) fn cover(width: usize, y: Range<usize>, planes: usize) -> Vec<Self> {
+    pub(super) fn cover(width: usize, y: Range<usize>, count: usize, order: Order) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(TILE).map(move |s| s..(s + TILE).min(r.end));
         pieces(y)
             .flat_map(|y| pieces(0..width).map(move |x| (x, y.clone())))
-            .map(|(x, y)| Self { planes: vec![0.0; planes * x.len() * y.len()], x, y })
+            .map(|(x, y)| Self { sums: vec![0.0; count * x.len() * y.len()], x, y, count, order })
             .collect()
+    }
+
+    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    pub(super) fn load(&self, first: usize, count: usize, planes: &mut [Lane]) {
+        let pixels = self.pixels();
+        for (p, lane) in planes.iter_mut().enumerate() {
+            for (l, sum) in lane.iter_mut().enumerate().take(count) {
+                *sum = match self.order {
+                    Order::Planes => self.sums[p * pixels + first + l],
+                    Order::Pixels => self.sums[(first + l) * self.count + p],
+                };
+            }
+        }
+    }
+
+    /// Its planes one after another, row by row; of a tile in that order.
+    pub(super) fn planes(&self) -> impl Iterator<Item = &[f64]> {
+        debug_assert!(self.order == Order::Planes);
+        self.sums.chunks_exact(self.pixels())
+    }
+
+    /// Puts other planes, one after another, in place of its own.
+    pub(super) fn replace(&mut self, planes: Vec<f64>) {
+        (self.count, self.order, self.sums) = (planes.len() / self.pixels(), Order::Planes, planes);
     }
 
     /// Number of pixels.
@@ -43,7 +80,7 @@ impl Tile {
         if !(overlap(&voxels.x, &self.x) && overlap(&voxels.y, &self.y)) {
             return;
         }
-        let (mut column, mut row) = (Vec::new(), Vec::new());
+        let (mut column, mut row, mut all) = (Vec::new(), Vec::new(), vec![0.0; self.count]);
         for voxel in &voxels.voxels {
             let (full_x, full_y) = (footprint.span(voxel.x, voxels.size[0]), footprint.span(voxel.y, voxels.size[1]));
             let (x, y) = (intersect(&full_x, &self.x), intersect(&full_y, &self.y));
@@ -53,11 +90,20 @@ impl Tile {
             // Weights begin at the footprint's own edge, so that a tile's edge cannot change their last bits.
             footprint.weights(voxel.x, &full_x, &mut row);
             footprint.weights(voxel.y, &full_y, &mut column);
-            let row = &row[x.start - full_x.start..x.end - full_x.start];
-            let column = &column[y.start - full_y.start..y.end - full_y.start];
+            let row = (x.start, &row[x.start - full_x.start..x.end - full_x.start]);
+            let column = (y.start, &column[y.start - full_y.start..y.end - full_y.start]);
             let (planes, amounts) = voxels.terms.of_voxel(voxel.index);
-            for (plane, amount) in planes.iter().zip(amounts) {
-                self.add(usize::from(*plane), amount * voxel.weight, (x.start, row), (y.start, column));
+            match self.order {
+                Order::Planes => {
+                    for (plane, amount) in planes.iter().zip(amounts) {
+                        self.add(usize::from(*plane), amount * voxel.weight, row, column);
+                    }
+                }
+                Order::Pixels => {
+                    all.fill(0.0);
+                    planes.iter().zip(amounts).for_each(|(p, a)| all[usize::from(*p)] = a * voxel.weight);
+                    self.add_all(&all, row, column);
+                }
             }
         }
     }
@@ -66,12 +112,37 @@ impl Tile {
     fn add(&mut self, plane: usize, amount: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
         let width = self.x.len();
         let start = plane * self.pixels() + (y - self.y.start) * width + (x - self.x.start);
-        for (i, weight) in column.iter().enumerate() {
-            let factor = amount * weight;
-            let line = &mut self.planes[start + i * width..][..row.len()];
-            for (pixel, w) in line.iter_mut().zip(row) {
-                *pixel += factor * w;
-            }
+        add_to_plane(&mut self.sums[start..], width, amount, row, column);
+    }
+
+    /// Adds an amount for every plane, as [`Self::add`] does for one.
+    fn add_all(&mut self, amounts: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+        let width = self.x.len();
+        let start = ((y - self.y.start) * width + (x - self.x.start)) * self.count;
+        add_to_pixels(&mut self.sums[start..], width, amounts, row, column);
+    }
+}
+
+/// Adds `amount` times the outer product of a row and a column to a plane whose rows are `width` pixels apart.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_to_plane(sums: &mut [f64], width: usize, amount: f64, row: &[f64], column: &[f64]) {
+    for (weight, line) in column.iter().zip(sums.chunks_mut(width)) {
+        let factor = amount * weight;
+        for (sum, w) in line.iter_mut().zip(row) {
+            *sum += factor * w;
+        }
+    }
+}
+
+/// The same with an amount for each of a pixel's planes, which lie side by side.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_to_pixels(sums: &mut [f64], width: usize, amounts: &[f64], row: &[f64], column: &[f64]) {
+    let count = amounts.len();
+    let mut factors = vec![0.0; count];
+    for (weight, line) in column.iter().zip(sums.chunks_mut(width * count)) {
+        factors.iter_mut().zip(amounts).for_each(|(f, amount)| *f = amount * weight);
+        for (pixel, w) in line.chunks_exact_mut(count).zip(row) {
+            pixel.iter_mut().zip(&factors).for_each(|(sum, f)| *sum += f * w);
         }
     }
 }
@@ -174,7 +245,7 @@ mod tests {
     #[test]
     fn tiles_cover_each_pixel_once() {
         let mut seen = vec![0; 150 * 100];
-        for tile in Tile::cover(150, 30..100, 1) {
+        for tile in Tile::cover(150, 30..100, 1, Order::Planes) {
             for y in tile.y.clone() {
                 tile.x.clone().for_each(|x| seen[y * 150 + x] += 1);
             }

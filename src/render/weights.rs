@@ -3,7 +3,7 @@
 use super::certificate::sum_rounding;
 use super::plan::Budget;
 use super::scene::{Layout, Terms};
-use super::splat::Tile;
+use super::splat::{Order, Tile};
 use super::{Eye, Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
 use crate::footprint::{Footprint, Method};
@@ -79,11 +79,11 @@ fn beyond(eye: &Eye, sums: &[f64], whole: &[f64]) -> Vec<f64> {
 }
 
 fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
-    let layout = Layout { coefficients: 1, frames: 1, values: false, absent: false, errors: 0 };
+    let layout = Layout { coefficients: 1, frames: 1, values: false, absent: false, errors: 0, order: Order::Planes };
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();
-        let mut tiles = eye.tiles(rows.clone(), 1);
+        let mut tiles = eye.tiles(rows.clone(), &layout);
         let ones = |b: usize| Ok(Terms::ones(eye.blocks.region(b).voxels()));
         eye.splat(&mut tiles, &blocks, budget.batch(&layout, rows.len()), ones, &mut RenderReport::default())?;
         tiles.iter().for_each(|tile| eye.paste(tile, 1, &mut out, |sum| sum));
