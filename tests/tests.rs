@@ -12,5 +12,6 @@ mod images;
 mod layering;
 mod real;
 mod reference;
+mod sampled;
 mod truncation;
 mod wavelets;
