@@ -7,8 +7,9 @@
 //! ```
 //!
 //! Batches keep their order, so the bytes depend neither on the number of threads nor on the memory budget, which fix the
-//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from the value range of all frames up to its end, which never exceeds
-//! that of the archive: no first pass over the data is needed, and a pipe gives the same bytes as files.
+//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from its own samples or, where
+//! the tolerance refers to the value range, from that of all frames up to its end, which never exceeds that of the archive:
+//! no first pass over the data is needed, and a pipe gives the same bytes as files.
 
 mod gather;
 mod record;

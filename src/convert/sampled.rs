@@ -127,12 +127,15 @@ fn factors(centre: f64, sigma: f64, len: usize) -> (Range<usize>, Vec<f64>) {
     let end = ((centre + reach).floor() as usize + 1).min(len);
     let nearest = (centre.round().max(0.0) as usize).min(len - 1); // at least, where voxels are far apart
     let range = first.min(nearest)..end.max(nearest + 1);
-    let gauss = |i: usize| libm::exp(-(i as f64 - centre).powi(2) / (2.0 * sigma * sigma));
+    let gauss = |i: usize| {
+        let off = i as f64 - centre;
+        libm::exp(-(off * off) / (2.0 * sigma * sigma))
+    };
     (range.clone(), range.map(gauss).collect())
 }
 
-/// Voxels that are looked at together. Fixed, since the order of sums depends on it.
-const PIECE: usize = 1 << 15;
+/// Voxels that are looked at together: little memory for each worker. Sums go row by row and do not depend on it.
+const PIECE: usize = 1 << 13;
 
 /// A region in pieces of no more than [`PIECE`] voxels, or of single rows.
 fn pieces(region: &Region) -> impl Iterator<Item = Region> {
@@ -182,8 +185,8 @@ mod tests {
         let many = pixels(dims, 4000, 3);
         assert_eq!(many[..300], pixels(dims, 100, 3));
         assert_ne!(many[..300], pixels(dims, 100, 4));
-        for a in 0..3 {
-            let len = dims[a] as f64;
+        for (a, len) in dims.into_iter().enumerate() {
+            let len = len as f64;
             assert!(many.iter().all(|p| (-0.5..=len - 0.5).contains(&p.at[a])));
             let mean = many.iter().map(|p| (p.at[a] + 0.5) / len).sum::<f64>() / many.len() as f64;
             assert!((mean - 0.5).abs() < 0.01, "axis {a}: {mean}");

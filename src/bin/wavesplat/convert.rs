@@ -49,10 +49,10 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     floor: Option<f64>,
     /// For --bound sampled: random pixels on each of three faces [default: 300]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true)]
     samples: Option<u32>,
     /// For --bound sampled: another seed takes other pixels [default: 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
     /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]

@@ -59,7 +59,7 @@ fn missed(c: &Comparison) -> Option<String> {
     }
     let BlockPlace { window, block } = c.first_beyond?;
     let blocks = c.blocks_beyond_reached;
-    Some(format!("{blocks} blocks are further off than they say; the first is block {block} of window {window}"))
+    Some(format!("blocks further off than the file says: {blocks}, the first of them block {block} of window {window}"))
 }
 
 impl VerifyArgs {
@@ -77,13 +77,16 @@ impl VerifyArgs {
     }
 }
 
+const ESTIMATE: &str = "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images";
+
 fn summary(r: &VerifyReport, bound: Bound) -> String {
+    let estimate = if matches!(bound, Bound::Sampled { .. }) { ESTIMATE } else { "" };
     let mut text = format!("{} blocks, {} bytes: whole\n", r.blocks, r.bytes);
     if let Some(c) = &r.against {
         let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
             "{} bound {held}: largest error {:.4e} ({:.4} of the bound used), rms error {:.4e}, {} missing samples as they were, \
-             {} samples compared\n",
+             {} samples compared{estimate}\n",
             bound.name(),
             c.largest_error,
             c.largest_share_of_bound,
