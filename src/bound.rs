@@ -1,7 +1,8 @@
-//! What is promised about an error (method.md section 5), and exact arithmetic to decide it.
+//! What is promised about errors (method.md section 5), and exact arithmetic to decide it.
 //!
-//! A promise rests on one comparison, `!(error <= delta)`, whose two sides are rounded against us: the error up, the
-//! bound down. No slack is added anywhere.
+//! A promise rests on one comparison, `!(error <= allowed)`, whose two sides are rounded against us: the error up, what
+//! is allowed down. No slack is added anywhere. The *share* of a sample is its error in units of what it is allowed; that
+//! of a series is the largest, or the root mean square, of its samples' shares. A bound holds where shares are at most 1.
 
 pub use wavesplat_format::Bound;
 
@@ -25,9 +26,9 @@ pub fn difference_up(x: f64, y: f64) -> f64 {
     }
 }
 
-/// `tolerance` times (`hi` - `lo`), rounded down if it is not exact: the voxel bound delta.
-pub fn voxel_bound(tolerance: f64, (lo, hi): (f64, f64)) -> f64 {
-    let range = match difference(hi, lo) {
+/// `hi` - `lo`, rounded down if it is not exact.
+fn length_down((lo, hi): (f64, f64)) -> f64 {
+    match difference(hi, lo) {
         (range, lost) if range.is_finite() => {
             if lost < 0.0 {
                 range.next_down()
@@ -36,10 +37,150 @@ pub fn voxel_bound(tolerance: f64, (lo, hi): (f64, f64)) -> f64 {
             }
         }
         _ => f64::MAX,
-    };
-    let product = tolerance * range;
-    let rounded_up = tolerance.mul_add(range, -product) < 0.0 || product < 1e-280; // there what was lost may underflow
+    }
+}
+
+/// `a` times `b`, neither negative, rounded down if it is not exact.
+fn product_down(a: f64, b: f64) -> f64 {
+    let product = a * b;
+    let rounded_up = a.mul_add(b, -product) < 0.0 || product < UNDERFLOW;
     if rounded_up { product.next_down().max(0.0) } else { product }
+}
+
+/// What rounding took from a product below this may itself underflow.
+const UNDERFLOW: f64 = 1e-280;
+
+/// `tolerance` times the length of a range, rounded down: the delta of [`Bound::Pointwise`] and [`Bound::Rms`].
+pub fn range_bound(tolerance: f64, range: (f64, f64)) -> f64 {
+    if range.0 <= range.1 { product_down(tolerance, length_down(range)) } else { 0.0 } // all missing so far
+}
+
+/// `tolerance` times |`value`|, or times `floor` if that is more, rounded down: what [`Bound::Relative`] allows.
+pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
+    product_down(tolerance, value.abs().max(floor))
+}
+
+/// What is promised of the samples of one window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Promise {
+    /// Of which kind.
+    pub bound: Bound,
+    /// As asked for: the share of the value range, or of the magnitude of each sample.
+    pub tolerance: f64,
+    /// The largest error allowed to any sample, or root mean square to any series; 0 asks for the very bits.
+    pub delta: f64,
+}
+
+/// How the shares of a series' samples make up its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// The largest.
+    Largest,
+    /// The root of the mean of their squares.
+    RootMeanSquare,
+}
+
+impl Promise {
+    /// How the shares of samples make up that of a series.
+    pub fn measure(&self) -> Measure {
+        match self.bound {
+            Bound::Pointwise | Bound::Relative { .. } => Measure::Largest,
+            Bound::Rms | Bound::Sampled { .. } => Measure::RootMeanSquare,
+        }
+    }
+
+    /// The error allowed to a sample that is `value`, rounded down; where means are bounded, that of the mean.
+    pub fn allowed(&self, value: f64) -> f64 {
+        match self.bound {
+            Bound::Relative { floor } => relative_bound(self.tolerance, floor, value),
+            _ => self.delta,
+        }
+    }
+
+    /// Whether the errors of one series keep the promise: for each frame the error, rounded up, and what is allowed.
+    pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
+        match self.measure() {
+            Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
+            Measure::RootMeanSquare => {
+                let frames = errors.len() as f64;
+                let add = |(sum, each): (f64, bool), (e, allowed): (f64, f64)| {
+                    ((sum + (e * e).next_up()).next_up(), each && e <= allowed)
+                };
+                let (squares, each) = errors.fold((0.0, true), add);
+                // Each within delta is enough; squares alone are rounded too far against us at delta itself, and underflow.
+                each || squares <= (frames * self.delta * self.delta).next_down().next_down()
+            }
+        }
+    }
+
+    /// The share of its bound that a series uses, rounded up; `errors` are as for [`Self::holds`].
+    pub fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
+        let frames = errors.len() as f64;
+        let add = |(largest, squares): (f64, f64), (e, allowed)| {
+            let share = share(e, allowed);
+            (share.max(largest), squares + share * share)
+        };
+        let (largest, squares) = errors.fold((0.0, 0.0), add);
+        match self.measure() {
+            Measure::Largest => largest,
+            // The mean is no more than the largest; what underflows adds less than the least number.
+            Measure::RootMeanSquare => largest.min((squares / frames * UP + f64::MIN_POSITIVE).sqrt()),
+        }
+    }
+
+    /// Adds the errors of the next frame of `N` series, whose samples are `values`, to what [`Self::largest_share`] makes
+    /// shares of. Vector code, and so without care for rounding.
+    pub fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
+        for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
+            match self.bound {
+                Bound::Pointwise => *sum = if *e > *sum { *e } else { *sum },
+                Bound::Rms | Bound::Sampled { .. } => *sum += e * e,
+                Bound::Relative { floor } => {
+                    let magnitude = if value.abs() > floor { value.abs() } else { floor };
+                    let allowed = self.tolerance * magnitude;
+                    let allowed = if allowed < UNDERFLOW { 0.0 } else { allowed };
+                    let share = if *e > 0.0 { e / allowed } else { 0.0 };
+                    *sum = if share > *sum { share } else { *sum };
+                }
+            }
+        }
+    }
+
+    /// No less than the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
+    pub fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
+        let largest = sums.iter().copied().fold(0.0, f64::max);
+        match self.bound {
+            Bound::Pointwise if largest > 0.0 => share(largest.next_up(), self.delta),
+            Bound::Relative { .. } if largest > 0.0 => (largest * UP).next_up(),
+            Bound::Pointwise | Bound::Relative { .. } => 0.0,
+            Bound::Rms | Bound::Sampled { .. } if !(1e-140..1e140).contains(&self.delta) => f64::INFINITY, // of squares
+            Bound::Rms | Bound::Sampled { .. } if largest == 0.0 => 0.0,
+            Bound::Rms | Bound::Sampled { .. } => {
+                let mean = largest / frames as f64 / (self.delta * self.delta);
+                (mean * UP + 1e-40).sqrt() // an error whose square underflowed was below 1e-20 of delta
+            }
+        }
+    }
+
+    /// The quantisation step of orthonormal-like coefficients for which rounding alone keeps the promise of samples that
+    /// are allowed `error`.
+    ///
+    /// `gain` is the largest sum of |u_k(t)| over k: with step/2 in every coefficient a sample moves by gain * step / 2.
+    pub fn step(&self, error: f64, gain: f64) -> f64 {
+        match self.measure() {
+            Measure::Largest => 2.0 * error / gain,
+            // Rounding moves a sample by step / sqrt 12 rms; the rest of the budget is left for dropping coefficients.
+            Measure::RootMeanSquare => error,
+        }
+    }
+}
+
+/// More than what rounding takes from a mean of as many squares as a window has frames.
+const UP: f64 = 1.0 + 1e-12;
+
+/// An error, rounded up, in units of what is allowed, rounded down; rounded up.
+pub fn share(error: f64, allowed: f64) -> f64 {
+    if error > 0.0 { (error / allowed).next_up() } else { 0.0 }
 }
 
 /// The largest error before rounding to the sample type that still leaves `delta` after it; 0 or less if there is none.
@@ -51,31 +192,6 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),
         SampleType::F16 => delta - magnitude * f64::from(f16::EPSILON) - f64::from(f16::MIN_POSITIVE_SUBNORMAL),
         _ => delta.min(delta.floor() + 0.499),
-    }
-}
-
-/// Whether the errors of one series (one value per frame, rounded up) keep the promise.
-pub fn holds(bound: Bound, delta: f64, mut errors: impl ExactSizeIterator<Item = f64>) -> bool {
-    match bound {
-        Bound::Pointwise => errors.all(|e| e <= delta),
-        Bound::Rms => {
-            let frames = errors.len() as f64;
-            let add = |(sum, each): (f64, bool), e: f64| ((sum + (e * e).next_up()).next_up(), each && e <= delta);
-            let (squares, each) = errors.fold((0.0, true), add);
-            // Each within delta is enough; squares alone are rounded too far against us at delta itself, and underflow.
-            each || squares <= (frames * delta * delta).next_down().next_down()
-        }
-    }
-}
-
-/// The quantisation step of orthonormal-like coefficients for which rounding alone keeps the promise.
-///
-/// `gain` is the largest sum of |u_k(t)| over k: with step/2 in every coefficient a sample moves by gain * step / 2.
-pub fn step(bound: Bound, delta: f64, gain: f64) -> f64 {
-    match bound {
-        Bound::Pointwise => 2.0 * delta / gain,
-        // Rounding moves a sample by step / sqrt 12 rms; the rest of the budget is left for dropping coefficients.
-        Bound::Rms => delta,
     }
 }
 
@@ -100,20 +216,38 @@ mod tests {
 
     #[test]
     fn whole_bounds_stay_whole() {
-        assert_eq!(voxel_bound(0.02, (0.0, 50.0)), 1.0);
-        assert_eq!(voxel_bound(0.5, (-1.0, 1.0)), 1.0);
-        assert_eq!(voxel_bound(0.0, (0.0, 1e300)), 0.0);
-        assert!(voxel_bound(0.01, (-f64::MAX, f64::MAX)).is_finite());
-        assert_eq!(voxel_bound(0.3, (0.0, 5e-324)), 0.0);
-        assert_eq!(voxel_bound(0.3, (0.0, 1e-323)), 0.0);
+        assert_eq!(range_bound(0.02, (0.0, 50.0)), 1.0);
+        assert_eq!(range_bound(0.5, (-1.0, 1.0)), 1.0);
+        assert_eq!(range_bound(0.0, (0.0, 1e300)), 0.0);
+        assert!(range_bound(0.01, (-f64::MAX, f64::MAX)).is_finite());
+        assert_eq!(range_bound(0.3, (0.0, 5e-324)), 0.0);
+        assert_eq!(range_bound(0.3, (0.0, 1e-323)), 0.0);
+        assert_eq!(range_bound(0.3, (f64::INFINITY, f64::NEG_INFINITY)), 0.0);
     }
 
     #[test]
     fn errors_of_just_delta_keep_the_root_mean_square() {
         for delta in [0.0, 5e-324, 1e-200, 0.1, 4.0, f64::MAX] {
-            assert!(holds(Bound::Rms, delta, [delta; 3].into_iter()), "{delta}");
-            assert!(!holds(Bound::Rms, delta, [delta.next_up(); 3].into_iter()), "{delta}");
+            let promise = Promise { bound: Bound::Rms, tolerance: 0.1, delta };
+            assert!(promise.holds([(delta, delta); 3].into_iter()), "{delta}");
+            assert!(!promise.holds([(delta.next_up(), delta); 3].into_iter()), "{delta}");
         }
+    }
+
+    fn relative(tolerance: f64, floor: f64) -> Promise {
+        Promise { bound: Bound::Relative { floor }, tolerance, delta: relative_bound(tolerance, floor, -8.0) }
+    }
+
+    #[test]
+    fn a_relative_bound_is_a_share_of_each_magnitude_or_of_the_floor() {
+        let promise = relative(0.25, 1.0);
+        assert_eq!([-8.0, 2.0, 1.0, 0.5, 0.0].map(|v| promise.allowed(v)), [2.0, 0.5, 0.25, 0.25, 0.25]);
+        assert_eq!(promise.delta, 2.0);
+        assert_eq!(relative(0.25, 100.0).delta, 25.0);
+        assert_eq!(relative(0.25, 0.0).allowed(-0.0), 0.0);
+        assert!(promise.holds([(2.0, 2.0), (0.25, 0.25)].into_iter()));
+        assert!(!promise.holds([(2.0, 2.0), (0.25f64.next_up(), 0.25)].into_iter()));
+        assert!(!promise.holds([(f64::NAN, 2.0)].into_iter()));
     }
 
     #[test]
@@ -130,6 +264,38 @@ mod tests {
             let y = b as f64;
             let truth = (i128::from(a) * (1i128 << shift.min(31)) - i128::from(b)).unsigned_abs();
             prop_assert!(difference_up(x, y) as u128 >= truth);
+        }
+
+        /// In 128-bit integers: what is allowed never exceeds the product, nor lacks more than rounding takes.
+        #[test]
+        fn what_is_allowed_never_exceeds_the_product(
+            t in 0..=1u64 << 53, v in -(1i64 << 53)..(1i64 << 53), floor in 0..1u64 << 53, down in 0..900_i32,
+        ) {
+            let unit = 2f64.powi(-53);
+            let scale = 2f64.powi(-down);
+            let promise = relative(t as f64 * unit, floor as f64 * scale);
+            let allowed = promise.allowed(v as f64 * scale);
+            let truth = u128::from(t) * u128::from(v.unsigned_abs().max(floor)); // in units of unit * scale
+            let in_units = allowed / scale; // a power of two
+            let (whole, rest) = (in_units.floor(), in_units.fract());
+            let found = ((whole as u128) << 53) + (rest / unit) as u128;
+            prop_assert!(found <= truth, "{found} {truth}");
+            prop_assert!(truth - found <= truth >> 51, "{found} {truth}");
+        }
+
+        /// Vector code never finds less than the share that exact steps do, and that only where it is near.
+        #[test]
+        fn shares_of_many_are_no_less_than_those_of_each(
+            values in proptest::collection::vec((-1e3..1e3, 0.0..30.0), 1..40), kind in 0..3_usize, floor in 0.0..10.0,
+        ) {
+            let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor }][kind];
+            let promise = Promise { bound, tolerance: 0.02, delta: 20.0 };
+            let mut sums = [0.0];
+            values.iter().for_each(|(v, e)| promise.add(&[*e], &[*v], &mut sums));
+            let fast = promise.largest_share(&sums, values.len());
+            let slow = promise.share(values.iter().map(|(v, e)| (*e, promise.allowed(*v))));
+            prop_assert!(fast >= slow * (1.0 - 1e-15) && fast <= slow * (1.0 + 1e-11), "{fast} {slow}");
+            prop_assert!(slow > 1.0 || promise.holds(values.iter().map(|(v, e)| (*e, promise.allowed(*v)))));
         }
     }
 }

@@ -44,7 +44,7 @@ pub enum Error {
         /// What was noticed.
         what: String,
     },
-    /// `verify` found samples outside the promised bound.
+    /// `verify` found samples outside the promised bound, or further off than the file states.
     #[error("{}: {what}", path.display())]
     BoundMissed {
         /// The coefficient file.

@@ -35,7 +35,8 @@
 //! consecutive frames; *block* a box of voxels over one window; *coefficient* c_{i,k} of voxel i and basis function k;
 //! *code* a quantised coefficient; *part* a piece of a block with its own zstd frame: a group of temporal *levels*,
 //! coarse to fine, or what overrides them (*outliers*, *missing* samples, an *exact* block); *plane* a sum of splats
-//! over pixels; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed.
+//! over pixels; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed,
+//! *share* how much of its bound a sample or series uses, *reached* the largest error found.
 //! Triples are x, y, z; arrays have x fastest, then y, z, and time slowest.
 //!
 //! # Who may call whom
@@ -46,8 +47,8 @@
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
 //! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`) are pure functions over slices: no
-//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `scan.rs`, `render/mod.rs`, `extract.rs` and
-//!    `verify.rs`.
+//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`,
+//!    `extract.rs` and `verify.rs`.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
@@ -71,6 +72,7 @@ pub mod npy;
 pub mod output;
 pub mod progress;
 pub mod render;
+pub mod report;
 pub mod sample;
 mod scan;
 pub mod source;

@@ -1,7 +1,8 @@
 //! Is a coefficient file whole, and does it keep its promise?
 
-use crate::bound::{self, difference_up};
+use crate::bound;
 use crate::codec::WindowCodec;
+use crate::codec::decode::Block;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
 use crate::memory::MOST_BLOCKS;
@@ -28,20 +29,33 @@ pub struct VerifyReport {
 pub struct Comparison {
     /// Samples compared.
     pub samples: u64,
-    /// Largest |decoded - source|, rounded up.
+    /// Largest error of a sample, as it is extracted and as it is splatted, rounded up.
     pub largest_error: f64,
     /// Root of the mean squared error over all samples that are not missing.
     pub rms_error: f64,
     /// Missing samples, found missing and with the same bytes in both.
     pub missing: u64,
-    /// The largest error in units of its window's bound; 0 where both are 0.
+    /// The largest share of its bound that a series uses, in the bound's own measure; more than 1 is outside.
     pub largest_share_of_bound: f64,
-    /// Where that was, if there was any error.
+    /// Where that was, if there was any error: the worst sample of the series.
     pub worst: Option<Place>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
+    /// Blocks with an error beyond the largest that the directory or the window's record states.
+    pub blocks_beyond_reached: u64,
+    /// The first of them.
+    pub first_beyond: Option<BlockPlace>,
     #[serde(skip)]
     squares: f64,
+}
+
+/// A block of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct BlockPlace {
+    /// The window, counted from 0.
+    pub window: u32,
+    /// The block in it, x fastest.
+    pub block: u32,
 }
 
 /// A sample of the file.
@@ -71,6 +85,8 @@ impl Comparison {
             missing: self.missing + other.missing,
             largest_share_of_bound: self.largest_share_of_bound.max(other.largest_share_of_bound),
             series_outside: self.series_outside + other.series_outside,
+            blocks_beyond_reached: self.blocks_beyond_reached + other.blocks_beyond_reached,
+            first_beyond: self.first_beyond.or(other.first_beyond),
             squares: self.squares + other.squares,
         }
     }
@@ -88,7 +104,7 @@ pub fn verify(
     if let Some(source) = &source {
         same_shape(file, *source)?;
     }
-    // Codes and payload, both samples in their type and as numbers.
+    // Codes and payload; source and decoded, as samples in their type and as numbers.
     let block_bytes = file.largest_block() * (4 + 5 + 2 * (file.sample().size() + 8));
     let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
     file.check_structure()?;
@@ -148,29 +164,39 @@ fn check_block(
     let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
     let Some(source) = source else { return Ok(Comparison::default()) };
     let region = file.blocks.region(entry.id.block as usize);
-    let decoded = block.samples(codec);
     let original = read_frames(source, 0..codec.frames(), &region, codec.sample)?;
     let first_frame = file.window_range(entry.id.window).start;
     let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel) };
-    Ok(compare(codec, &original, &decoded, place))
+    let mut found = compare(codec, &original, &block, place);
+    let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
+    if found.largest_error > stated {
+        found.blocks_beyond_reached = 1;
+        found.first_beyond = Some(BlockPlace { window: entry.id.window, block: entry.id.block });
+    }
+    Ok(found)
 }
 
 /// Compares the samples of a block, `frame * voxels + voxel`, each of which is at `place(frame, voxel)`.
-fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8], place: impl Fn(usize, usize) -> Place) -> Comparison {
+fn compare(codec: &WindowCodec, original: &[u8], decoded: &Block, place: impl Fn(usize, usize) -> Place) -> Comparison {
     let size = codec.sample.size();
     let samples = original.len() / size;
     let voxels = samples / codec.frames();
-    let (mut x, mut y) = (vec![0.0; samples], vec![0.0; samples]);
-    sample::load(codec.sample, original, &mut x);
-    sample::load(codec.sample, decoded, &mut y);
+    let mut source = vec![0.0; samples];
+    sample::load(codec.sample, original, &mut source);
+    let (bytes, values) = decoded.samples_and_values(codec);
+    let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     for voxel in 0..voxels {
-        let errors: Vec<f64> = (voxel..samples)
+        let errors: Vec<(f64, f64)> = (voxel..samples)
             .step_by(voxels)
             .map(|i| {
-                let same = original[i * size..(i + 1) * size] == decoded[i * size..(i + 1) * size];
-                found.missing += u64::from(same && codec.is_missing(x[i]));
-                if same { 0.0 } else { error(x[i], y[i]) }
+                let missing = codec.is_missing(source[i]);
+                found.missing += u64::from(missing && same(i));
+                match missing {
+                    true if same(i) => (0.0, 0.0),
+                    true => (f64::INFINITY, 0.0),
+                    false => (codec.error(values[i], source[i]), codec.promise.allowed(source[i])),
+                }
             })
             .collect();
         add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
@@ -178,27 +204,18 @@ fn compare(codec: &WindowCodec, original: &[u8], decoded: &[u8], place: impl Fn(
     found
 }
 
-/// A difference that is not a number, as of a missing sample that was lost, is infinite.
-fn error(x: f64, y: f64) -> f64 {
-    let e = difference_up(y, x);
-    if e.is_nan() { f64::INFINITY } else { e }
-}
-
-fn add_series(codec: &WindowCodec, errors: &[f64], place: impl Fn(usize) -> Place, found: &mut Comparison) {
-    let largest = errors.iter().copied().fold(0.0, f64::max);
-    let squares: f64 = errors.iter().map(|e| e * e).sum();
-    let reached = match codec.bound {
-        bound::Bound::Pointwise => largest,
-        bound::Bound::Rms => (squares / errors.len() as f64).sqrt(),
-    };
+/// Adds the errors of a series, each with what is allowed.
+fn add_series(codec: &WindowCodec, errors: &[(f64, f64)], place: impl Fn(usize) -> Place, found: &mut Comparison) {
+    let largest = errors.iter().fold(0.0, |largest, (e, _)| e.max(largest));
     found.largest_error = found.largest_error.max(largest);
-    found.squares += squares;
-    let share = reached / codec.delta;
-    if reached > 0.0 && share > found.largest_share_of_bound {
+    found.squares += errors.iter().map(|(e, _)| e * e).sum::<f64>();
+    let holds = codec.promise.holds(errors.iter().copied());
+    found.series_outside += u64::from(!holds);
+    let share = codec.promise.share(errors.iter().copied());
+    let share = if holds { share.min(1.0) } else { share }; // rounded up beyond what holds
+    if share > found.largest_share_of_bound {
         found.largest_share_of_bound = share;
-        found.worst = errors.iter().position(|e| *e == largest).map(place);
-    }
-    if !bound::holds(codec.bound, codec.delta, errors.iter().copied()) && largest > 0.0 {
-        found.series_outside += 1;
+        let shares = errors.iter().map(|(e, allowed)| bound::share(*e, *allowed)).enumerate();
+        found.worst = shares.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(frame, _)| place(frame));
     }
 }

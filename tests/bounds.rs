@@ -86,14 +86,14 @@ impl Trial {
     fn window(&self, window: u32) -> usize {
         let frames = self.file.window_range(window);
         let voxels = self.file.grid.whole().voxels();
-        let Some(limit) = self.limit(frames.end * voxels) else { return voxels }; // all missing so far
+        let Some(limit) = self.limit(window) else { return voxels }; // all missing so far
         let record = &self.file.metadata().windows[window as usize];
         assert!(limit.holds(record.delta, 0.0), "delta {} for {limit:?}", record.delta);
-        let pointwise = self.case.bound == Bound::Pointwise;
-        assert!(!pointwise || record.reached <= record.delta);
+        assert!(!self.of_samples() || record.reached <= record.delta);
+        assert!(record.share > 0.0 || record.reached == 0.0, "errors that use no share of the bound");
         for voxel in 0..voxels {
             let places: Vec<usize> = frames.clone().map(|t| t * voxels + voxel).collect();
-            self.series(&limit, &places, &self.found, "extracted");
+            self.series(&limit, record.share, &places, &self.found, "extracted");
             for i in places.into_iter().filter(|i| !self.missing[*i]) {
                 assert!(Limit::of(record.reached).holds(self.found[i], self.source[i]), "sample {i}: beyond reached");
             }
@@ -102,22 +102,46 @@ impl Trial {
         voxels
     }
 
-    /// The tolerance times the range of the first samples; none if all are missing.
-    fn limit(&self, samples: usize) -> Option<Limit> {
-        let present = || (0..samples).filter(|i| !self.missing[*i]).map(|i| self.source[i]);
-        let (lo, hi) = (present().reduce(f64::min)?, present().reduce(f64::max)?);
-        Some(Limit { tolerance: self.case.tolerance, lo, hi })
+    /// Whether the bound is one of every sample.
+    fn of_samples(&self) -> bool {
+        matches!(self.case.bound, Bound::Pointwise | Bound::Relative { .. })
     }
 
-    /// `found` has a value for every sample of the archive; `places` are those of the series.
-    fn series(&self, limit: &Limit, places: &[usize], found: &[f64], what: &str) {
+    /// What the window's delta may be at most; none if all samples so far are missing. The tolerance times the range of
+    /// all samples up to its end; or times its own largest magnitude; or the number that was estimated, which another test
+    /// compares with its definition.
+    fn limit(&self, window: u32) -> Option<Limit> {
+        let (frames, voxels) = (self.file.window_range(window), self.file.grid.whole().voxels());
+        let present =
+            |from: usize| (from * voxels..frames.end * voxels).filter(|i| !self.missing[*i]).map(|i| self.source[i]);
+        let tolerance = self.case.tolerance;
+        match self.case.bound {
+            Bound::Relative { floor } => {
+                let largest = present(frames.start).map(f64::abs).fold(0.0, f64::max);
+                Some(Limit::relative(tolerance, floor, largest))
+            }
+            Bound::Sampled { .. } => Some(Limit::of(self.file.metadata().windows[window as usize].delta)),
+            Bound::Pointwise | Bound::Rms => {
+                let (lo, hi) = (present(0).reduce(f64::min)?, present(0).reduce(f64::max)?);
+                Some(Limit::range(tolerance, lo, hi))
+            }
+        }
+    }
+
+    /// `found` has a value for every sample of the archive; `places` are those of the series, which may use a `share` of
+    /// its bound.
+    fn series(&self, limit: &Limit, share: f64, places: &[usize], found: &[f64], what: &str) {
         let present = places.iter().filter(|i| !self.missing[**i]);
         let pairs: Vec<(f64, f64)> = present.map(|i| (found[*i], self.source[*i])).collect();
+        let tolerance = self.case.tolerance;
         let holds = match self.case.bound {
-            Bound::Pointwise => pairs.iter().all(|(a, b)| limit.holds(*a, *b)),
-            Bound::Rms => limit.holds_rms(&pairs, places.len()),
+            Bound::Pointwise => pairs.iter().all(|(a, b)| limit.used(share).holds(*a, *b)),
+            Bound::Relative { floor } => {
+                pairs.iter().all(|(a, b)| Limit::relative(tolerance, floor, *b).used(share).holds(*a, *b))
+            }
+            Bound::Rms | Bound::Sampled { .. } => limit.used(share).holds_rms(&pairs, places.len()),
         };
-        assert!(holds, "{what}, sample {}: outside {limit:?}: (found, source) {pairs:?}", places[0]);
+        assert!(holds, "{what}, sample {}: outside {share} of {limit:?}: (found, source) {pairs:?}", places[0]);
     }
 
     /// What the renderer splats: coefficients not rounded to the samples' type, and what overrides them.
@@ -127,8 +151,7 @@ impl Trial {
         for leaf in self.file.leaves(window) {
             for entry in self.file.leaf(leaf).unwrap() {
                 let places = self.places(&codec, window, entry.id.block);
-                let pointwise = self.case.bound == Bound::Pointwise;
-                assert!(!pointwise || entry.stats.reached <= codec.delta);
+                assert!(!self.of_samples() || entry.stats.reached <= codec.promise.delta);
                 let block = self.file.block(&codec, &entry, &vec![true; codec.basis.coefficients()]).unwrap();
                 if block.exact.is_some() {
                     assert!(places.iter().all(|i| self.missing[*i] || self.found[*i] == self.source[*i]));
@@ -154,7 +177,8 @@ impl Trial {
         let voxels = self.file.grid.whole().voxels();
         for voxel in 0..voxels {
             let places: Vec<usize> = self.file.window_range(window).map(|t| t * voxels + voxel).collect();
-            self.series(limit, &places, &found, "splatted");
+            let share = self.file.metadata().windows[window as usize].share;
+            self.series(limit, share, &places, &found, "splatted");
         }
     }
 
@@ -169,12 +193,21 @@ impl Trial {
 
 const TOLERANCES: [f64; 12] = [0.0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.02, 0.1, 0.3, 0.5];
 
+const BOUNDS: [Bound; 6] = [
+    Bound::Pointwise,
+    Bound::Rms,
+    Bound::Relative { floor: 0.0 },
+    Bound::Relative { floor: 1e-9 },
+    Bound::Relative { floor: 0.7 },
+    Bound::Sampled { samples: 5, seed: 9 },
+];
+
 fn cases() -> impl Strategy<Value = Case> {
     let data = (0..TYPES.len(), 0..KINDS.len(), 0..8_usize, any::<u64>());
-    let coding = (any::<bool>(), any::<bool>(), 0..TOLERANCES.len(), 0.5..1.0, 1..=6_u32);
+    let coding = (any::<bool>(), 0..BOUNDS.len(), 0..TOLERANCES.len(), 0.5..1.0, 1..=6_u32);
     let shape = (1..=70_usize, 1..=9_usize, 0..4_usize);
     (data, coding, shape).prop_map(
-        |((ty, kind, mask, seed), (multi, rms, tolerance, share, window), (frames, edge, dims))| {
+        |((ty, kind, mask, seed), (multi, bound, tolerance, share, window), (frames, edge, dims))| {
             let ty = TYPES[ty];
             let mask = match mask {
                 0 | 1 if ty.is_float() => Mask::Special,
@@ -187,7 +220,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 kind: KINDS[kind],
                 mask,
                 basis: if multi { Basis::Multi } else { Basis::Haar },
-                bound: if rms { Bound::Rms } else { Bound::Pointwise },
+                bound: BOUNDS[bound],
                 tolerance: TOLERANCES[tolerance] * share, // with all digits in use
                 frames,
                 window,
@@ -207,7 +240,7 @@ fn report(series: usize, started: std::time::Instant) {
 #[test]
 fn no_series_breaks_its_bound() {
     let (started, series) = (std::time::Instant::now(), Cell::new(0));
-    let config = Config { cases: 900, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
+    let config = Config { cases: 1300, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
     let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
     let found = runner.run(&cases(), |case| {
         series.set(series.get() + case.check());
@@ -222,18 +255,11 @@ fn no_kind_of_series_breaks_its_bound_for_any_type() {
     let (started, mut series) = (std::time::Instant::now(), 0);
     for (n, ty) in TYPES.into_iter().enumerate() {
         for (m, kind) in KINDS.into_iter().enumerate() {
-            for (k, (basis, bound)) in [
-                (Basis::Haar, Bound::Pointwise),
-                (Basis::Multi, Bound::Pointwise),
-                (Basis::Haar, Bound::Rms),
-                (Basis::Multi, Bound::Rms),
-            ]
-            .into_iter()
-            .enumerate()
-            {
+            let bases = |bound| [(Basis::Haar, bound), (Basis::Multi, bound)];
+            for (k, (basis, bound)) in BOUNDS.into_iter().flat_map(bases).enumerate() {
                 let seed = (n * 1000 + m * 10 + k) as u64;
                 let tolerance = TOLERANCES[2 + (n + 3 * m + 5 * k) % 10];
-                let (frames, window) = (33 + 9 * k, [5, 4, 3, 5][k]);
+                let (frames, window) = (33 + 9 * (k % 4), [5, 4, 3, 5][k % 4]);
                 let (edge, dims) = (8, [16, 8, 2]);
                 let mask = Mask::None;
                 series += Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed }.check();
@@ -247,8 +273,10 @@ fn no_kind_of_series_breaks_its_bound_for_any_type() {
 fn a_flash_in_any_frame_of_any_window_is_kept() {
     for frames in 1..=70 {
         let basis = if frames % 2 == 0 { Basis::Haar } else { Basis::Multi };
-        let (ty, kind, mask, bound) = (SampleType::F32, Kind::Flash, Mask::None, Bound::Pointwise);
-        let (window, edge, dims, seed) = (6, 4, [frames, 2, 1], frames as u64);
-        Case { ty, kind, mask, basis, bound, tolerance: 0.01, frames, window, edge, dims, seed }.check();
+        for bound in [Bound::Pointwise, Bound::Relative { floor: 1e-3 }] {
+            let (ty, kind, mask) = (SampleType::F32, Kind::Flash, Mask::None);
+            let (window, edge, dims, seed) = (6, 4, [frames, 2, 1], frames as u64);
+            Case { ty, kind, mask, basis, bound, tolerance: 0.01, frames, window, edge, dims, seed }.check();
+        }
     }
 }

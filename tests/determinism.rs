@@ -7,6 +7,7 @@ use crate::common::{direct, extracted, looking, pictures, settings, stored};
 use crate::images::bits;
 use std::path::Path;
 use std::process::Command;
+use wavesplat::bound::Bound;
 use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, Quantity, What};
@@ -51,14 +52,17 @@ fn threads_change_no_byte_and_no_pixel() {
 fn memory_changes_no_byte_of_a_file() {
     let source = memory(Mask::Special);
     let mut files = Vec::new();
-    for mib in [15, 16, 20, 40, 300] {
-        let config = ConvertConfig { memory: mib << 20, ..config(Basis::Haar) };
-        let mut bytes = Vec::new();
-        let done = convert(&mut source.clone(), &config, Path::new("a.wspl"), &mut bytes, &Silent);
-        files.extend(done.is_ok().then_some(bytes));
+    for bound in [Bound::Pointwise, Bound::Relative { floor: 0.01 }, Bound::Sampled { samples: 30, seed: 0 }] {
+        files.clear();
+        for mib in [15, 16, 20, 40, 300] {
+            let config = ConvertConfig { bound, memory: mib << 20, ..config(Basis::Haar) };
+            let mut bytes = Vec::new();
+            let done = convert(&mut source.clone(), &config, Path::new("a.wspl"), &mut bytes, &Silent);
+            files.extend(done.is_ok().then_some(bytes));
+        }
+        assert!(files.len() >= 4, "{} budgets suffice", files.len());
+        assert!(files.iter().all(|f| *f == files[0]), "{bound:?}");
     }
-    assert!(files.len() >= 4, "{} budgets suffice", files.len());
-    assert!(files.iter().all(|f| *f == files[0]));
 }
 
 /// The stages of a conversion work in the program's own pool, which only the program can size.
@@ -67,14 +71,16 @@ fn the_program_writes_the_same_bytes_with_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let frames = folder.path().join("frames.raw");
     std::fs::write(&frames, memory(Mask::None).frames.as_slice()).unwrap();
-    let run = |threads: &str| {
-        let out = folder.path().join(format!("{threads}.wspl"));
+    let run = |bound: &str, threads: &str| {
+        let out = folder.path().join(format!("{bound}{threads}.wspl"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_wavesplat"));
         command.arg("convert").arg(&frames).args(["--dims", "40x33x20x20", "--dtype", "f32", "--threads", threads]);
-        let done = command.arg("-o").arg(&out).output().unwrap();
+        let done = command.args(["--bound", bound, "-o"]).arg(&out).output().unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         std::fs::read(out).unwrap()
     };
-    let one = run("1");
-    assert!(["2", "5"].into_iter().all(|n| run(n) == one));
+    for bound in ["pointwise", "relative", "sampled"] {
+        let one = run(bound, "1");
+        assert!(["2", "4", "5"].into_iter().all(|n| run(bound, n) == one), "{bound}");
+    }
 }

@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 7] = [
     &["sample", "volume", "mapped", "output"],
     &["bound", "wavelet", "camera", "footprint", "source", "npy"],
     &["codec", "scan"],
-    &["file"],
+    &["file", "report"],
     &["convert", "render", "extract", "verify"],
     &["cli"],
 ];
@@ -19,7 +19,10 @@ const HOMES: [(&str, &[&str]); 12] = [
     ("memmap2::", &["mapped.rs"]),
     ("libc::", &["mapped.rs"]),
     ("crossbeam::", &["convert/"]),
-    ("rayon::", &["convert/mod.rs", "scan.rs", "render/mod.rs", "extract.rs", "verify.rs", "cli/mod.rs"]),
+    (
+        "rayon::",
+        &["convert/mod.rs", "convert/sampled.rs", "scan.rs", "render/mod.rs", "extract.rs", "verify.rs", "cli/mod.rs"],
+    ),
     ("clap::", &["cli/", "bin/"]),
     ("indicatif::", &["cli/"]),
     ("bytesize::", &["cli/"]),

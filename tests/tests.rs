@@ -13,5 +13,6 @@ mod images;
 mod layering;
 mod real;
 mod reference;
+mod sampled;
 mod truncation;
 mod wavelets;

@@ -55,7 +55,7 @@ fn kept(values: &[f64], config: &ConvertConfig) -> (Vec<usize>, f64) {
     let block = file.block(&codec, entry, &vec![true; codec.basis.coefficients()]).unwrap();
     assert!(block.exact.is_none() && block.outliers.positions.is_empty(), "the case says nothing about coefficients");
     let of_voxel = |v| block.codes.iter().skip(v).step_by(VOXELS).filter(|c| **c != 0).count();
-    ((0..VOXELS).map(of_voxel).collect(), codec.delta)
+    ((0..VOXELS).map(of_voxel).collect(), codec.promise.delta)
 }
 
 /// Mean number of coefficients: the library's, the fewest for the bound, and for twice the bound.

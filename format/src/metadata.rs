@@ -14,12 +14,45 @@ const CONFIG: config::Configuration<config::LittleEndian, config::Fixint, config
     config::standard().with_little_endian().with_fixed_int_encoding().with_limit::<MAX_METADATA>();
 
 /// What the tolerance promises; new kinds are appended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
+#[derive(Debug, Clone, Copy, PartialEq, Encode, Decode)]
 pub enum Bound {
     /// Every sample is within the window's `delta`.
     Pointwise,
-    /// The root mean square of the errors is within it.
+    /// The root mean square of each series' errors is within it.
     Rms,
+    /// Every sample v is within tolerance x max(|v|, floor); `delta` is the largest of these in the window.
+    Relative {
+        /// Below this magnitude samples may be as wrong as at it; in units of the samples.
+        floor: f64,
+    },
+    /// As [`Bound::Rms`], but `delta` is ESTIMATED from images, so that the relative error of their pixels is about the
+    /// tolerance: an estimate, not a guarantee.
+    Sampled {
+        /// Random pixels on each of three faces.
+        samples: u32,
+        /// What chose them.
+        seed: u64,
+    },
+}
+
+impl Bound {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pointwise => "pointwise",
+            Self::Rms => "rms",
+            Self::Relative { .. } => "relative",
+            Self::Sampled { .. } => "sampled",
+        }
+    }
+
+    fn check(self) -> Check {
+        match self {
+            Self::Relative { floor } => ensure(finite_amount(floor), || format!("a floor of {floor}")),
+            Self::Sampled { samples, .. } => ensure(samples > 0, || "a bound sampled nowhere".into()),
+            Self::Pointwise | Self::Rms => Ok(()),
+        }
+    }
 }
 
 /// The transform along time; new kinds are appended.
@@ -44,10 +77,12 @@ pub struct Window {
     pub coefficients: u32,
     /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`.
     pub levels: Vec<u32>,
-    /// The bound promised in this window, in units of the samples.
+    /// The largest error that the bound allows in this window, in units of the samples.
     pub delta: f64,
     /// Largest error of a sample, rounded up; at least that of every block.
     pub reached: f64,
+    /// Largest share of its bound that any series used, in the bound's own measure, rounded up; at most 1.
+    pub share: f64,
     /// Sum of the squared errors of the samples; may overflow to infinity.
     pub squared_error: f64,
     /// Smallest decoded finite sample; infinity when there is none.
@@ -85,9 +120,10 @@ pub struct Metadata {
     pub variable: Option<String>,
     /// What the tolerance promises.
     pub bound: Bound,
-    /// The tolerance as asked for; relative to `range` where the bound is.
+    /// The tolerance as asked for.
     pub tolerance: f64,
-    /// The value range that the tolerance refers to, at the end of the archive; (inf, -inf) when there is none.
+    /// The value range at the end of the archive, or as given, that a pointwise or rms tolerance refers to; (inf, -inf)
+    /// when there is none.
     pub range: (f64, f64),
     /// The value that marks a missing sample, besides NaN.
     pub missing_value: Option<f64>,
@@ -134,6 +170,7 @@ impl Metadata {
         self.check_grid()?;
         self.check_times()?;
         ensure(finite_amount(self.tolerance), || format!("a tolerance of {}", self.tolerance))?;
+        self.bound.check()?;
         ensure(is_range(self.range.0, self.range.1), || "a value range out of order".into())?;
         self.check_windows()
     }
@@ -237,7 +274,8 @@ impl Window {
         let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
         ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
         let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
-        ensure(errors && is_range(self.min, self.max), || "an error or value range out of range".into())
+        ensure(errors && is_range(self.min, self.max), || "an error or value range out of range".into())?;
+        ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
     }
 }
 
@@ -269,7 +307,7 @@ mod tests {
     #[test]
     fn impossible_metadata_is_refused() {
         type Change = fn(&mut Metadata);
-        let changes: [Change; 16] = [
+        let changes: [Change; 21] = [
             |m| m.dims[1] = 0,
             |m| m.dims = [MAX_DIM; 3],
             |m| m.spacing[0] = 0.0,
@@ -285,6 +323,11 @@ mod tests {
             |m| m.windows[0].levels.push(1),
             |m| m.windows[0].frames = 0,
             |m| m.windows[0].reached = f64::INFINITY,
+            |m| m.windows[0].share = 1f64.next_up(),
+            |m| m.windows[0].share = f64::NAN,
+            |m| m.bound = Bound::Relative { floor: -1.0 },
+            |m| m.bound = Bound::Relative { floor: f64::INFINITY },
+            |m| m.bound = Bound::Sampled { samples: 0, seed: 7 },
             |m| m.windows.clear(),
         ];
         for (number, change) in changes.into_iter().enumerate() {

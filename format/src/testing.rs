@@ -26,6 +26,7 @@ pub(crate) fn metadata() -> Metadata {
         levels: levels.to_vec(),
         delta: 0.5,
         reached: 0.25,
+        share: 0.75,
         squared_error: 1.5,
         min: -4.0,
         max: 9.0,

@@ -4,7 +4,7 @@
 use clap::{Parser, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use wavesplat::bound::voxel_bound;
+use wavesplat::bound::range_bound;
 use wavesplat::camera::View;
 use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole};
 use wavesplat::error::{Error, Result};
@@ -242,11 +242,10 @@ impl Cli {
         if !(0.0..=1.0).contains(&tolerance) {
             return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
         }
-        let range = if file.range.0 <= file.range.1 { file.range } else { (0.0, 0.0) };
-        let allowed = voxel_bound(tolerance, range);
+        let allowed = range_bound(tolerance, file.range);
         let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         if allowed < reached {
-            let least = (reached / (range.1 - range.0)).next_up();
+            let least = reached / (file.range.1 - file.range.0);
             let what = "the file itself is up to";
             return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
         }

@@ -91,6 +91,25 @@ impl Block {
 
     /// All samples of the block in their own type, little-endian, `frame * voxels + voxel`.
     pub fn samples(&self, codec: &WindowCodec) -> Vec<u8> {
+        self.decode(codec, |_, _| {})
+    }
+
+    /// What [`Self::samples`] gives, and the numbers that are splatted, not rounded to the samples' type.
+    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Vec<u8>, Vec<f64>) {
+        let mut values = vec![0.0; codec.frames() * self.voxels];
+        let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
+        if self.exact.is_some() {
+            sample::load(codec.sample, &samples, &mut values);
+        }
+        let outliers = self.outliers.samples.chunks_exact(codec.sample.size());
+        for (index, bytes) in self.outliers.positions.iter().map(|p| *p as usize).zip(outliers) {
+            sample::load(codec.sample, bytes, &mut values[index..=index]);
+        }
+        (samples, values)
+    }
+
+    /// All samples; `visit(index of the first, values)` sees what coefficients give before it is rounded.
+    fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Vec<u8> {
         let size = codec.sample.size();
         let mut out = match &self.exact {
             Some(exact) => exact.clone(),
@@ -99,8 +118,9 @@ impl Block {
         if self.exact.is_none() {
             self.for_each_group(codec, |first, count, series| {
                 for (frame, lane) in series.iter().enumerate() {
-                    let at = (frame * self.voxels + first) * size;
-                    sample::store(codec.sample, &lane[..count.min(LANES)], &mut out[at..at + count * size]);
+                    let (at, values) = (frame * self.voxels + first, &lane[..count.min(LANES)]);
+                    visit(at, values);
+                    sample::store(codec.sample, values, &mut out[at * size..(at + count) * size]);
                 }
             });
         }

@@ -1,8 +1,8 @@
 //! Samples of one block to a coded block that keeps its promise.
 
 use super::truncate::Group;
+use super::weigh::Weighing;
 use super::{WindowCodec, lane_groups};
-use crate::bound::{self, difference_up};
 use crate::sample;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
@@ -21,6 +21,8 @@ pub struct Encoder {
 pub struct Encoded {
     /// What the file stores.
     pub block: EncodedBlock,
+    /// The largest share of its bound that a series uses, rounded up.
+    pub share: f64,
     /// Nonzero coefficients.
     pub coded: u64,
     /// Samples stored exactly because they missed the bound.
@@ -44,10 +46,13 @@ struct Tally {
     max: f64,
     reached: f64,
     squared_error: f64,
+    /// The largest share of its bound that a series uses.
+    share: f64,
 }
 
 impl Tally {
-    const NONE: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, reached: 0.0, squared_error: 0.0 };
+    const NONE: Self =
+        Self { min: f64::INFINITY, max: f64::NEG_INFINITY, reached: 0.0, squared_error: 0.0, share: 0.0 };
 
     fn add(&mut self, decoded: f64, error: f64) {
         self.min = self.min.min(decoded);
@@ -60,25 +65,30 @@ impl Tally {
     /// rounding up at the end. False if they are not, so that each must be looked at; nothing is added then.
     fn add_clearly_within(&mut self, codec: &WindowCodec, group: &Group) -> bool {
         let (mut all, mut largest, mut squares) = ((self.min, self.max), Lane::default(), Lane::default());
+        let mut sums = Lane::default();
         for (decoded, source) in group.decoded.iter().zip(&group.source) {
-            let rounded = sample::round_all(codec.sample, decoded);
+            let (rounded, mut errors) = (sample::round_all(codec.sample, decoded), Lane::default());
             for l in 0..LANES {
                 let (a, b) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs());
                 let e = if a > b { a } else { b };
                 largest[l] = if e > largest[l] { e } else { largest[l] };
                 squares[l] += e * e;
+                errors[l] = e;
             }
+            codec.promise.add(&errors, source, &mut sums);
             match sample::range_unless_missing(&rounded, codec.missing_value) {
                 Some(range) => all = (all.0.min(range.0), all.1.max(range.1)),
                 None => return false,
             }
         }
-        let largest = largest.into_iter().fold(0.0, f64::max);
-        let largest = if largest > 0.0 { largest.next_up() } else { largest };
-        if largest > codec.delta {
+        let share = codec.promise.largest_share(&sums, codec.frames());
+        if share > 1.0 {
             return false;
         }
+        let largest = largest.into_iter().fold(0.0, f64::max);
+        let largest = if largest > 0.0 { largest.next_up() } else { largest };
         self.reached = self.reached.max(largest);
+        self.share = self.share.max(share);
         self.squared_error += squares.iter().sum::<f64>();
         (self.min, self.max) = all;
         true
@@ -99,34 +109,31 @@ impl Encoder {
             Some(coded) => self.coded_parts(codec, &coded)?,
             None => self.exact_parts(codec, samples, &missing)?,
         };
-        let (stats, mut parts) = self.smaller(codec, samples, &missing, coded)?;
+        let Parts { stats, share, mut parts } = self.smaller(codec, samples, &missing, coded)?;
         if missing.count > 0 {
             pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
             parts.sort_by_key(|part| part.kind); // an exact part stands after it
         }
-        Ok(Encoded::new(EncodedBlock { id, stats, parts }, missing.count))
+        Ok(Encoded::new(EncodedBlock { id, stats, parts }, share, missing.count))
     }
 
     /// Codes every series. None if the block must be stored exactly.
     fn series(&mut self, codec: &WindowCodec, samples: &[u8], missing: &Missing) -> Option<Coded> {
         let voxels = samples.len() / codec.sample.size() / codec.frames();
-        let error = bound::before_rounding(codec.sample, codec.delta, missing.magnitude);
-        let step = bound::step(codec.bound, error, codec.gain);
-        if !(error > 0.0 && step.is_normal()) {
-            return None;
-        }
+        let weighing = Weighing::of(codec, samples, missing.magnitude)?;
+        let step = weighing.step;
         clear(&mut self.codes).resize(codec.basis.coefficients() * voxels, 0);
         let mut group = Group::new(codec);
         let mut coded = Coded { step, dropped: 0.0, outliers: Default::default(), tally: Tally::NONE };
         let mut places = Vec::new();
         for (first, count) in lane_groups(voxels) {
-            load_group(codec, samples, missing, first, count, &mut group);
+            load_group(codec, &weighing, samples, missing, first, count, &mut group);
             if !group.quantise(codec, step) {
                 return None;
             }
-            group.truncate(codec, step, error);
+            group.truncate(codec, step);
             coded.dropped += self.keep_codes(&group, step, voxels, first, count);
             if count < LANES || missing.count > 0 || !coded.tally.add_clearly_within(codec, &group) {
                 check_group(codec, &group, voxels, first, count, &mut coded.tally, &mut places);
@@ -171,7 +178,7 @@ impl Encoder {
             let stats = PartStats { count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Outliers, stats, &self.raw)?);
         }
-        Ok((block_stats(coded.tally, coded.step, coded.dropped), parts))
+        Ok(Parts::new(coded.tally, coded.step, coded.dropped, parts))
     }
 
     /// The parts of a block stored exactly.
@@ -190,7 +197,7 @@ impl Encoder {
         let count = (samples.len() / codec.sample.size()) as u64;
         let stats = PartStats { count, energy: 0.0, largest: 0.0 };
         let part = self.compressor.part(PartKind::Exact, stats, &self.raw)?;
-        Ok((block_stats(tally, 0.0, 0.0), vec![part]))
+        Ok(Parts::new(tally, 0.0, 0.0, vec![part]))
     }
 
     /// The block as coded, or stored exactly if it hardly shrank and that is smaller.
@@ -201,8 +208,8 @@ impl Encoder {
         missing: &Missing,
         coded: Parts,
     ) -> wavesplat_format::Result<Parts> {
-        let size = |parts: &Parts| parts.1.iter().map(|p| p.stored.len()).sum::<usize>();
-        if size(&coded) < samples.len() / 2 || coded.1.iter().any(|p| p.kind == PartKind::Exact) {
+        let size = |coded: &Parts| coded.parts.iter().map(|p| p.stored.len()).sum::<usize>();
+        if size(&coded) < samples.len() / 2 || coded.parts.iter().any(|p| p.kind == PartKind::Exact) {
             return Ok(coded);
         }
         let exact = self.exact_parts(codec, samples, missing)?;
@@ -210,29 +217,36 @@ impl Encoder {
     }
 }
 
-type Parts = (BlockStats, Vec<EncodedPart>);
+/// The parts of a block, and what the directory and the window's record say of them.
+struct Parts {
+    stats: BlockStats,
+    share: f64,
+    parts: Vec<EncodedPart>,
+}
+
+impl Parts {
+    fn new(tally: Tally, step: f64, dropped: f64, parts: Vec<EncodedPart>) -> Self {
+        let Tally { min, max, reached, squared_error, share } = tally;
+        Self { stats: BlockStats { step, min, max, reached, squared_error, dropped }, share, parts }
+    }
+}
 
 /// A block in which more than one sample in this many misses the bound is stored exactly: an outlier costs more bytes.
 const MOST_OUTLIERS: usize = 8;
 
 impl Encoded {
-    fn new(block: EncodedBlock, missing: u64) -> Self {
+    fn new(block: EncodedBlock, share: f64, missing: u64) -> Self {
         let count =
             |wanted: fn(PartKind) -> bool| block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum();
         let coded = count(|kind| matches!(kind, PartKind::Level(_)));
         let outliers = count(|kind| kind == PartKind::Outliers);
-        Self { block, coded, outliers, missing }
+        Self { block, share, coded, outliers, missing }
     }
 }
 
 fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
     buffer.clear();
     buffer
-}
-
-fn block_stats(tally: Tally, step: f64, dropped: f64) -> BlockStats {
-    let Tally { min, max, reached, squared_error } = tally;
-    BlockStats { step, min, max, reached, squared_error, dropped }
 }
 
 fn code_stats(codes: &[i32], step: f64) -> PartStats {
@@ -279,14 +293,23 @@ impl Missing {
 }
 
 /// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
-fn load_group(codec: &WindowCodec, samples: &[u8], missing: &Missing, first: usize, count: usize, group: &mut Group) {
+fn load_group(
+    codec: &WindowCodec,
+    weighing: &Weighing,
+    samples: &[u8],
+    missing: &Missing,
+    first: usize,
+    count: usize,
+    group: &mut Group,
+) {
     let voxels = missing.mask.len() / codec.frames();
     let size = codec.sample.size();
     for (frame, (source, weight)) in group.source.iter_mut().zip(&mut group.weight).enumerate() {
         let at = frame * voxels + first;
         *source = Lane::default();
         sample::load(codec.sample, &samples[at * size..(at + count) * size], &mut source[..count]);
-        *weight = std::array::from_fn(|l| f64::from(u8::from(l < count && !missing.mask[at + l])));
+        let weights = weighing.weights(source);
+        *weight = std::array::from_fn(|l| if l < count && !missing.mask[at + l] { weights[l] } else { 0.0 });
     }
     if missing.count > 0 {
         (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));
@@ -315,31 +338,27 @@ fn check_group(
     tally: &mut Tally,
     places: &mut Vec<u32>,
 ) {
-    let mut errors = vec![0.0; codec.frames()];
+    let mut errors = vec![(0.0, 0.0); codec.frames()]; // each with what is allowed
     for lane in 0..count {
+        let present = |t: usize| group.weight[t][lane] > 0.0;
         for (t, error) in errors.iter_mut().enumerate() {
-            let counts = group.weight[t][lane] > 0.0;
-            *error = if counts { sample_error(codec, group.decoded[t][lane], group.source[t][lane]) } else { 0.0 };
+            let (decoded, source) = (group.decoded[t][lane], group.source[t][lane]);
+            let found = if present(t) { codec.error(decoded, source) } else { 0.0 };
+            *error = (found, codec.promise.allowed(source));
         }
-        let holds = bound::holds(codec.bound, codec.delta, errors.iter().copied());
-        for (t, error) in errors.iter().enumerate().filter(|(t, _)| group.weight[*t][lane] > 0.0) {
-            if holds || *error <= codec.delta {
+        let holds = codec.promise.holds(errors.iter().copied());
+        for (t, (error, allowed)) in errors.iter_mut().enumerate().filter(|(t, _)| present(*t)) {
+            if holds || *error <= *allowed {
                 tally.add(sample::round_to(codec.sample, group.decoded[t][lane]), *error);
             } else {
+                *error = 0.0;
                 tally.add(group.source[t][lane], 0.0);
                 places.push((t * voxels + first + lane) as u32);
             }
         }
+        let share = codec.promise.share(errors.iter().copied());
+        tally.share = tally.share.max(share.min(1.0)); // rounded up beyond what holds
     }
-}
-
-/// The larger error of a decoded value as it is splatted and as it is extracted, rounded to its type; rounded up.
-/// Infinite if it would be taken for a missing one.
-fn sample_error(codec: &WindowCodec, decoded: f64, source: f64) -> f64 {
-    let rounded = sample::round_to(codec.sample, decoded);
-    let (splatted, extracted) = (difference_up(decoded, source), difference_up(rounded, source));
-    let lost = splatted.is_nan() || extracted.is_nan() || codec.is_missing(rounded);
-    if lost { f64::INFINITY } else { splatted.max(extracted) }
 }
 
 fn gather_outliers(codec: &WindowCodec, samples: &[u8], mut positions: Vec<u32>) -> wavesplat_format::Outliers {

@@ -7,8 +7,9 @@
 pub mod decode;
 pub mod encode;
 mod truncate;
+mod weigh;
 
-use crate::bound::Bound;
+use crate::bound::{Promise, difference_up};
 use crate::sample::{self, SampleType};
 use crate::wavelet::{self, LANES, Lane, TimeBasis};
 use std::ops::Range;
@@ -26,9 +27,7 @@ pub struct WindowCodec {
     /// The type of the samples.
     pub sample: SampleType,
     /// What is promised.
-    pub bound: Bound,
-    /// The bound on a voxel's error in this window; 0 asks for the very bits.
-    pub delta: f64,
+    pub promise: Promise,
     /// The sample that stands for "missing" besides NaN and infinities.
     pub missing_value: Option<f64>,
     /// The coefficients in each level part of a block, coarse to fine.
@@ -37,11 +36,11 @@ pub struct WindowCodec {
 
 impl WindowCodec {
     /// The codec of a window whose blocks are at most `edge` voxels a side.
-    pub fn new(basis: Box<dyn TimeBasis>, sample: SampleType, bound: Bound, delta: f64, edge: usize) -> Self {
+    pub fn new(basis: Box<dyn TimeBasis>, sample: SampleType, promise: Promise, edge: usize) -> Self {
         let synthesis = wavelet::synthesis(basis.as_ref());
         let parts = wavelet::ranges(&join_levels(&basis.levels(), edge));
         let gain = wavelet::gain(&synthesis);
-        Self { basis, synthesis, gain, sample, bound, delta, missing_value: None, parts }
+        Self { basis, synthesis, gain, sample, promise, missing_value: None, parts }
     }
 
     /// The codec of a window as a coefficient file describes it; says what contradicts the basis.
@@ -53,7 +52,8 @@ impl WindowCodec {
             return Err(wavesplat_format::Error::Invalid(what));
         }
         let lengths: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
-        let mut codec = Self::new(basis, file.sample, file.bound, window.delta, 1);
+        let promise = Promise { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
+        let mut codec = Self::new(basis, file.sample, promise, 1);
         codec.missing_value = file.missing_value;
         codec.parts = wavelet::ranges(&lengths);
         Ok(codec)
@@ -67,6 +67,15 @@ impl WindowCodec {
     /// Whether a sample is missing: not finite, or the declared value.
     pub fn is_missing(&self, value: f64) -> bool {
         sample::is_missing(value, self.missing_value)
+    }
+
+    /// The larger error of a decoded value as it is splatted and as it is extracted, rounded to its type; rounded up.
+    /// Infinite if it would be taken for a missing one.
+    pub fn error(&self, decoded: f64, source: f64) -> f64 {
+        let rounded = sample::round_to(self.sample, decoded);
+        let (splatted, extracted) = (difference_up(decoded, source), difference_up(rounded, source));
+        let lost = splatted.is_nan() || extracted.is_nan() || self.is_missing(rounded);
+        if lost { f64::INFINITY } else { splatted.max(extracted) }
     }
 }
 

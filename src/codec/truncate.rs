@@ -1,7 +1,7 @@
 //! Which coefficients to keep (method.md section 4): the smallest are dropped for as long as the promise holds.
 
 use super::{WindowCodec, reconstruct};
-use crate::bound::Bound;
+use crate::bound::Measure;
 use crate::wavelet::{LANES, Lane};
 
 /// The coefficients of [`LANES`] voxels while they are coded; reused from group to group.
@@ -9,7 +9,7 @@ use crate::wavelet::{LANES, Lane};
 pub(super) struct Group {
     /// The samples, missing ones filled; `frames` lanes.
     pub(super) source: Vec<Lane>,
-    /// 1 where a sample's error counts, 0 where it is missing; `frames` lanes.
+    /// What a sample's error is multiplied by, 0 where it is missing; `frames` lanes.
     pub(super) weight: Vec<Lane>,
     /// K lanes.
     pub(super) coefficients: Vec<Lane>,
@@ -60,17 +60,17 @@ impl Group {
         kept(&self.codes[k], &self.rank[k], &self.dropped)
     }
 
-    /// Drops as many of the smallest coefficients as the error allows, and decodes the rest into `decoded`.
-    pub(super) fn truncate(&mut self, codec: &WindowCodec, step: f64, error: f64) {
+    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded`.
+    pub(super) fn truncate(&mut self, codec: &WindowCodec, step: f64) {
         let counts = self.order();
         let mut holds = [0; LANES]; // so many can be dropped, or none can
         let mut fails = counts.map(|n| n + 1);
         self.dropped = counts; // a series within the bound of zero keeps none
         loop {
             self.reconstruct(codec, step);
-            let errors = self.errors(codec.bound);
+            let errors = self.errors(codec.promise.measure());
             for l in 0..LANES {
-                let end = if errors[l] <= error { &mut holds[l] } else { &mut fails[l] };
+                let end = if errors[l] <= 1.0 { &mut holds[l] } else { &mut fails[l] };
                 *end = self.dropped[l];
             }
             let open = |l: usize| fails[l] > holds[l] + 1;
@@ -107,11 +107,11 @@ impl Group {
         reconstruct(codec.basis.as_ref(), step, code, &mut self.work, &mut self.decoded);
     }
 
-    /// The error of each lane in the bound's own measure: the largest over the frames, or the root of the mean square.
-    fn errors(&self, bound: Bound) -> Lane {
-        match bound {
-            Bound::Pointwise => self.fold_errors(f64::max),
-            Bound::Rms => {
+    /// The weighed error of each lane: the largest over the frames, or the root of the mean square.
+    fn errors(&self, measure: Measure) -> Lane {
+        match measure {
+            Measure::Largest => self.fold_errors(f64::max),
+            Measure::RootMeanSquare => {
                 let frames = self.source.len() as f64;
                 self.fold_errors(|sum, e| sum + e * e).map(|sum| (sum / frames).sqrt())
             }

@@ -1,7 +1,8 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
+use super::sampled::{self, Pixel};
 use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
-use crate::bound::{self, Bound};
+use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
 use crate::scan::{Scan, join_ranges, scan};
@@ -28,7 +29,12 @@ pub(super) fn read(
     plan: &Plan,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
-    let mut reader = WindowReader { config, plan, archive: source.archive().clone(), range: None, id: None };
+    let archive = source.archive().clone();
+    let pixels = match config.bound {
+        Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
+        _ => Vec::new(),
+    };
+    let mut reader = WindowReader { config, plan, archive, pixels, range: None, id: None };
     let mut busy = Duration::ZERO;
     for index in 0.. {
         let started = Instant::now();
@@ -58,6 +64,8 @@ struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan,
     archive: Archive,
+    /// Where a sampled bound looks.
+    pixels: Vec<Pixel>,
     /// Range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
@@ -71,14 +79,28 @@ impl WindowReader<'_> {
         self.refuse_missing(window, first, &seen)?;
         let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
         self.range = Some(range);
-        let (lo, hi) = config.range.unwrap_or(range);
-        let delta = if lo <= hi { bound::voxel_bound(config.tolerance, (lo, hi)) } else { 0.0 }; // all missing so far
+        let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
+        let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let basis = wavelet::basis(config.basis, window.frames());
-        let mut codec = WindowCodec::new(basis, ty, config.bound, delta, self.plan.blocks.edge);
+        let mut codec = WindowCodec::new(basis, ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
         let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
         Ok(WindowJob { index, first_frame: first as u64, id, codec, range })
+    }
+
+    /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
+    fn delta(&self, window: &dyn FrameWindow, seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
+        let ConvertConfig { tolerance, missing_value, .. } = *self.config;
+        let magnitude = if seen.0 <= seen.1 { seen.1.max(-seen.0) } else { 0.0 }; // all missing
+        match self.config.bound {
+            Bound::Pointwise | Bound::Rms => Ok(bound::range_bound(tolerance, range)),
+            Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),
+            Bound::Sampled { .. } => {
+                let Archive { ref grid, sample, .. } = self.archive;
+                sampled::View { window, grid, sample, missing_value, magnitude }.bound(tolerance, &self.pixels)
+            }
+        }
     }
 
     fn refuse_missing(&self, window: &dyn FrameWindow, first: usize, seen: &Scan) -> Result<()> {

@@ -7,11 +7,13 @@
 //! ```
 //!
 //! Batches keep their order, so the bytes depend neither on the number of threads nor on the memory budget, which fix the
-//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from the value range of all frames up to its end, which never exceeds
-//! that of the archive: no first pass over the data is needed, and a pipe gives the same bytes as files.
+//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from its own samples or, where
+//! the tolerance refers to the value range, from that of all frames up to its end, which never exceeds that of the archive:
+//! no first pass over the data is needed, and a pipe gives the same bytes as files.
 
 mod gather;
 mod record;
+pub mod sampled;
 
 use crate::bound::Bound;
 use crate::codec::WindowCodec;
@@ -19,6 +21,7 @@ use crate::codec::encode::{Encoded, Encoder};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::progress::Progress;
+use crate::report::{PromiseReport, WindowReport};
 use crate::sample::{self, SampleType};
 use crate::source::{Archive, FrameSource};
 use crate::volume::BlockGrid;
@@ -50,11 +53,11 @@ pub struct ConvertConfig {
     pub basis: Basis,
     /// Frames in a window.
     pub window: usize,
-    /// The voxel bound as a share of the value range; 0 keeps every bit.
+    /// The error allowed, as a share of what the bound refers to; 0 keeps every bit.
     pub tolerance: f64,
     /// What is promised.
     pub bound: Bound,
-    /// The value range; by default that of the frames so far.
+    /// The value range that a pointwise or rms tolerance refers to; by default that of the frames so far.
     pub range: Option<(f64, f64)>,
     /// What to do with missing samples.
     pub missing: MissingPolicy,
@@ -91,12 +94,19 @@ pub struct ConvertReport {
     pub outliers: u64,
     /// Missing samples.
     pub missing: u64,
-    /// Value range that the tolerance refers to.
+    /// What is promised.
+    #[serde(flatten)]
+    pub promise: PromiseReport,
+    /// Value range, which a pointwise or rms tolerance refers to.
     pub range: (f64, f64),
-    /// The largest voxel bound promised in any window.
+    /// The largest bound in any window.
     pub delta: f64,
     /// The largest error reached in any sample.
     pub reached: f64,
+    /// The largest share of its bound that any series used.
+    pub share: f64,
+    /// What each window promised and reached.
+    pub per_window: Vec<WindowReport>,
     /// Seconds spent scanning and gathering samples, on the reader's thread.
     pub read_seconds: f64,
     /// Seconds spent encoding, on all workers together as wall time.

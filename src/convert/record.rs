@@ -3,6 +3,7 @@
 use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, WindowJob};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
+use crate::report::{PromiseReport, WindowReport};
 use crate::scan::join_ranges;
 use crate::source::Archive;
 use crossbeam::channel::Receiver;
@@ -70,6 +71,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         let writer = self.writer.as_mut().expect("made with the first batch");
         for encoded in &batch.blocks {
             add_stats(window, &encoded.block.stats);
+            window.share = window.share.max(encoded.share);
             window.coded += encoded.coded;
             window.outliers += encoded.outliers;
             window.missing += encoded.missing;
@@ -100,7 +102,8 @@ impl<'a, W: Write> Recorder<'a, W> {
 
     fn report(&self, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
         let Metadata { dims, frames, windows, range, .. } = &self.metadata;
-        let samples = dims.iter().product::<u64>() * frames;
+        let voxels = dims.iter().product::<u64>();
+        let samples = voxels * frames;
         let sum = |part: fn(&Window) -> u64| windows.iter().map(part).sum::<u64>();
         let largest = |part: fn(&Window) -> f64| windows.iter().map(part).fold(0.0, f64::max);
         let [read_seconds, encode_seconds, write_seconds, seconds] = seconds.map(|d| d.as_secs_f64());
@@ -113,9 +116,12 @@ impl<'a, W: Write> Recorder<'a, W> {
             coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,
             outliers: sum(|w| w.outliers),
             missing: sum(|w| w.missing),
+            promise: PromiseReport::new(self.config.bound, self.config.tolerance, *range),
             range: *range,
             delta: largest(|w| w.delta),
             reached: largest(|w| w.reached),
+            share: largest(|w| w.share),
+            per_window: windows.iter().map(|w| WindowReport::new(w, voxels)).collect(),
             read_seconds,
             encode_seconds,
             write_seconds,
@@ -131,8 +137,9 @@ fn window_record(config: &ConvertConfig, job: &WindowJob) -> Window {
         basis: config.basis,
         coefficients: job.codec.basis.coefficients() as u32,
         levels: job.codec.parts.iter().map(|r| r.len() as u32).collect(),
-        delta: job.codec.delta,
+        delta: job.codec.promise.delta,
         reached: 0.0,
+        share: 0.0,
         squared_error: 0.0,
         min: f64::INFINITY,
         max: f64::NEG_INFINITY,

@@ -15,6 +15,15 @@ fn every_command_has_help_with_examples() {
 }
 
 #[test]
+fn an_estimate_is_not_sold_as_a_guarantee() {
+    let run = Work::new().wavesplat("convert --help").ok();
+    let text = run.text().split_whitespace().collect::<Vec<_>>().join(" ");
+    for words in ["AN ESTIMATE, NOT A GUARANTEE", "--floor", "zeros must come back as zeros", "--samples", "--seed"] {
+        assert!(text.contains(words), "'{words}' in\n{text}");
+    }
+}
+
+#[test]
 fn versions_are_told() {
     let work = Work::new();
     let version = env!("CARGO_PKG_VERSION");

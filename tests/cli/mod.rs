@@ -6,6 +6,7 @@ mod errors;
 mod extract;
 mod help;
 mod memory;
+mod modes;
 mod pipes;
 mod render;
 mod usage;

@@ -6,7 +6,7 @@ use super::{Work, small};
 fn bad_values_of_convert_are_named() {
     let work = Work::new();
     work.write("a.npy", small().npy());
-    let cases: [(&str, &[&str]); 22] = [
+    let cases: [(&str, &[&str]); 34] = [
         ("--tolerance -1", &["--tolerance", "0 or more"]),
         ("--tolerance nan", &["--tolerance", "0 or more"]),
         ("--tolerance much", &["--tolerance"]),
@@ -16,6 +16,18 @@ fn bad_values_of_convert_are_named() {
         ("--basis fourier", &["--basis", "haar", "multi"]),
         ("--range 2,1", &["--range", "lower"]),
         ("--range 1", &["--range", "2 numbers"]),
+        ("--bound exact", &["--bound", "pointwise", "rms", "relative", "sampled"]),
+        ("--floor 1", &["--floor", "--bound relative"]),
+        ("--floor 1 --bound sampled", &["--floor", "--bound relative"]),
+        ("--bound relative --floor -1", &["--floor", "0 or more"]),
+        ("--bound relative --floor nan", &["--floor", "0 or more"]),
+        ("--bound relative --floor inf", &["--floor", "0 or more"]),
+        ("--bound relative --range 0,1", &["--range", "--bound relative", "each sample"]),
+        ("--bound sampled --range 0,1", &["--range", "--bound sampled", "pixels"]),
+        ("--bound rms --samples 5", &["--samples", "--bound sampled"]),
+        ("--seed 5", &["--seed", "--bound sampled"]),
+        ("--bound sampled --samples 0", &["--samples", "1"]),
+        ("--bound sampled --seed -1", &["--seed"]),
         ("--region 0:21,:,:", &["--region", "20x14x10"]),
         ("--region 4:4,:,:", &["--region", "20x14x10"]),
         ("--region 0:4", &["--region", "x0:x1"]),

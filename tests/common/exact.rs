@@ -88,21 +88,37 @@ fn distance(a: f64, b: f64) -> Whole {
     }
 }
 
-/// A bound: tolerance * (hi - lo), exactly.
+/// A bound: share * tolerance * (hi - lo), exactly.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limit {
-    pub(crate) tolerance: f64,
-    pub(crate) lo: f64,
-    pub(crate) hi: f64,
+    share: f64,
+    tolerance: f64,
+    lo: f64,
+    hi: f64,
 }
 
 /// Below this share of a bound, rounding in `f64` cannot be what decides.
 const CLEAR: f64 = 1.0 - 1e-12;
 
 impl Limit {
+    /// tolerance * (hi - lo)
+    pub(crate) fn range(tolerance: f64, lo: f64, hi: f64) -> Self {
+        Self { share: 1.0, tolerance, lo, hi }
+    }
+
     /// A plain number.
     pub(crate) fn of(number: f64) -> Self {
-        Self { tolerance: 1.0, lo: 0.0, hi: number }
+        Self::range(1.0, 0.0, number)
+    }
+
+    /// What a relative bound allows a sample: tolerance * max(|value|, floor).
+    pub(crate) fn relative(tolerance: f64, floor: f64, value: f64) -> Self {
+        Self::range(tolerance, 0.0, value.abs().max(floor))
+    }
+
+    /// A share of it.
+    pub(crate) fn used(self, share: f64) -> Self {
+        Self { share, ..self }
     }
 
     /// Whether |a - b| <= the bound.
@@ -114,8 +130,8 @@ impl Limit {
         if bound.is_normal() && bound > 1e-290 && (a - b).abs() < bound * CLEAR {
             return true;
         }
-        let (mantissa, exponent) = self.tolerance_parts();
-        let right = product(&vec![mantissa], &distance(self.hi, self.lo));
+        let (mantissa, exponent) = self.factor();
+        let right = product(&mantissa, &distance(self.hi, self.lo));
         compare(&shifted(&distance(a, b), exponent), &right).is_le()
     }
 
@@ -126,8 +142,8 @@ impl Limit {
         if bound.is_normal() && bound > 1e-290 && squares < frames as f64 * CLEAR * CLEAR {
             return true;
         }
-        let (mantissa, exponent) = self.tolerance_parts();
-        let right = product(&vec![mantissa], &distance(self.hi, self.lo));
+        let (mantissa, exponent) = self.factor();
+        let right = product(&mantissa, &distance(self.hi, self.lo));
         let right = product(&vec![frames as u64], &product(&right, &right));
         let square = |(a, b): &(f64, f64)| {
             let d = shifted(&distance(*a, *b), exponent);
@@ -138,28 +154,34 @@ impl Limit {
     }
 
     fn approximate(&self) -> f64 {
-        self.tolerance * (self.hi - self.lo)
+        self.share * self.tolerance * (self.hi - self.lo)
     }
 
-    /// The tolerance as a mantissa and the power of 2 that it is divided by.
-    fn tolerance_parts(&self) -> (u64, usize) {
-        assert!((0.0..=1.0).contains(&self.tolerance) && self.lo <= self.hi);
-        let (mantissa, exponent) = parts(self.tolerance);
-        (mantissa, -exponent as usize)
+    /// share * tolerance as a whole number and the power of 2 that it is divided by.
+    fn factor(&self) -> (Whole, usize) {
+        assert!(self.lo <= self.hi && [self.share, self.tolerance].iter().all(|f| (0.0..=1.0).contains(f)));
+        let [(a, down), (b, further)] = [self.share, self.tolerance].map(parts);
+        (product(&vec![a], &vec![b]), -(down + further) as usize)
     }
 }
 
 #[test]
 fn exact_comparisons_see_the_last_bit() {
-    let limit = Limit { tolerance: 0.5, lo: -f64::MAX, hi: f64::MAX };
+    let limit = Limit::range(0.5, -f64::MAX, f64::MAX);
     assert!(limit.holds(f64::MAX, 0.0) && limit.holds(0.0, -f64::MAX));
     assert!(!limit.holds(f64::MAX, -5e-324));
     assert!(Limit::of(1.0).holds(1.0, 0.0) && !Limit::of(1.0).holds(1.0, -5e-324));
     assert!(!Limit::of(0.0).holds(5e-324, 0.0) && Limit::of(5e-324).holds(5e-324, 0.0));
     assert!(Limit::of(1e-300).holds(0.0, -0.0));
     // 0.1 is a little more than a tenth, 0.3 a little less than three.
-    assert!(Limit { tolerance: 0.1, lo: 0.0, hi: 3.0 }.holds(0.3, 0.0));
-    assert!(!Limit { tolerance: 0.1, lo: 0.0, hi: 3.0 }.holds(0.1 * 3.0, 0.0));
+    assert!(Limit::range(0.1, 0.0, 3.0).holds(0.3, 0.0));
+    assert!(!Limit::range(0.1, 0.0, 3.0).holds(0.1 * 3.0, 0.0));
+    assert!(Limit::relative(0.25, 1.0, -8.0).holds(-6.0, -8.0) && !Limit::relative(0.25, 1.0, -8.0).holds(-5.9, -8.0));
+    assert!(
+        Limit::relative(0.25, 1.0, -0.5).holds(-0.25, -0.5) && !Limit::relative(0.25, 0.0, -0.5).holds(-0.25, -0.5)
+    );
+    assert!(Limit::of(4.0).used(0.25).holds(1.0, 0.0) && !Limit::of(4.0).used(0.25_f64.next_down()).holds(1.0, 0.0));
+    assert!(!Limit::of(1e-300).used(1e-20).holds(1e-319, 0.0) && Limit::of(1e-300).used(1e-20).holds(5e-324, 0.0));
     assert!(
         Limit::of(5.0).holds_rms(&[(1.0, -6.0), (1.0, 2.0)], 2)
             && !Limit::of(5.0).holds_rms(&[(7.0, 0.0), (1.0_f64.next_up(), 0.0)], 2)

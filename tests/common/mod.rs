@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use wavesplat::bound::Bound;
 use wavesplat::camera::View;
+use wavesplat::codec::encode::Encoder;
 use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
@@ -19,9 +20,10 @@ use wavesplat::footprint::Kernel;
 use wavesplat::mapped::Access;
 use wavesplat::progress::Silent;
 use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
-use wavesplat::source::FrameSource;
+use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
+use wavesplat_format::{BlockId, Writer};
 
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
@@ -70,6 +72,26 @@ pub(crate) fn stored(source: &mut dyn FrameSource, config: &ConvertConfig) -> St
     let stored = Stored { folder: tempfile::tempdir().unwrap(), report };
     std::fs::write(stored.path(), bytes).unwrap();
     stored
+}
+
+/// A coefficient file one of whose blocks, (window, block), says that it reached only a `share` of what it did.
+pub(crate) fn stored_with_a_lie(memory: &Memory, config: &ConvertConfig, lie: (u32, u32), share: f64) -> Vec<u8> {
+    let file = stored(&mut memory.clone(), config).open();
+    let mut encoder = Encoder::new(config.level).unwrap();
+    let mut writer = Writer::new(Vec::new(), file.id()).unwrap();
+    for window in 0..file.metadata().windows.len() as u32 {
+        let (codec, frames) = (file.codec(window).unwrap(), file.window_range(window));
+        let samples = memory.clone().window(frames.start, frames.len()).unwrap();
+        for block in 0..file.blocks.len() {
+            let region = file.blocks.region(block);
+            let bytes = read_frames(samples.as_ref(), 0..frames.len(), &region, file.sample()).unwrap();
+            let id = BlockId { window, block: block as u32, channel: 0 };
+            let mut encoded = encoder.block(&codec, id, &bytes).unwrap().block;
+            encoded.stats.reached *= if (id.window, id.block) == lie { share } else { 1.0 };
+            writer.append(&encoded).unwrap();
+        }
+    }
+    writer.finish(file.metadata()).unwrap().0
 }
 
 /// All samples of a file.

@@ -3,6 +3,7 @@
 //! Written from `shared/method.md` alone: nothing here calls the library, and only `std` arithmetic is used.
 
 pub(crate) mod camera;
+pub(crate) mod sampled;
 pub(crate) mod splat;
 pub(crate) mod transform;
 pub(crate) mod truncate;

@@ -19,7 +19,9 @@ Examples:
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
 Inputs: .npy, .nrrd/.nhdr, .vti, .pvd, headerless data with --dims and --dtype.
 The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass;
---range fixes the range instead.")]
+--range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of
+every view is then within the tolerance of its own value. --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker
+than the mean, and single frames, may be off by many times the tolerance.")]
 pub(crate) struct ConvertArgs {
     /// Frame files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
     #[arg(required = true)]
@@ -36,13 +38,23 @@ pub(crate) struct ConvertArgs {
     /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
     #[arg(long, value_name = "T")]
     window: Option<usize>,
-    /// Largest error as a share of the value range; 0 keeps every bit
+    /// Largest error as a share of what the bound refers to; 0 keeps every bit
     #[arg(long, value_name = "X", default_value_t = 0.01, allow_hyphen_values = true)]
     tolerance: f64,
-    /// What is guaranteed: every sample, or the root mean square of each voxel in each window
+    /// What the tolerance bounds
     #[arg(long, value_enum, default_value = "pointwise")]
     bound: BoundName,
-    /// Value range that the tolerance refers to, instead of that of the frames so far
+    /// For --bound relative: samples smaller than this may be as wrong as one of this size. Say where values stop to
+    /// matter: with 0, zeros must come back as zeros, and values near zero cost most of the file [default: 0]
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    floor: Option<f64>,
+    /// For --bound sampled: random pixels on each of three faces [default: 300]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true)]
+    samples: Option<u32>,
+    /// For --bound sampled: another seed takes other pixels [default: 0]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    seed: Option<u64>,
+    /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
     range: Option<Pair>,
     /// NaN, infinities and the missing value: refuse them, or keep them as they are
@@ -80,10 +92,15 @@ enum BasisName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum BoundName {
-    /// Every sample is within the bound
+    /// Every sample: error <= tolerance x value range
     Pointwise,
-    /// The root of each series' mean squared error is
+    /// The root mean square of each voxel's errors in each window <= tolerance x value range
     Rms,
+    /// Every sample v: error <= tolerance x max(|v|, floor)
+    Relative,
+    /// The paper's rule, AN ESTIMATE, NOT A GUARANTEE: as rms, but of tolerance x the mean of random pixels (their
+    /// absolute values), which leaves the relative error of most pixels below the tolerance, and of some not
+    Sampled,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -112,11 +129,7 @@ impl ConvertArgs {
             return Err(Error::usage("--tolerance: takes a number of 0 or more"));
         }
         if self.tolerance > 1.0 {
-            return Err(Error::usage("--tolerance: a share of the value range, at most 1; 2 % is 0.02"));
-        }
-        let range = self.range.map(|r| (r.0[0], r.0[1]));
-        if range.is_some_and(|(lo, hi)| lo > hi) {
-            return Err(Error::usage("--range: the lower end comes first"));
+            return Err(Error::usage("--tolerance: a share, at most 1; 2 % is 0.02"));
         }
         let (basis, window) = match self.basis {
             BasisName::Haar => (Basis::Haar, 32),
@@ -127,11 +140,8 @@ impl ConvertArgs {
             basis,
             window: self.window.unwrap_or(window),
             tolerance: self.tolerance,
-            bound: match self.bound {
-                BoundName::Pointwise => Bound::Pointwise,
-                BoundName::Rms => Bound::Rms,
-            },
-            range,
+            bound: self.bound()?,
+            range: self.range()?,
             missing: match (self.missing, self.missing_value) {
                 (Some(MissingName::Error), _) | (None, None) => MissingPolicy::Error,
                 (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
@@ -145,6 +155,38 @@ impl ConvertArgs {
         })
     }
 
+    fn bound(&self) -> Result<Bound> {
+        if self.floor.is_some() && !matches!(self.bound, BoundName::Relative) {
+            return Err(Error::usage("--floor: goes with --bound relative alone"));
+        }
+        if (self.samples.is_some() || self.seed.is_some()) && !matches!(self.bound, BoundName::Sampled) {
+            return Err(Error::usage("--samples and --seed: go with --bound sampled alone"));
+        }
+        let floor = self.floor.unwrap_or(0.0);
+        if !(floor.is_finite() && floor >= 0.0) {
+            return Err(Error::usage("--floor: takes a finite number of 0 or more, in the units of the samples"));
+        }
+        Ok(match self.bound {
+            BoundName::Pointwise => Bound::Pointwise,
+            BoundName::Rms => Bound::Rms,
+            BoundName::Relative => Bound::Relative { floor: floor.abs() }, // no -0
+            BoundName::Sampled => {
+                Bound::Sampled { samples: self.samples.unwrap_or(SAMPLES), seed: self.seed.unwrap_or(0) }
+            }
+        })
+    }
+
+    fn range(&self) -> Result<Option<(f64, f64)>> {
+        let Some((lo, hi)) = self.range.map(|r| (r.0[0], r.0[1])) else { return Ok(None) };
+        let refused = match self.bound {
+            BoundName::Relative => "--range: with --bound relative the tolerance refers to each sample, not to a range",
+            BoundName::Sampled => "--range: with --bound sampled the tolerance refers to pixels, not to a range",
+            BoundName::Pointwise | BoundName::Rms if lo > hi => "--range: the lower end comes first",
+            BoundName::Pointwise | BoundName::Rms => return Ok(Some((lo, hi))),
+        };
+        Err(Error::usage(refused))
+    }
+
     /// What `verify --against` must know to read the same samples again.
     fn settings(&self) -> Vec<(String, String)> {
         let frames = self.frames.map(|f| ("frames".to_string(), f.to_string()));
@@ -154,17 +196,26 @@ impl ConvertArgs {
     }
 }
 
+/// Pixels on each face, as in the paper.
+const SAMPLES: u32 = 300;
+
 fn summary(r: &ConvertReport, bound: Bound) -> String {
     let ratio = r.input_bytes as f64 / r.output_bytes as f64;
     let rate = r.input_bytes as f64 / r.seconds / 1e6;
     let errors = match bound {
         Bound::Pointwise => format!("largest error {:.4e} of {:.4e} allowed", r.reached, r.delta),
-        Bound::Rms => {
+        Bound::Relative { .. } => {
+            let tolerance = r.promise.tolerance;
+            let relative = r.share * tolerance;
+            format!("largest relative error {relative:.4e} of {tolerance:.4e} allowed, largest error {:.4e}", r.reached)
+        }
+        Bound::Rms | Bound::Sampled { .. } => {
             format!("rms error of every series within {:.4e}, largest single error {:.4e}", r.delta, r.reached)
         }
     };
+    let estimate = if r.promise.guaranteed { "" } else { "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE" };
     format!(
-        "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}",
+        "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
         r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample
     )
 }

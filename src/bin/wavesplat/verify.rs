@@ -2,11 +2,12 @@
 
 use clap::Args;
 use std::path::PathBuf;
+use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, InputArgs, narrow, print};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::source::FrameSource;
-use wavesplat::verify::{VerifyReport, verify};
+use wavesplat::verify::{BlockPlace, Comparison, VerifyReport, verify};
 
 /// Check a coefficient file, and its promise against the source
 #[derive(Debug, Args)]
@@ -14,7 +15,8 @@ use wavesplat::verify::{VerifyReport, verify};
 Examples:
   wavesplat verify run.wspl
   wavesplat verify run.wspl --against frames/
-Every byte is checked. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound.
+Every byte is checked. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound, or
+further off than its block says. Of a file with a sampled bound, an estimate, what is checked is the rms of each series.
 The frames and the region that were converted are remembered and chosen again.")]
 pub(crate) struct VerifyArgs {
     /// Coefficient file
@@ -40,17 +42,24 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     if args.common.json {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {
-        print(&summary(&report))?;
+        print(&summary(&report, file.metadata().bound))?;
     }
-    match report.against {
-        Some(c) if c.series_outside > 0 => {
-            let (outside, share) = (c.series_outside, c.largest_share_of_bound);
-            let place = c.worst.map_or(String::new(), |p| format!(" at {p}"));
-            let what = format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound");
-            Err(Error::BoundMissed { path: args.file.clone(), what })
-        }
-        _ => Ok(()),
+    match report.against.as_ref().and_then(missed) {
+        Some(what) => Err(Error::BoundMissed { path: args.file.clone(), what }),
+        None => Ok(()),
     }
+}
+
+/// What was promised and not kept.
+fn missed(c: &Comparison) -> Option<String> {
+    if c.series_outside > 0 {
+        let (outside, share) = (c.series_outside, c.largest_share_of_bound);
+        let place = c.worst.map_or(String::new(), |p| format!(" at {p}"));
+        return Some(format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound"));
+    }
+    let BlockPlace { window, block } = c.first_beyond?;
+    let blocks = c.blocks_beyond_reached;
+    Some(format!("blocks further off than the file says: {blocks}, the first of them block {block} of window {window}"))
 }
 
 impl VerifyArgs {
@@ -68,14 +77,22 @@ impl VerifyArgs {
     }
 }
 
-fn summary(r: &VerifyReport) -> String {
+const ESTIMATE: &str = "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images";
+
+fn summary(r: &VerifyReport, bound: Bound) -> String {
+    let estimate = if matches!(bound, Bound::Sampled { .. }) { ESTIMATE } else { "" };
     let mut text = format!("{} blocks, {} bytes: whole\n", r.blocks, r.bytes);
     if let Some(c) = &r.against {
-        let held = if c.series_outside == 0 { "kept" } else { "MISSED" };
+        let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
-            "bound {held}: largest error {:.4e} ({:.4} of the bound), rms error {:.4e}, {} missing samples as they were, \
-             {} samples compared\n",
-            c.largest_error, c.largest_share_of_bound, c.rms_error, c.missing, c.samples
+            "{} bound {held}: largest error {:.4e} ({:.4} of the bound used), rms error {:.4e}, {} missing samples as they were, \
+             {} samples compared{estimate}\n",
+            bound.name(),
+            c.largest_error,
+            c.largest_share_of_bound,
+            c.rms_error,
+            c.missing,
+            c.samples
         );
     }
     text
