@@ -93,9 +93,10 @@ impl<'a> Bench<'a> {
         let steps: Vec<Option<Convert>> =
             group.contenders.iter().enumerate().map(|(i, c)| self.conversion(group, i, c)).collect();
         let mut runs: Vec<Vec<Outcome<Converted>>> = steps.iter().map(|_| Vec::new()).collect();
-        for _ in 0..group.rounds(self.config.sweep.repeats) {
-            for (step, runs) in steps.iter().zip(&mut runs) {
-                if let Some(step) = step {
+        let repeats = group.rounds(self.config.sweep.repeats);
+        for round in 0..repeats {
+            for ((step, contender), runs) in steps.iter().zip(&group.contenders).zip(&mut runs) {
+                if let Some(step) = step.as_ref().filter(|_| round < contender.rounds(repeats)) {
                     runs.push(in_process(&self.config.program, &Step::Convert(step.clone()))?);
                 }
             }
@@ -123,7 +124,7 @@ impl<'a> Bench<'a> {
         for round in 0..repeats {
             for ((number, contender), runs) in group.contenders.iter().enumerate().zip(&mut runs) {
                 if round < contender.rounds(repeats) {
-                    let step = self.rendering(group, number, contender);
+                    let step = Render { certify: round == 0, ..self.rendering(group, number, contender) };
                     runs.push(in_process(&self.config.program, &Step::Render(step))?);
                 }
             }
@@ -138,7 +139,15 @@ impl<'a> Bench<'a> {
             Contender::Textbook(radius) => (self.frames(), Way::Textbook(*radius)),
         };
         let frames = contender.frames(self.config.sweep.dims[3]);
-        Render { input, way, frames, look: self.look, splat_error: group.splat_error, truth: self.truth() }
+        Render {
+            input,
+            way,
+            frames,
+            look: self.look,
+            splat_error: group.splat_error,
+            truth: self.truth(),
+            certify: false,
+        }
     }
 
     fn point(

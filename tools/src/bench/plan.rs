@@ -39,9 +39,11 @@ pub struct BoundRow {
 }
 
 /// All promises; a further one is a further line. The first is the one whose splat methods are compared.
-pub const BOUNDS: [BoundRow; 2] = [
+pub const BOUNDS: [BoundRow; 4] = [
     BoundRow { name: "pointwise", bound: Bound::Pointwise, worst: |_| Some(1.0) },
+    BoundRow { name: "relative", bound: Bound::Relative { floor: 0.01 }, worst: |_| Some(1.0) },
     BoundRow { name: "rms", bound: Bound::Rms, worst: |window| Some(window.sqrt()) },
+    BoundRow { name: "sampled", bound: Bound::Sampled { samples: 300, seed: 0 }, worst: |_| None },
 ];
 
 /// Where textbooks cut the footprint, in standard deviations.
@@ -177,7 +179,7 @@ impl Contender {
         if let Self::Coefficients(_, bound) = self { Some(bound.name) } else { None }
     }
 
-    /// How often its pictures are timed: but for the first bound, pictures are there for their errors.
+    /// How often it is timed: but for the first bound, sizes and errors are what matters.
     pub fn rounds(&self, repeats: usize) -> usize {
         match self {
             Self::Coefficients(_, bound) if bound.name != BOUNDS[0].name => 1,

@@ -83,7 +83,7 @@ pub(super) fn render(step: &Render) -> Result<Rendered> {
         splat: first.splat,
         stated_splat_error: first.stated_error,
         error: Truth::error(&differences),
-        certified_error: method.certified(step)?.map(|e| e / truth.range),
+        certified_error: if step.certify { method.certified(step)?.map(|e| e / truth.range) } else { None },
     })
 }
 

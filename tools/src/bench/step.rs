@@ -58,6 +58,8 @@ pub(super) struct Render {
     pub(super) splat_error: f64,
     /// The file of the truth for the first view.
     pub(super) truth: PathBuf,
+    /// Whether to render the first view once more for its certificate, not timed.
+    pub(super) certify: bool,
 }
 
 /// How pictures are made.
@@ -83,7 +85,7 @@ pub(super) struct Rendered {
     pub(super) stated_splat_error: Option<f64>,
     /// Of the first view.
     pub(super) error: ImageError,
-    /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
+    /// The largest error that the renderer certifies for any pixel of the first view, as a share of the value range.
     pub(super) certified_error: Option<f64>,
 }
 
