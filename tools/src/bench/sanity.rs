@@ -82,7 +82,12 @@ mod tests {
             series_outside: 0,
             peak_bytes: None,
         };
-        Point { tolerance, conversion: Some(conversion), ..Point::example(&format!("at {tolerance}")) }
+        Point {
+            tolerance,
+            bound: Some("pointwise".into()),
+            conversion: Some(conversion),
+            ..Point::example(&format!("at {tolerance}"))
+        }
     }
 
     fn wrong(points: &[Point]) -> usize {
