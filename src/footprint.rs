@@ -108,11 +108,12 @@ impl Footprint {
     /// Each is the one before times a quotient that itself changes by a constant factor: two exponentials for a run.
     pub fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {
         out.clear();
-        for first in span.clone().step_by(RUN) {
+        let run = if self.decay > STEEP { 1 } else { RUN };
+        for first in span.clone().step_by(run) {
             let offset = first as f64 + 0.5 - centre;
             let mut weight = libm::exp(-self.decay * offset * offset);
             let mut quotient = libm::exp(-self.decay * (2.0 * offset + 1.0));
-            for _ in first..span.end.min(first + RUN) {
+            for _ in first..span.end.min(first + run) {
                 out.push(weight);
                 weight *= quotient;
                 quotient *= self.bend;
@@ -123,6 +124,9 @@ impl Footprint {
 
 /// Pixels over which quotients are multiplied up; rounding grows with its square, to 3e-13.
 const RUN: usize = 64;
+
+/// Beyond this decay a weight may underflow where its quotient overflows. A span is then two pixels: each is computed.
+const STEEP: f64 = 100.0;
 
 #[cfg(test)]
 mod tests {
@@ -144,6 +148,22 @@ mod tests {
             for (pixel, w) in span.zip(&weights) {
                 let d = pixel as f64 + 0.5 - centre;
                 assert!((w - (-f.decay * d * d).exp()).abs() < 1e-11, "scale {scale} offset {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_of_voxels_far_smaller_than_a_pixel_are_numbers() {
+        for scale in [1e-6, 1e-3, 0.01, 0.03, 0.1] {
+            let f = footprint(scale);
+            for centre in [10.0, 10.01, 10.49, 10.5, 10.99] {
+                let span = f.span(centre, 100);
+                let mut weights = Vec::new();
+                f.weights(centre, &span, &mut weights);
+                for (pixel, w) in span.zip(&weights) {
+                    let d = pixel as f64 + 0.5 - centre;
+                    assert!((w - (-f.decay * d * d).exp()).abs() < 1e-11, "scale {scale} offset {d}: {w}");
+                }
             }
         }
     }
