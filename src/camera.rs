@@ -65,6 +65,19 @@ impl Camera {
         ]
     }
 
+    /// The depth of the farthest corner of `grid`, in world units.
+    pub fn depth(&self, grid: &Grid) -> f64 {
+        corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
+    }
+
+    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of depth.
+    pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
+        let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
+        let far = corners(grid).map(size).fold(size(self.center), f64::max);
+        let depth = 64.0 * f64::EPSILON * far; // some twenty operations on numbers of at most twice this size
+        (self.scale * depth + 4.0 * f64::EPSILON * self.size[0].max(self.size[1]) as f64, depth)
+    }
+
     /// The largest scale at which every cell of the grid is within the picture, less a margin.
     fn fitting_scale(&self, grid: &Grid) -> f64 {
         let half = |axis: [f64; 3]| {

@@ -21,7 +21,7 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    const NOTHING: Self =
+    pub(crate) const NOTHING: Self =
         Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
 
     /// What two consecutive stretches hold together.
@@ -46,26 +46,34 @@ pub(crate) fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
 /// Bytes of the rows that are looked at together. Fixed, since the digest depends on it.
 const RUN_BYTES: usize = 256 << 10;
 
-/// Looks at every sample of a window; runs of rows in parallel, joined in order. `declared` stands for a missing sample.
+/// Looks at every sample of a window. `declared` stands for a missing sample.
 pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declared: Option<f64>) -> Result<Scan> {
+    (0..window.frames()).try_fold(Scan::NOTHING, |seen, frame| scan_frame(seen, window, frame, grid, ty, declared))
+}
+
+/// Looks at every sample of a frame, after what was `seen`; runs of rows in parallel, joined in order.
+pub(crate) fn scan_frame(
+    seen: Scan,
+    window: &dyn FrameWindow,
+    frame: usize,
+    grid: &Grid,
+    ty: SampleType,
+    declared: Option<f64>,
+) -> Result<Scan> {
     let [nx, ny, nz] = grid.dims;
     let rows = (RUN_BYTES / (nx * ty.size())).clamp(1, ny);
     let runs_in_plane = ny.div_ceil(rows);
-    let mut seen = Scan::NOTHING;
-    for frame in 0..window.frames() {
-        let runs: Result<Vec<Scan>> = (0..nz * runs_in_plane)
-            .into_par_iter()
-            .map_init(Vec::new, |bytes, index| {
-                let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
-                let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
-                bytes.resize(run.voxels() * ty.size(), 0);
-                window.read_box(frame, &run, bytes)?;
-                Ok(scan_run(bytes, ty, declared, (frame, (z * ny + y) * nx)))
-            })
-            .collect();
-        seen = runs?.into_iter().fold(seen, Scan::then);
-    }
-    Ok(seen)
+    let runs: Result<Vec<Scan>> = (0..nz * runs_in_plane)
+        .into_par_iter()
+        .map_init(Vec::new, |bytes, index| {
+            let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
+            let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
+            bytes.resize(run.voxels() * ty.size(), 0);
+            window.read_box(frame, &run, bytes)?;
+            Ok(scan_run(bytes, ty, declared, (frame, (z * ny + y) * nx)))
+        })
+        .collect();
+    Ok(runs?.into_iter().fold(seen, Scan::then))
 }
 
 fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {

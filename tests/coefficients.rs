@@ -17,25 +17,25 @@ use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 19;
 
-struct Trial {
-    name: &'static str,
-    memory: Memory,
-    config: ConvertConfig,
-    file: Stored,
+pub(crate) struct Trial {
+    pub(crate) name: &'static str,
+    pub(crate) memory: Memory,
+    pub(crate) config: ConvertConfig,
+    pub(crate) file: Stored,
 }
 
 impl Trial {
-    fn new(name: &'static str, memory: Memory, config: ConvertConfig) -> Self {
+    pub(crate) fn new(name: &'static str, memory: Memory, config: ConvertConfig) -> Self {
         let config = ConvertConfig { block: Some(4), ..config };
         let file = stored(&mut memory.clone(), &config);
         Self { name, memory, config, file }
     }
 
-    fn grid(&self) -> Grid {
+    pub(crate) fn grid(&self) -> Grid {
         self.memory.archive().grid
     }
 
-    fn ty(&self) -> SampleType {
+    pub(crate) fn ty(&self) -> SampleType {
         self.memory.archive().sample
     }
 
@@ -79,7 +79,7 @@ fn near_the_missing_value(grid: Grid) -> Memory {
 }
 
 /// Doubles, so that decoded samples are what is splatted.
-fn doubles() -> Vec<Trial> {
+pub(crate) fn doubles() -> Vec<Trial> {
     let grid = SKEWED;
     let plain = || archive(grid, SampleType::F64, &field(&grid, FRAMES, 2));
     let rms = |basis, window| ConvertConfig { bound: Bound::Rms, ..settings(basis, window, 0.02) };
@@ -109,7 +109,7 @@ fn doubles() -> Vec<Trial> {
 /// Leaves a bound of a few units in the last place of 1e9.
 const HARD: f64 = 2.5e-16;
 
-fn views() -> [(View, f64); 3] {
+pub(crate) fn views() -> [(View, f64); 3] {
     [(view(30.0, 30.0, [36, 28]), 0.0), (view(0.0, 90.0, [30, 30]), 0.0), (view(-70.0, -15.0, [28, 36]), 0.4)]
 }
 

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
 
 mod bounds;
+mod certificates;
 mod cli;
 mod coefficients;
 mod common;

@@ -4,6 +4,7 @@
 use clap::{Parser, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use wavesplat::bound::voxel_bound;
 use wavesplat::camera::View;
 use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole};
 use wavesplat::error::{Error, Result};
@@ -13,7 +14,8 @@ use wavesplat::output::STANDARD;
 use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, What, render};
+use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, RenderReport, Scene, What, render};
+use wavesplat_format::Metadata;
 
 /// Render pictures of time-varying volumes.
 #[derive(Debug, Parser)]
@@ -27,6 +29,7 @@ Examples:
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
   wavesplat-render run.wspl -o values.npy --size 800x600
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
+  wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render frames/ --method direct -o frame_%04d.png
 An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours.
 The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks
@@ -73,6 +76,13 @@ struct Cli {
     /// [default: a tenth of the file's tolerance; 1e-4 for frames]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
+    /// Read and splat less, so that samples may be this share of the range off: more than the file's own tolerance
+    #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = "Error")]
+    tolerance: Option<f64>,
+    /// Write pictures of the certified error as well: no pixel is further than this from the picture of the source's
+    /// samples, splatted without a cut (a file or pattern as for -o; .npy in units of --quantity)
+    #[arg(long, value_name = "OUT", help_heading = "Error")]
+    error_image: Option<PathBuf>,
     /// What a pixel means
     #[arg(long, value_enum, default_value = "mean")]
     quantity: QuantityName,
@@ -127,41 +137,48 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
-        let (mut scene, tolerance) = self.scene()?;
-        let config = self.config(scene.as_ref(), tolerance)?;
-        let colours = self.colours(scene.as_mut(), &config, format)?;
-        let mut sink = Sink::open(
-            &self.output,
-            SinkConfig {
-                format,
-                size: config.view.size,
-                frames: config.frames.clone(),
-                fps: self.fps,
-                colours,
-                coloured_array: self.colormap.is_some(),
-                force: self.force,
-            },
-        )?;
+        let (mut scene, file) = self.scene()?;
+        let config = self.config(scene.as_ref(), file.as_ref())?;
+        let (mut sink, mut errors) = self.sinks(scene.as_mut(), &config)?;
         let progress = self.common.progress("frames");
-        let report = render(scene.as_mut(), &config, &progress, &mut |frame, picture| sink.picture(frame, picture))?;
+        let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
+            if let (Some(sink), Some(error)) = (&mut errors, rendered.error) {
+                sink.picture(rendered.frame, error)?;
+            }
+            sink.picture(rendered.frame, rendered.picture)
+        })?;
+        errors.map_or(Ok(()), Sink::finish)?;
         sink.finish()?;
-        self.common.detail(format_args!(
-            "{} frames by {} in {:.3} s: weights {:.3}, decode {:.3}, splat {:.3}, inverse {:.3}; {} coefficients",
-            report.frames,
-            report.method,
-            report.seconds,
-            report.weight_seconds,
-            report.decode_seconds,
-            report.splat_seconds,
-            report.inverse_seconds,
-            report.coefficients
-        ));
+        self.common.detail(summary(&report));
         self.common.report(&report, self.output == Path::new(STANDARD))
     }
 
-    /// What is rendered, and the tolerance that it was converted with.
-    fn scene(&self) -> Result<(Box<dyn Scene>, Option<f64>)> {
+    /// Where pictures go, and where those of their errors go.
+    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Sink, Option<Sink>)> {
+        let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
+        let coloured = |format| format != PictureFormat::Npy || self.colormap.is_some();
+        let of_errors = self.error_image.as_deref().map(|path| Ok((path, format_of(path)?))).transpose()?;
+        if self.error_image.as_deref().is_some_and(|path| path == self.output || path == Path::new(STANDARD)) {
+            return Err(Error::usage("--error-image: takes a file of its own"));
+        }
+        let needed = coloured(format) && self.range.is_none() || of_errors.is_some_and(|(_, format)| coloured(format));
+        let seen = if needed { Ranges::of(scene, config)? } else { Ranges::default() };
+        let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
+        if needed {
+            self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
+        }
+        let sink = |path: &Path, format, range| {
+            let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
+            let (size, frames, fps, force) = (config.view.size, config.frames.clone(), self.fps, self.force);
+            let coloured_array = self.colormap.is_some();
+            Sink::open(path, SinkConfig { format, size, frames, fps, colours, coloured_array, force })
+        };
+        let errors = of_errors.map(|(path, format)| sink(path, format, seen.errors)).transpose()?;
+        Ok((sink(&self.output, format, range)?, errors))
+    }
+
+    /// What is rendered, and what it was converted with.
+    fn scene(&self) -> Result<(Box<dyn Scene>, Option<Metadata>)> {
         let coefficients = self.method == MethodName::Coefficients;
         if let [only] = self.inputs.as_slice()
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
@@ -171,9 +188,9 @@ impl Cli {
             }
             self.input.refuse_for_coefficients()?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
-            let tolerance = file.metadata().tolerance;
+            let metadata = file.metadata().clone();
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            return Ok((Box::new(CoefficientScene::new(file, what)), Some(tolerance)));
+            return Ok((Box::new(CoefficientScene::new(file, what)), Some(metadata)));
         }
         if coefficients {
             return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
@@ -185,10 +202,11 @@ impl Cli {
         Ok((Box::new(FrameScene::new(source, self.missing_value)), None))
     }
 
-    fn config(&self, scene: &dyn Scene, tolerance: Option<f64>) -> Result<RenderConfig> {
+    fn config(&self, scene: &dyn Scene, file: Option<&Metadata>) -> Result<RenderConfig> {
         let grid = scene.grid();
-        let default_error = tolerance.map_or(1e-4, |t| t / 10.0);
-        let splat_error = self.splat_error.unwrap_or(default_error);
+        let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
+        let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
+        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(1e-4, |t| t / 10.0));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
             return Err(Error::usage("--splat-error: takes a number of 0 or more"));
         }
@@ -210,24 +228,29 @@ impl Cli {
             frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
             region: self.region.map(|r| r.resolve(grid)).transpose()?,
             splat_error,
+            allowed,
+            certify: self.error_image.is_some(),
             memory: self.common.memory.0,
         })
     }
 
-    /// Colours over the given range, or over that of small pictures of frames spread over the archive: the same for
-    /// every frame, whichever are asked for.
-    fn colours(&self, scene: &mut dyn Scene, config: &RenderConfig, format: PictureFormat) -> Result<ColourMap> {
-        let values_only = format == PictureFormat::Npy && self.colormap.is_none();
-        let range = match self.range {
-            Some(range) => (range.0[0], range.0[1]),
-            None if values_only => (0.0, 1.0),
-            None => {
-                let (lo, hi) = picture_range(scene, config)?;
-                self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
-                (lo, hi)
-            }
+    /// The error that samples may have under a looser tolerance, in their unit.
+    fn allowed(&self, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
+        let Some(file) = file.filter(|_| self.method == MethodName::Coefficients) else {
+            return Err(Error::usage("--tolerance: leaves out coefficients, so it needs --method coefficients"));
         };
-        ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)
+        if !(0.0..=1.0).contains(&tolerance) {
+            return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
+        }
+        let range = if file.range.0 <= file.range.1 { file.range } else { (0.0, 0.0) };
+        let allowed = voxel_bound(tolerance, range);
+        let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
+        if allowed < reached {
+            let least = (reached / (range.1 - range.0)).next_up();
+            let what = "the file itself is up to";
+            return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
+        }
+        Ok(allowed)
     }
 }
 
@@ -243,23 +266,54 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     error
 }
 
-/// The range of small pictures of a few frames; (0, 1) if they show nothing.
-fn picture_range(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(f64, f64)> {
-    const PIXELS: f64 = 64.0;
-    const FRAMES: usize = 16;
-    let mut small = config.clone();
-    let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
-    small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
-    small.view.scale = small.view.scale.map(|s| s * shrink);
-    let last = scene.frames().unwrap_or(1).saturating_sub(1);
-    small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
-    small.frames.dedup();
-    let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
-    render(scene, &small, &Silent, &mut |_, picture| {
-        (lo, hi) = picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-        Ok(())
-    })?;
-    Ok(if lo <= hi { (f64::from(lo), f64::from(hi)) } else { (0.0, 1.0) })
+/// The ranges of the pictures and of their errors.
+struct Ranges {
+    values: (f64, f64),
+    errors: (f64, f64),
+}
+
+impl Default for Ranges {
+    fn default() -> Self {
+        Self { values: (0.0, 1.0), errors: (0.0, 1.0) }
+    }
+}
+
+impl Ranges {
+    /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
+    /// they show nothing; errors begin at 0.
+    fn of(scene: &mut dyn Scene, config: &RenderConfig) -> Result<Self> {
+        const PIXELS: f64 = 64.0;
+        const FRAMES: usize = 16;
+        let mut small = config.clone();
+        let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
+        small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+        small.view.scale = small.view.scale.map(|s| s * shrink);
+        let last = scene.frames().unwrap_or(1).saturating_sub(1);
+        small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
+        small.frames.dedup();
+        let mut ranges = Self::default();
+        let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
+        let report = render(scene, &small, &Silent, &mut |rendered| {
+            (lo, hi) = rendered.picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+            Ok(())
+        })?;
+        if lo <= hi {
+            ranges.values = (lo.into(), hi.into());
+        }
+        ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
+        Ok(ranges)
+    }
+}
+
+fn summary(r: &RenderReport) -> String {
+    let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
+    let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
+    let error = r.certified_error.map_or(String::new(), |e| format!("; no pixel is off by more than {e:.4e}"));
+    format!(
+        "{} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
+         {} coefficients, {} left out{error}",
+        r.frames, r.method, r.seconds, r.coefficients, r.left_out.coefficients
+    )
 }
 
 fn parse_colour(text: &str) -> std::result::Result<colour::Rgb, String> {
@@ -279,7 +333,6 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
         return Ok(PictureFormat::Png);
     }
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    parse_format(ending).map_err(|names| {
-        Error::usage(format!("-o {}: the ending says no format; give --format, {names}", path.display()))
-    })
+    parse_format(ending)
+        .map_err(|names| Error::usage(format!("{}: the ending says no format: {names}", path.display())))
 }

@@ -1,6 +1,9 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
-use super::scene::{Group, Layout, Scene, Terms};
+use super::RenderConfig;
+use super::certificate::magnitude;
+use super::reading::{Reader, Reading};
+use super::scene::{Contents, FrameErrors, Group, Layout, SampleErrors, Scene, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::error::Result;
@@ -50,23 +53,34 @@ impl Scene for CoefficientScene {
         self.file.window_range(self.file.window_of(frame)).end
     }
 
-    fn most_planes(&self, frames: usize) -> usize {
-        let coefficients = self.file.metadata().windows.iter().map(|w| w.coefficients as usize).max();
-        coefficients.unwrap_or(0) + 2 * frames + 1
+    fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize {
+        let windows = &self.file.metadata().windows;
+        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, w.levels.len())).max();
+        most.unwrap_or(0) + 2 * frames + 1
     }
 
-    fn block_bytes(&self) -> usize {
+    fn block_bytes(&self, config: &RenderConfig) -> usize {
         let windows = &self.file.metadata().windows;
+        let errors = windows.iter().map(|w| error_planes(config, w.levels.len())).max().unwrap_or(0);
         // Codes, payload and samples, and a term of ten bytes for each; where samples are missing, a mask and overrides.
         let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
-        self.file.largest_block() * (4 + 5 + 8 + 10 + missing)
+        self.file.largest_block() * (4 + 5 + 8 + 10 + missing) + self.blocks().region(0).voxels() * errors * 10
     }
 
-    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>> {
+    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
         let window = self.file.window_of(frames[0]);
         let first = self.file.window_range(window).start;
         let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames)?))
+        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames, config)?))
+    }
+}
+
+/// What holds in every frame, and what each level part that is left out counts in a frame.
+fn error_planes(config: &RenderConfig, levels: usize) -> usize {
+    match (config.certify, config.allowed) {
+        (false, _) => 0,
+        (true, None) => 1,
+        (true, Some(_)) => 1 + levels,
     }
 }
 
@@ -82,12 +96,20 @@ struct CoefficientGroup<'a> {
     wanted: Vec<bool>,
     kept: Vec<usize>,
     layout: Layout,
+    reader: Reader,
+    errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
 }
 
 impl<'a> CoefficientGroup<'a> {
-    fn new(file: &'a CoefficientFile, what: What, window: u32, frames: Vec<usize>) -> Result<Self> {
+    fn new(
+        file: &'a CoefficientFile,
+        what: What,
+        window: u32,
+        frames: Vec<usize>,
+        config: &RenderConfig,
+    ) -> Result<Self> {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
@@ -100,8 +122,36 @@ impl<'a> CoefficientGroup<'a> {
             frames: frames.len(),
             values: samples || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
+            errors: error_planes(config, codec.parts.len()),
         };
-        Ok(Self { file, what, window, codec, frames, wanted, kept, layout, leaf: Mutex::default() })
+        // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
+        let reader = Reader::new(&codec, config.allowed.filter(|_| !samples));
+        let (errors, leaf) = (SampleErrors::default(), Mutex::default());
+        let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, reader, errors, leaf };
+        if config.certify {
+            group.errors = group.sample_errors(config.allowed)?;
+        }
+        Ok(group)
+    }
+
+    fn sample_errors(&self, allowed: Option<f64>) -> Result<SampleErrors> {
+        let record = &self.file.metadata().windows[self.window as usize];
+        let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
+        let mut terms = 0.0_f64;
+        for leaf in self.file.leaves(self.window) {
+            terms = self.file.leaf(leaf)?.iter().map(|entry| self.reader.terms(entry)).fold(terms, f64::max);
+        }
+        // What overrides a sample is the sample less what the coefficients give.
+        let terms = 2.0 * terms + magnitude(range);
+        let frame = FrameErrors { largest: record.reached.max(allowed.unwrap_or(0.0)), range, terms };
+        let of_part = |gains: &Vec<f64>| self.frames.iter().map(|f| gains[*f]).collect();
+        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.reader.gains.iter().map(of_part));
+        Ok(SampleErrors { factors: factors.take(self.layout.errors).collect(), frames: vec![frame; self.frames.len()] })
+    }
+
+    /// Whether a block adds nothing to any plane.
+    fn adds_nothing(&self, reading: &Reading) -> bool {
+        reading.entry.parts.is_empty() && (self.layout.errors == 0 || reading.errors.iter().all(|e| *e == 0.0))
     }
 
     /// The entries of the directory's leaf that lists a block.
@@ -121,16 +171,16 @@ impl<'a> CoefficientGroup<'a> {
         self.frames.iter().flat_map(|f| &samples[f * frame_bytes..(f + 1) * frame_bytes]).copied().collect()
     }
 
-    fn terms_of_samples(&self, block: &Block, samples: &[u8]) -> Terms {
+    fn terms_of_samples(&self, block: &Block, samples: &[u8], errors: &[f64]) -> Terms {
         let ty: SampleType = self.codec.sample;
         let is_missing =
             |i: usize, _: f64| block.is_missing(self.frames[i / block.voxels] * block.voxels + i % block.voxels);
-        let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), is_missing);
+        let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), errors, is_missing);
         terms.bytes_read = block.bytes_read;
         terms
     }
 
-    fn terms_of_codes(&self, block: &Block) -> Terms {
+    fn terms_of_codes(&self, block: &Block, errors: &[f64]) -> Terms {
         let mut terms = Terms::new(block.bytes_read);
         let overrides = Overrides::of(block, &self.codec, &self.frames);
         let mut next = overrides.values.iter().peekable();
@@ -141,11 +191,14 @@ impl<'a> CoefficientGroup<'a> {
             while let Some((_, frame, amount)) = next.next_if(|(v, _, _)| *v == voxel) {
                 terms.add(self.layout.value(*frame), *amount);
             }
+            // Judged by the window, not by the group, whose frames depend on the memory that there is.
+            let in_all = (0..self.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel));
             if self.layout.absent {
                 let missing = |f: usize| block.is_missing(self.frames[f] * block.voxels + voxel);
-                // Judged by the window, not by the group, whose frames depend on the memory that there is.
-                let in_all = (0..self.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel));
                 terms.add_absent(&self.layout, in_all, missing);
+            }
+            if !in_all {
+                terms.add_errors(&self.layout, errors);
             }
             terms.end_voxel();
         }
@@ -168,24 +221,34 @@ impl Group for CoefficientGroup<'_> {
         self.layout
     }
 
-    fn blocks(&self, region: &Region) -> Result<Vec<usize>> {
-        let mut found = Vec::new();
+    fn blocks(&self, region: &Region) -> Result<Contents> {
+        let mut found = Contents { empty: self.file.blocks.len() as u64, ..Contents::default() };
         for entries in self.file.entries(self.window, region) {
-            let holding = entries?.into_iter().filter(|entry| !entry.parts.is_empty());
-            found.extend(holding.map(|entry| entry.id.block as usize));
+            for entry in entries? {
+                let reading = self.reader.reading(&entry);
+                found.left_out += reading.left_out;
+                found.empty -= u64::from(!entry.parts.is_empty());
+                if !self.adds_nothing(&reading) {
+                    found.blocks.push(entry.id.block as usize);
+                }
+            }
         }
         Ok(found)
     }
 
     fn terms(&self, block: usize) -> Result<Terms> {
         let leaf = self.leaf_of(block as u32)?;
-        let entry = &leaf[block - leaf[0].id.block as usize];
-        let block = self.file.block(&self.codec, entry, &self.wanted)?;
+        let Reading { entry, errors, .. } = self.reader.reading(&leaf[block - leaf[0].id.block as usize]);
+        let block = self.file.block(&self.codec, &entry, &self.wanted)?;
         Ok(match (&block.exact, self.what) {
-            (Some(exact), _) => self.terms_of_samples(&block, exact),
-            (None, What::Samples) => self.terms_of_samples(&block, &block.samples(&self.codec)),
-            (None, What::Coefficients) => self.terms_of_codes(&block),
+            (Some(exact), _) => self.terms_of_samples(&block, exact, &errors),
+            (None, What::Samples) => self.terms_of_samples(&block, &block.samples(&self.codec), &errors),
+            (None, What::Coefficients) => self.terms_of_codes(&block, &errors),
         })
+    }
+
+    fn errors(&self) -> &SampleErrors {
+        &self.errors
     }
 
     fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {

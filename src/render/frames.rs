@@ -1,9 +1,11 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
-use super::scene::{Group, Layout, Scene, Terms};
+use super::RenderConfig;
+use super::certificate::magnitude;
+use super::scene::{Contents, FrameErrors, Group, Layout, SampleErrors, Scene, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing};
-use crate::scan::scan;
+use crate::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
@@ -46,25 +48,32 @@ impl Scene for FrameScene {
         frame + GROUP
     }
 
-    fn most_planes(&self, frames: usize) -> usize {
+    fn most_planes(&self, frames: usize, _config: &RenderConfig) -> usize {
         2 * frames + 1
     }
 
-    fn block_bytes(&self) -> usize {
+    fn block_bytes(&self, _config: &RenderConfig) -> usize {
         // Samples in their type and as f64, and a term of ten bytes for each.
         self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
     }
 
-    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>> {
+    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let absent = can_miss && scan(window.as_ref(), &archive.grid, archive.sample, declared)?.missing > 0;
-        let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent };
+        let look = |frame: &usize| {
+            scan_frame(Scan::NOTHING, window.as_ref(), frame - first, &archive.grid, archive.sample, declared)
+        };
+        let looked_at = if can_miss || config.certify { frames } else { &[] };
+        let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
+        let absent = seen.iter().any(|s| s.missing > 0);
+        let layout = Layout { coefficients: 0, frames: frames.len(), values: true, absent, errors: 0 };
+        let errors = seen.iter().map(|s| FrameErrors { largest: 0.0, range: s.range, terms: magnitude(s.range) });
+        let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
         let blocks = self.blocks();
-        Ok(Box::new(FrameGroup { archive, blocks, missing_value: declared, window, frames, layout }))
+        Ok(Box::new(FrameGroup { archive, blocks, missing_value: declared, window, frames, layout, errors }))
     }
 }
 
@@ -77,6 +86,7 @@ struct FrameGroup<'a> {
     /// Counted from the first frame of the window.
     frames: Vec<usize>,
     layout: Layout,
+    errors: SampleErrors,
 }
 
 impl Group for FrameGroup<'_> {
@@ -84,8 +94,10 @@ impl Group for FrameGroup<'_> {
         self.layout
     }
 
-    fn blocks(&self, region: &Region) -> Result<Vec<usize>> {
-        Ok(self.blocks.touching(region).collect())
+    fn blocks(&self, region: &Region) -> Result<Contents> {
+        let blocks: Vec<usize> = self.blocks.touching(region).collect();
+        let empty = (self.blocks.len() - blocks.len()) as u64;
+        Ok(Contents { blocks, empty, ..Contents::default() })
     }
 
     fn terms(&self, block: usize) -> Result<Terms> {
@@ -93,11 +105,15 @@ impl Group for FrameGroup<'_> {
         let frames = self.frames.iter().copied();
         let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
         let declared = self.missing_value;
-        Ok(Terms::of_samples(&self.layout, archive.sample, &samples, |_, v| is_missing(v, declared)))
+        Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
     }
 
     fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {
         frames.copy_from_slice(&planes[..frames.len()]);
+    }
+
+    fn errors(&self) -> &SampleErrors {
+        &self.errors
     }
 
     fn finish(&self) -> Result<()> {

@@ -5,14 +5,17 @@
 //!   for each band of rows
 //!     for each batch of blocks                 scene: read, decode, terms     (workers)
 //!       every tile splats the batch            splat: terms x footprint       (one owner per tile)
-//!     every tile inverts its pixels            scene: planes -> frames, then / weights
+//!     every tile inverts its pixels            finish: planes -> frames, then / weights; certificate
 //!   give the finished frames to the sink
 //! ```
 
+mod certificate;
 mod coefficients;
 pub mod colour;
+mod finish;
 mod frames;
 mod plan;
+mod reading;
 mod scene;
 pub mod sink;
 mod splat;
@@ -20,17 +23,18 @@ mod weights;
 
 pub use coefficients::{CoefficientScene, What};
 pub use frames::FrameScene;
-pub use scene::Scene;
+pub use scene::{LeftOut, Scene};
 
 use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
 use crate::footprint::{Footprint, Kernel, Method};
 use crate::progress::Progress;
 use crate::volume::{BlockGrid, Grid, Region};
-use crate::wavelet::{LANES, Lane};
+use certificate::Certificate;
+use finish::Finish;
 use plan::Budget;
 use rayon::prelude::*;
-use scene::{Group, Layout, Terms};
+use scene::{Contents, Group, Terms};
 use serde::Serialize;
 use splat::{Splats, Tile, overlap, rows_reached};
 use std::ops::Range;
@@ -62,6 +66,11 @@ pub struct RenderConfig {
     /// What splatting may add to the error: of an emission relative to the image of the largest |v|, of a mean
     /// relative to the value range. 0 asks for the exact method.
     pub splat_error: f64,
+    /// How far a sample may be from the source's, in its unit, so that less is read and splatted; none: as near as the
+    /// file is.
+    pub allowed: Option<f64>,
+    /// Whether each picture comes with a bound on the error of every pixel.
+    pub certify: bool,
     /// Bytes that may be allocated.
     pub memory: usize,
 }
@@ -85,6 +94,10 @@ pub struct RenderReport {
     pub blocks_empty: u64,
     /// Blocks left out because no pixel sees them.
     pub blocks_outside: u64,
+    /// What a looser tolerance left out of the blocks in the region, over all windows touched.
+    pub left_out: LeftOut,
+    /// The largest error that a pixel may have, if pictures are certified.
+    pub certified_error: Option<f64>,
     /// Stored bytes that were read of blocks.
     pub bytes_read: u64,
     /// Nonzero coefficients splatted, each time counted.
@@ -104,35 +117,48 @@ pub struct RenderReport {
 /// A finished picture: `width * height` numbers, row by row.
 pub type Picture<'a> = &'a [f32];
 
-/// Renders frames in order, giving each to `sink` with its number.
+/// A frame as it was rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Rendered<'a> {
+    /// Its number.
+    pub frame: usize,
+    /// The quantity asked for.
+    pub picture: Picture<'a>,
+    /// If pictures are certified, a bound on the error of every pixel, in the same unit: against the picture of the
+    /// source's samples splatted without a cut and without rounding. NaN is background.
+    pub error: Option<Picture<'a>>,
+}
+
+/// Renders frames in order, giving each to `sink`.
 pub fn render(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     progress: &dyn Progress,
-    sink: &mut dyn FnMut(usize, Picture<'_>) -> Result<()>,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
     let mut sink_time = Duration::ZERO;
     let (eye, method) = Eye::new(scene, config)?;
-    let budget = Budget::new(config.memory, config.view.size, scene)?;
+    let budget = Budget::new(config, scene)?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = method.stated_error * mean_factor(config.quantity);
-    let mut clock = Instant::now();
-    let weights = match config.quantity {
-        Quantity::Mean => Some(Weights::new(&eye, config.kernel, &budget)?),
-        Quantity::Emission => None,
+    report.stated_splat_error = match config.quantity {
+        Quantity::Emission => method.stated_error,
+        Quantity::Mean => method.stated_error / weights::BACKGROUND, // weights there are down to so much of the largest
     };
+    let mut clock = Instant::now();
+    let weights = Weights::new(&eye, config, &budget)?;
     lap(&mut clock, &mut report.weight_seconds);
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
         let end = scene.group_end(*first);
         let most = rest.partition_point(|f| *f < end);
-        let (now, later) = rest.split_at(budget.frames(scene, most));
-        let pictures = render_group(scene.group(now)?.as_ref(), &eye, weights.as_ref(), &budget, &mut report)?;
-        for (frame, picture) in now.iter().zip(pictures.chunks_exact(eye.pixels())) {
+        let (now, later) = rest.split_at(budget.frames(scene, config, most));
+        let group = scene.group(now, config)?;
+        let pictures = render_group(group.as_ref(), &eye, config, weights.as_ref(), &budget, &mut report)?;
+        for rendered in pictures.frames(now) {
             let writing = Instant::now();
-            sink(*frame, picture)?;
+            sink(rendered)?;
             sink_time += writing.elapsed();
             progress.advance(1);
         }
@@ -142,14 +168,6 @@ pub fn render(
     progress.finish();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
-}
-
-/// How much a splat error in the sums can grow in their quotient, where weights are down to 1 % of the largest.
-fn mean_factor(quantity: Quantity) -> f64 {
-    match quantity {
-        Quantity::Mean => 1.0 / weights::BACKGROUND,
-        Quantity::Emission => 1.0,
-    }
 }
 
 /// Adds the seconds since `clock` to a stage, and restarts it.
@@ -177,7 +195,11 @@ impl Eye {
             let d = grid.dims;
             return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
         }
-        let method = Method::within(config.splat_error / mean_factor(config.quantity));
+        let method = match config.quantity {
+            Quantity::Emission => Method::within(config.splat_error),
+            // A pixel that is not background must keep some of its weights.
+            Quantity::Mean => Method::within((config.splat_error * weights::BACKGROUND).min(weights::BACKGROUND / 2.0)),
+        };
         let camera = Camera::new(&config.view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
         Ok((Self { camera, footprint, grid, blocks, clip }, method))
@@ -234,66 +256,65 @@ impl Eye {
     }
 }
 
-/// All pictures of a group, one after another.
+/// The pictures of a group.
+struct Pictures {
+    pixels: usize,
+    /// Those of the frames, and if they are certified, those of their errors.
+    all: Vec<f32>,
+}
+
+impl Pictures {
+    fn frames<'a>(&'a self, numbers: &'a [usize]) -> impl Iterator<Item = Rendered<'a>> {
+        let (values, errors) = self.all.split_at(numbers.len() * self.pixels);
+        let of = |all: &'a [f32], i: usize| all.get(i * self.pixels..(i + 1) * self.pixels);
+        numbers.iter().enumerate().map(move |(i, frame)| Rendered {
+            frame: *frame,
+            picture: of(values, i).unwrap_or_default(),
+            error: of(errors, i),
+        })
+    }
+}
+
+/// Renders all frames of a group.
 fn render_group(
     group: &dyn Group,
     eye: &Eye,
+    config: &RenderConfig,
     weights: Option<&Weights>,
     budget: &Budget,
     report: &mut RenderReport,
-) -> Result<Vec<f32>> {
+) -> Result<Pictures> {
     let layout = group.layout();
-    let mut blocks = group.blocks(&eye.clip)?;
-    let held = blocks.len();
-    blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
-    report.blocks += eye.blocks.len() as u64;
-    report.blocks_empty += (eye.blocks.len() - held) as u64;
-    report.blocks_outside += (held - blocks.len()) as u64;
-    let mut pictures = vec![f32::NAN; layout.frames * eye.pixels()];
+    let certificate = config.certify.then(|| Certificate::new(eye, config.quantity));
+    let finish = Finish { group, layout, quantity: config.quantity, weights, certificate };
+    let blocks = blocks_to_read(group, eye, report)?;
+    let mut pictures = vec![f32::NAN; finish.planes() * eye.pixels()];
     for rows in budget.bands(&layout) {
         let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
         report.blocks_read += seen.len() as u64;
         let mut tiles = eye.tiles(rows.clone(), layout.planes());
         eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
         let mut clock = Instant::now();
-        tiles.par_iter_mut().for_each(|tile| finish(tile, group, &layout, weights));
-        tiles.iter().for_each(|tile| eye.paste(tile, layout.frames, &mut pictures, |pixel| pixel as f32));
+        tiles.par_iter_mut().for_each(|tile| finish.tile(tile));
+        tiles.iter().for_each(|tile| eye.paste(tile, finish.planes(), &mut pictures, |pixel| pixel as f32));
         lap(&mut clock, &mut report.inverse_seconds);
     }
     group.finish()?;
-    Ok(pictures)
+    if certificate.is_some() {
+        let errors = pictures[layout.frames * eye.pixels()..].iter().map(|e| f64::from(*e));
+        report.certified_error = Some(errors.fold(report.certified_error.unwrap_or(0.0), f64::max));
+    }
+    Ok(Pictures { pixels: eye.pixels(), all: pictures })
 }
 
-/// Turns the planes of a tile into its pixels: the first `layout.frames` planes become the frames.
-fn finish(tile: &mut Tile, group: &dyn Group, layout: &Layout, weights: Option<&Weights>) {
-    let pixels = tile.pixels();
-    let mut planes = vec![Lane::default(); layout.planes()];
-    let mut frames = vec![Lane::default(); layout.frames];
-    let mut out = vec![0.0; layout.frames * pixels];
-    for first in (0..pixels).step_by(LANES) {
-        let count = LANES.min(pixels - first);
-        for (p, lane) in planes.iter_mut().enumerate() {
-            lane[..count].copy_from_slice(&tile.planes[p * pixels + first..][..count]);
-        }
-        let absent: Vec<Lane> = (0..layout.frames).map(|f| absent_weight(layout, &planes, f)).collect();
-        group.reconstruct(&mut planes, &mut frames);
-        for (f, emission) in frames.iter().enumerate() {
-            for l in 0..count {
-                out[f * pixels + first + l] = match weights {
-                    Some(weights) => weights.at(tile, first + l).mean(emission[l], absent[f][l]),
-                    None => emission[l],
-                };
-            }
-        }
-    }
-    tile.planes = out;
-}
-
-/// The weights that are missing in a frame.
-fn absent_weight(layout: &Layout, planes: &[Lane], frame: usize) -> Lane {
-    if !layout.absent {
-        return Lane::default();
-    }
-    let (one, all) = (planes[layout.absent(frame)], planes[layout.absent_in_all()]);
-    std::array::from_fn(|l| one[l] + all[l])
+/// The blocks of a group that a pixel sees, and a word in the report on the others.
+fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Vec<usize>> {
+    let Contents { mut blocks, empty, left_out } = group.blocks(&eye.clip)?;
+    let held = blocks.len();
+    blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
+    report.blocks += eye.blocks.len() as u64;
+    report.blocks_empty += empty;
+    report.blocks_outside += (held - blocks.len()) as u64;
+    report.left_out += left_out;
+    Ok(blocks)
 }

@@ -2,6 +2,7 @@
 //!
 //! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
 
+use super::RenderConfig;
 use super::scene::{Layout, Scene};
 use super::splat::TILE;
 use crate::error::{Error, Result};
@@ -14,18 +15,23 @@ pub(super) struct Budget {
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
+    /// Finished numbers of a pixel and frame: its value, and its error.
+    numbers: usize,
     block_bytes: usize,
 }
 
-/// The weights' sum, and that of uncut footprints, for every pixel.
-const WEIGHT_BYTES: usize = 16;
+/// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
+const WEIGHT_BYTES: usize = 24;
 
 impl Budget {
-    /// For pictures of `size` pixels of a scene.
-    pub(super) fn new(memory: usize, size: [usize; 2], scene: &dyn Scene) -> Result<Self> {
+    /// For pictures of a scene.
+    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene) -> Result<Self> {
+        let size = config.view.size;
         let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
-        let budget = Self { available: memory.saturating_sub(fixed), size, block_bytes: scene.block_bytes() };
-        let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1)) + budget.block_bytes;
+        let numbers = 1 + usize::from(config.certify);
+        let available = config.memory.saturating_sub(fixed);
+        let budget = Self { available, size, numbers, block_bytes: scene.block_bytes(config) };
+        let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1, config)) + budget.block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
             let what =
@@ -37,7 +43,7 @@ impl Budget {
 
     /// Finished pictures of a group, as f32.
     fn picture_bytes(&self, frames: usize) -> usize {
-        frames * self.size[0] * self.size[1] * size_of::<f32>()
+        frames * self.numbers * self.size[0] * self.size[1] * size_of::<f32>()
     }
 
     /// One row of tiles with all planes.
@@ -46,9 +52,9 @@ impl Budget {
     }
 
     /// How many of `most` frames to render together.
-    pub(super) fn frames(&self, scene: &dyn Scene, most: usize) -> usize {
+    pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let fits = |f: &usize| {
-            let rows = self.row_bytes(scene.most_planes(*f)) * self.size[1].div_ceil(TILE).min(FEW_ROWS);
+            let rows = self.row_bytes(scene.most_planes(*f, config)) * self.size[1].div_ceil(TILE).min(FEW_ROWS);
             self.picture_bytes(*f) + rows + self.block_bytes <= self.available
         };
         (1..=most).rev().find(fits).unwrap_or(1)

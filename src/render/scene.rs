@@ -3,10 +3,12 @@
 //! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes, and a
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
+use super::RenderConfig;
 use crate::error::Result;
 use crate::sample::{self, SampleType};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
+use serde::Serialize;
 
 /// Something to render.
 pub trait Scene {
@@ -23,13 +25,13 @@ pub trait Scene {
     fn group_end(&self, frame: usize) -> usize;
 
     /// An upper bound of the planes that `frames` frames of a group need.
-    fn most_planes(&self, frames: usize) -> usize;
+    fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
 
     /// An upper bound of the bytes that one block takes while its terms are made.
-    fn block_bytes(&self) -> usize;
+    fn block_bytes(&self, config: &RenderConfig) -> usize;
 
     /// Opens some frames of one group, ascending.
-    fn group(&mut self, frames: &[usize]) -> Result<Box<dyn Group + '_>>;
+    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>>;
 }
 
 /// Some frames that are rendered together.
@@ -37,8 +39,8 @@ pub trait Group: Sync {
     /// How the planes are used.
     fn layout(&self) -> Layout;
 
-    /// The blocks that touch `region` and hold anything.
-    fn blocks(&self, region: &Region) -> Result<Vec<usize>>;
+    /// The blocks that touch `region` and have terms.
+    fn blocks(&self, region: &Region) -> Result<Contents>;
 
     /// The terms of a block.
     fn terms(&self, block: usize) -> Result<Terms>;
@@ -46,12 +48,68 @@ pub trait Group: Sync {
     /// The frames at some pixels from their planes: the inverse transform (eq 8). Overwrites `planes`.
     fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]);
 
+    /// How far the samples may be from the source's, besides what the terms in error planes say.
+    fn errors(&self) -> &SampleErrors;
+
     /// An error if what was read changed meanwhile.
     fn finish(&self) -> Result<()>;
 }
 
+/// The blocks of a group.
+#[derive(Debug, Default)]
+pub struct Contents {
+    /// Those that have terms, ascending.
+    pub blocks: Vec<usize>,
+    /// How many others hold nothing in the region.
+    pub empty: u64,
+    /// What a looser tolerance leaves out of all.
+    pub left_out: LeftOut,
+}
+
+/// What a looser tolerance leaves out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// Blocks of which nothing is read.
+    pub blocks: u64,
+    /// Parts that are not read, those of such blocks included.
+    pub parts: u64,
+    /// Nonzero coefficients in them.
+    pub coefficients: u64,
+    /// Stored bytes of them.
+    pub bytes: u64,
+}
+
+impl std::ops::AddAssign for LeftOut {
+    fn add_assign(&mut self, other: Self) {
+        self.blocks += other.blocks;
+        self.parts += other.parts;
+        self.coefficients += other.coefficients;
+        self.bytes += other.bytes;
+    }
+}
+
+/// What is known of the errors of a group's samples.
+#[derive(Debug, Clone, Default)]
+pub struct SampleErrors {
+    /// `factors[plane][frame]`: how much the sums of an error plane count in a frame.
+    pub factors: Vec<Vec<f64>>,
+    /// What holds for all samples of a frame.
+    pub frames: Vec<FrameErrors>,
+}
+
+/// What holds for all samples of a frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FrameErrors {
+    /// No sample's error is above this.
+    pub largest: f64,
+    /// A range that holds the source's samples; (inf, -inf) if all are missing.
+    pub range: (f64, f64),
+    /// An upper bound of the sum of the absolute terms that make up one sample.
+    pub terms: f64,
+}
+
 /// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
-/// missing in single frames, and last of what is missing in all of them.
+/// missing in single frames and of what is missing in all of them, and last errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Planes of coefficients.
@@ -62,6 +120,8 @@ pub struct Layout {
     pub values: bool,
     /// Whether anything is missing.
     pub absent: bool,
+    /// Planes of errors; none unless pictures are certified.
+    pub errors: usize,
 }
 
 impl Layout {
@@ -85,9 +145,14 @@ impl Layout {
         self.value_planes() + self.frames
     }
 
+    /// The first plane of errors.
+    pub fn first_error(&self) -> usize {
+        self.value_planes() + if self.absent { self.frames + 1 } else { 0 }
+    }
+
     /// Number of planes.
     pub fn planes(&self) -> usize {
-        self.value_planes() + if self.absent { self.frames + 1 } else { 0 }
+        self.first_error() + self.errors
     }
 }
 
@@ -125,6 +190,12 @@ impl Terms {
         self.amounts.push(amount);
     }
 
+    /// Adds errors of the current voxel, one for each error plane.
+    pub(super) fn add_errors(&mut self, layout: &Layout, errors: &[f64]) {
+        let planes = layout.first_error()..layout.planes();
+        planes.zip(errors).filter(|(_, e)| **e > 0.0).for_each(|(plane, e)| self.add(plane, *e));
+    }
+
     /// Goes on to the next voxel.
     pub fn end_voxel(&mut self) {
         self.ends.push(self.planes.len() as u32);
@@ -146,11 +217,13 @@ impl Terms {
         }
     }
 
-    /// The terms of samples that are splatted frame by frame: `samples` holds `layout.frames` frames of `voxels`.
+    /// The terms of samples that are splatted frame by frame, each off by `errors`: `samples` holds `layout.frames`
+    /// frames of as many voxels.
     pub fn of_samples(
         layout: &Layout,
         ty: SampleType,
         samples: &[u8],
+        errors: &[f64],
         is_missing: impl Fn(usize, f64) -> bool,
     ) -> Self {
         let mut values = vec![0.0; samples.len() / ty.size()];
@@ -165,6 +238,7 @@ impl Terms {
             if layout.absent {
                 terms.add_absent(layout, false, missing);
             }
+            terms.add_errors(layout, errors);
             terms.end_voxel();
         }
         terms
@@ -177,17 +251,18 @@ mod tests {
 
     #[test]
     fn planes_follow_one_another() {
-        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true };
-        assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all(), layout.planes()), (5, 8, 11, 12));
-        let plain = Layout { values: false, absent: false, ..layout };
+        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true, errors: 2 };
+        assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all()), (5, 8, 11));
+        assert_eq!((layout.first_error(), layout.planes()), (12, 14));
+        let plain = Layout { values: false, absent: false, errors: 0, ..layout };
         assert_eq!(plain.planes(), 5);
     }
 
     #[test]
     fn missing_samples_take_weights_instead_of_values() {
-        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true };
+        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true, errors: 0 };
         let samples: Vec<u8> = [f32::NAN, 1.0, 3.0, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let terms = Terms::of_samples(&layout, SampleType::F32, &samples, |_, v| v.is_nan());
+        let terms = Terms::of_samples(&layout, SampleType::F32, &samples, &[], |_, v| v.is_nan());
         assert_eq!(terms.of_voxel(0), (&[1u16, 2][..], &[3.0, 1.0][..]));
         assert_eq!(terms.of_voxel(1), (&[0u16, 1][..], &[1.0, 2.0][..]));
     }

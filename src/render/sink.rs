@@ -120,7 +120,7 @@ impl Numbered {
         let name = path.to_string_lossy().into_owned();
         let Some((before, rest)) = name.split_once('%') else {
             if frames != 1 {
-                let what = format!("-o {name}: {frames} frames need a numbered name, as frame_%04d.png");
+                let what = format!("{name}: {frames} frames need a numbered name, as frame_%04d.png");
                 return Err(Error::usage(what));
             }
             return Ok(Self { before: name, after: String::new(), digits: None });
@@ -131,7 +131,7 @@ impl Numbered {
             number.map(|n: usize| (n, after))
         });
         let Some((digits, after)) = parsed else {
-            return Err(Error::usage(format!("-o {name}: the number's place is %d or, with zeros, %04d")));
+            return Err(Error::usage(format!("{name}: the number's place is %d or, with zeros, %04d")));
         };
         Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
     }

@@ -1,11 +1,12 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
+use super::certificate::sum_rounding;
 use super::plan::Budget;
 use super::scene::{Layout, Terms};
 use super::splat::Tile;
-use super::{Eye, RenderReport};
+use super::{Eye, Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
-use crate::footprint::{Footprint, Kernel, Method};
+use crate::footprint::{Footprint, Method};
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
 pub(super) const BACKGROUND: f64 = 0.01;
@@ -18,14 +19,19 @@ pub(super) struct Weights {
     sums: Vec<f64>,
     /// With uncut footprints, so that the background is the same for every splat method. Empty: the same sums.
     uncut: Vec<f64>,
+    /// At least what lies beyond the cut. Empty: not asked for.
+    beyond: Vec<f64>,
     threshold: f64,
 }
 
 /// The weights of one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelWeight {
-    sum: f64,
+    /// C, as values are splatted.
+    pub(super) sum: f64,
     uncut: f64,
+    /// T, beyond the cut.
+    pub(super) beyond: f64,
     threshold: f64,
 }
 
@@ -37,30 +43,43 @@ impl PixelWeight {
 }
 
 impl Weights {
-    /// Splats a 1 for every voxel.
-    pub(super) fn new(eye: &Eye, kernel: Kernel, budget: &Budget) -> Result<Self> {
+    /// Splats a 1 for every voxel, if the quantity or its certificate needs that.
+    pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Option<Self>> {
+        let mean = config.quantity == Quantity::Mean;
+        if !mean && !config.certify {
+            return Ok(None);
+        }
+        let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
+        let sums_by = |footprint: Footprint| sums(&Eye { footprint, ..eye.clone() }, budget);
         let sums = sums(eye, budget)?;
-        let exact = Footprint::new(kernel, &eye.grid, eye.camera.scale, Method::EXACT)?;
-        let uncut = if eye.footprint.reach < exact.reach {
-            self::sums(&Eye { footprint: exact, ..eye.clone() }, budget)?
-        } else {
-            Vec::new()
-        };
+        let exact = by(Method::EXACT)?;
+        let uncut = if mean && eye.footprint.reach < exact.reach { sums_by(exact)? } else { Vec::new() };
+        let beyond = if config.certify { beyond(eye, &sums, &sums_by(by(Method::WHOLE)?)?) } else { Vec::new() };
         let largest = if uncut.is_empty() { &sums } else { &uncut }.iter().copied().fold(0.0, f64::max);
-        Ok(Self { width: eye.camera.size[0], sums, uncut, threshold: BACKGROUND * largest })
+        Ok(Some(Self { width: eye.camera.size[0], sums, uncut, beyond, threshold: BACKGROUND * largest }))
     }
 
     /// The weights of a tile's pixel, counted row by row.
     pub(super) fn at(&self, tile: &Tile, pixel: usize) -> PixelWeight {
         let (x, y) = (tile.x.start + pixel % tile.x.len(), tile.y.start + pixel / tile.x.len());
-        let sum = self.sums[y * self.width + x];
-        let uncut = self.uncut.get(y * self.width + x).copied().unwrap_or(sum);
-        PixelWeight { sum, uncut, threshold: self.threshold }
+        let at = y * self.width + x;
+        let sum = self.sums[at];
+        let uncut = self.uncut.get(at).copied().unwrap_or(sum);
+        PixelWeight { sum, uncut, beyond: self.beyond.get(at).copied().unwrap_or(0.0), threshold: self.threshold }
     }
 }
 
+/// At least the weights that the cut leaves out: those up to the reach of the whole method, and for each voxel further
+/// away the share of its peak that it has at most.
+fn beyond(eye: &Eye, sums: &[f64], whole: &[f64]) -> Vec<f64> {
+    let further = eye.clip.voxels() as f64 * eye.footprint.at_depth(0.0) * Method::WHOLE.stated_error;
+    let rounding = sum_rounding(eye);
+    let left = |(sum, whole): (&f64, &f64)| (whole - sum).max(0.0) + 2.0 * rounding * whole + further;
+    sums.iter().zip(whole).map(left).collect()
+}
+
 fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
-    let layout = Layout { coefficients: 1, frames: 1, values: false, absent: false };
+    let layout = Layout { coefficients: 1, frames: 1, values: false, absent: false, errors: 0 };
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();

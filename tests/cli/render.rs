@@ -128,6 +128,49 @@ fn options_of_the_view_change_the_picture() {
 }
 
 #[test]
+fn an_error_image_bounds_every_pixel() {
+    let work = Work::with_file("--tolerance 0.004");
+    small().write_frames(&work, "frames");
+    let options = format!("{SIZE} --frames 0,9,35 --force");
+    work.render(&format!("frames --method direct --splat-error 0 {options} -o truth.npy")).ok();
+    let truth = floats(&read_npy(&work.read("truth.npy")).1);
+    let mut largest = Vec::new();
+    for looser in ["", "--tolerance 0.02", "--tolerance 0.3"] {
+        let run = format!("a.wspl {looser} {options} -o v.npy --error-image e.npy --json -v");
+        let run = work.render(&run).ok();
+        assert!(run.err.contains("no pixel is off by more than"), "{}", run.err);
+        let certified = run.json()["certified_error"].as_f64().unwrap();
+        let (values, errors) = (floats(&read_npy(&work.read("v.npy")).1), floats(&read_npy(&work.read("e.npy")).1));
+        for ((value, error), truth) in values.iter().zip(&errors).zip(&truth) {
+            assert_eq!(value.is_nan(), error.is_nan());
+            assert!(value.is_nan() || (value - truth).abs() <= *error && f64::from(*error) <= certified, "{looser}");
+        }
+        largest.push(certified);
+    }
+    assert!(largest.is_sorted() && largest[0] <= 0.004001 * f64::from(small().range()), "{largest:?}");
+    assert!(largest[2] > 2.0 * largest[0] && largest[2] <= 0.3001 * f64::from(small().range()), "{largest:?}");
+    work.render(&format!("a.wspl {options} -o v_%d.png --error-image e_%d.png")).ok();
+    assert!(["v_0.png", "e_0.png", "e_35.png"].iter().all(|n| work.names().contains(&n.to_string())));
+    work.render(&format!("frames --method direct {options} -o v.npy --error-image e.npy")).ok();
+}
+
+#[test]
+fn errors_and_tolerances_that_make_no_sense_are_refused() {
+    let work = Work::with_file("--tolerance 0.004");
+    small().write_frames(&work, "frames");
+    let bad = |options: &str, words: &[&str]| drop(work.render(&format!("{options} -o v.npy")).fails(2, words));
+    bad("a.wspl --error-image v.npy", &["--error-image", "a file of its own"]);
+    bad("a.wspl --error-image -", &["--error-image", "a file of its own"]);
+    bad("a.wspl --error-image e.png", &["e.png", "frame_%04d.png"]);
+    bad("a.wspl --error-image e", &["e: the ending says no format"]);
+    bad("a.wspl --tolerance 0.0001", &["--tolerance", "e-3 of its range off"]);
+    bad("a.wspl --tolerance nan", &["--tolerance", "0 to 1"]);
+    bad("a.wspl --tolerance 2", &["--tolerance", "0 to 1"]);
+    bad("frames --method direct --tolerance 0.1", &["--tolerance", "--method coefficients"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "frames"]);
+}
+
+#[test]
 fn memory_changes_no_pixel() {
     let work = Work::with_file("--block 8");
     let options = "a.wspl --size 150x130 -o - --format npy";

@@ -84,20 +84,37 @@ pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
 pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, frames: usize) -> RenderConfig {
     let kernel = Kernel::new(None, tau, grid).unwrap();
     let frames = (0..frames).collect();
-    RenderConfig { view, kernel, quantity, frames, region: None, splat_error: 0.0, memory: MEMORY }
+    RenderConfig {
+        view,
+        kernel,
+        quantity,
+        frames,
+        region: None,
+        splat_error: 0.0,
+        allowed: None,
+        certify: false,
+        memory: MEMORY,
+    }
 }
 
 /// The pictures, one after another.
 pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, RenderReport) {
-    let mut out = Vec::new();
-    let mut numbers = Vec::new();
-    let report = render(scene, config, &Silent, &mut |frame, picture| {
-        numbers.push(frame);
-        out.extend_from_slice(picture);
+    let (pictures, _, report) = rendered(scene, config);
+    (pictures, report)
+}
+
+/// The pictures, and their certified errors if those are asked for.
+pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, Vec<f32>, RenderReport) {
+    let (mut pictures, mut errors, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
+    let report = render(scene, config, &Silent, &mut |rendered| {
+        numbers.push(rendered.frame);
+        pictures.extend_from_slice(rendered.picture);
+        errors.extend_from_slice(rendered.error.unwrap_or_default());
         Ok(())
     });
     assert_eq!(numbers, config.frames);
-    (out, report.unwrap())
+    assert_eq!(errors.len(), if config.certify { pictures.len() } else { 0 });
+    (pictures, errors, report.unwrap())
 }
 
 /// The frames of `memory` as they are.

@@ -134,11 +134,13 @@ fn pictures(scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
         frames: (0..FRAMES).collect(),
         region: None,
         splat_error: SPLAT_ERROR,
+        allowed: None,
+        certify: false,
         memory: MEMORY,
     };
     let mut all = Vec::new();
-    let report = render(scene, &config, &Silent, &mut |_, picture| {
-        all.extend_from_slice(picture);
+    let report = render(scene, &config, &Silent, &mut |rendered| {
+        all.extend_from_slice(rendered.picture);
         Ok(())
     })?;
     Ok((all, report))

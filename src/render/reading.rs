@@ -1,0 +1,94 @@
+//! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
+
+use super::certificate::magnitude;
+use super::scene::LeftOut;
+use crate::codec::WindowCodec;
+use wavesplat_format::{BlockEntry, PartEntry, PartKind};
+
+/// What is read of a block.
+#[derive(Debug)]
+pub(super) struct Reading {
+    /// Its entry, without the parts that are left out.
+    pub(super) entry: BlockEntry,
+    /// The error of its samples: first what holds in every frame, then for each level part what counts
+    /// [`Reader::gains`] times in a frame.
+    pub(super) errors: Vec<f64>,
+    pub(super) left_out: LeftOut,
+}
+
+/// Decides what of a window's blocks is read.
+#[derive(Debug)]
+pub(super) struct Reader {
+    /// `gains[part][frame]`: the sum of |u_k(t)| over the coefficients of a level part. Leaving the part out moves a
+    /// sample of the frame by at most so many times its largest coefficient.
+    pub(super) gains: Vec<Vec<f64>>,
+    /// The largest of each part's gains.
+    largest_gain: Vec<f64>,
+    /// How far a sample may be from the source's; none: leave nothing out.
+    allowed: Option<f64>,
+}
+
+impl Reader {
+    pub(super) fn new(codec: &WindowCodec, allowed: Option<f64>) -> Self {
+        let gain =
+            |range: &std::ops::Range<usize>, t: usize| codec.synthesis[range.clone()].iter().map(|u| u[t].abs()).sum();
+        let of_part = |range| (0..codec.frames()).map(|t| gain(range, t)).collect();
+        let gains: Vec<Vec<f64>> = codec.parts.iter().map(of_part).collect();
+        let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
+        Self { gains, largest_gain, allowed }
+    }
+
+    /// What is read of a block.
+    pub(super) fn reading(&self, entry: &BlockEntry) -> Reading {
+        let mut errors = vec![0.0; 1 + self.gains.len()];
+        errors[0] = entry.stats.reached;
+        let mut kept = entry.clone();
+        if let Some(allowed) = self.allowed {
+            kept.parts.retain(self.keep(entry, allowed, &mut errors));
+        }
+        let left_out = left_out(entry, &kept);
+        Reading { entry: kept, errors, left_out }
+    }
+
+    /// Which parts to keep: none if the block is as good as zero, else all but those, from the finest on, whose largest
+    /// effect fits in what is allowed. Notes in `errors` what that costs.
+    fn keep(&self, entry: &BlockEntry, allowed: f64, errors: &mut [f64]) -> impl Fn(&PartEntry) -> bool + use<> {
+        let all = (magnitude((entry.stats.min, entry.stats.max)) + entry.stats.reached).next_up();
+        let mut spared = Vec::new();
+        if all <= allowed {
+            errors[0] = all;
+        } else {
+            let mut total = entry.stats.reached;
+            for (level, part) in entry.parts.iter().rev().filter_map(level_of) {
+                let with = (total + part.stats.largest * self.largest_gain[level]).next_up();
+                if with <= allowed {
+                    total = with;
+                    errors[1 + level] = part.stats.largest;
+                    spared.push(part.kind);
+                }
+            }
+        }
+        move |part| part.kind == PartKind::Missing || all > allowed && !spared.contains(&part.kind)
+    }
+
+    /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
+    pub(super) fn terms(&self, entry: &BlockEntry) -> f64 {
+        let levels = entry.parts.iter().filter_map(level_of);
+        levels.map(|(level, part)| part.stats.largest * self.largest_gain[level]).sum()
+    }
+}
+
+fn level_of(part: &PartEntry) -> Option<(usize, &PartEntry)> {
+    if let PartKind::Level(level) = part.kind { Some((level.into(), part)) } else { None }
+}
+
+/// The difference between a whole entry and what is kept of it.
+fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
+    let parts = || entry.parts.iter().filter(|p| kept.part(p.kind).is_none());
+    LeftOut {
+        blocks: u64::from(kept.parts.is_empty() && !entry.parts.is_empty()),
+        parts: parts().count() as u64,
+        coefficients: parts().filter_map(level_of).map(|(_, p)| p.stats.count).sum(),
+        bytes: parts().map(|p| u64::from(p.stored_len)).sum(),
+    }
+}
