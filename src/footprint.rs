@@ -87,7 +87,7 @@ impl Footprint {
         let peak = cell * libm::exp(tau * tau * sigma * sigma / 2.0) / (2.0 * std::f64::consts::PI * sigma * sigma);
         // At least a pixel: a voxel far smaller than that must still reach the nearest pixel's centre.
         let reach = (method.radius * in_pixels).max(1.0);
-        let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0);
+        let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
             let what = "the kernel's weights are beyond numbers: choose another --sigma, --tau or --scale";
             return Err(Error::usage(format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
@@ -133,6 +133,9 @@ impl Footprint {
         }
     }
 }
+
+/// Leaves room for sums of 1e20 products with the largest `f32`.
+const LARGEST_PEAK: f64 = 1e250;
 
 /// Pixels over which quotients are multiplied up; rounding grows with its square, to 3e-13.
 const RUN: usize = 64;
