@@ -2,6 +2,7 @@
 //!
 //! Nothing here calls the library's own bound: decoded samples are compared with the patterns themselves, exactly.
 
+use crate::common::computed::{Computed, Sampled};
 use crate::common::exact::Limit;
 use crate::common::{report, settings};
 use rayon::prelude::*;
@@ -11,11 +12,9 @@ use std::time::Instant;
 use wavesplat::codec::WindowCodec;
 use wavesplat::codec::decode::Block;
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::error::Result;
 use wavesplat::progress::Silent;
 use wavesplat::sample::SampleType;
-use wavesplat::source::{Archive, FrameSource, FrameWindow};
-use wavesplat::volume::{Grid, Region};
+use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, Reader};
 
@@ -25,70 +24,11 @@ const BLOCKS: usize = 16;
 const GRID: Grid = Grid { dims: [EDGE, EDGE, EDGE * BLOCKS], spacing: [1.0; 3], origin: [0.0; 3] };
 const VOXELS: usize = EDGE * EDGE * EDGE * BLOCKS;
 
-/// What stands at a place of an archive: `frame * VOXELS + voxel` to bits.
-type Pattern = fn(u64) -> u32;
-
-/// An archive of patterns that is computed where it is read.
-#[derive(Clone)]
-struct Patterns {
-    archive: Archive,
-    /// Which places of all are its samples.
-    first: u64,
-    pattern: Pattern,
-}
-
-impl Patterns {
-    fn new(places: Range<u64>, pattern: Pattern) -> Self {
-        let frames = Some((places.end - places.start) as usize / VOXELS);
-        let (sample, times, notes) = (SampleType::F32, Vec::new(), Vec::new());
-        let archive = Archive { grid: GRID, sample, frames, times, variable: None, notes };
-        Self { archive, first: places.start, pattern }
-    }
-
-    fn bits(&self, frame: usize, voxel: usize) -> u32 {
-        (self.pattern)(self.first + (frame * VOXELS + voxel) as u64)
-    }
-}
-
-impl FrameSource for Patterns {
-    fn archive(&self) -> &Archive {
-        &self.archive
-    }
-
-    fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
-        Ok(Box::new(Window { patterns: self.clone(), first, count }))
-    }
-}
-
-struct Window {
-    patterns: Patterns,
-    first: usize,
-    count: usize,
-}
-
-impl FrameWindow for Window {
-    fn frames(&self) -> usize {
-        self.count
-    }
-
-    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        let row = region.dims()[0];
-        for ((y, z), to) in region.rows().zip(out.chunks_exact_mut(row * 4)) {
-            let voxel = (z * EDGE + y) * EDGE + region.start[0];
-            for (i, bytes) in to.as_chunks_mut().0.iter_mut().enumerate() {
-                *bytes = self.patterns.bits(self.first + frame, voxel + i).to_le_bytes();
-            }
-        }
-        Ok(())
-    }
-
-    fn name(&self, frame: usize) -> String {
-        format!("frame {}", self.first + frame)
-    }
-
-    fn check_unchanged(&self) -> Result<()> {
-        Ok(())
-    }
+/// The archive of the patterns of some places, `frame * VOXELS + voxel` of all.
+fn patterns(places: Range<u64>, pattern: fn(u64) -> u32) -> Computed<4, impl Sampled<4>> {
+    let frames = (places.end - places.start) as usize / VOXELS;
+    let sample = move |frame, voxel| pattern(places.start + (frame * VOXELS + voxel) as u64).to_le_bytes();
+    Computed::new(GRID, SampleType::F32, frames, sample)
 }
 
 /// What came back.
@@ -116,7 +56,7 @@ impl Add for Seen {
 const TOLERANCE: f64 = 1e-3;
 
 /// Converts the patterns into a file in memory, decodes it, and compares.
-fn check(patterns: &Patterns, basis: Basis, window: usize) -> Seen {
+fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -> Seen {
     let config = ConvertConfig { range: Some((0.0, 1.0)), block: Some(EDGE), ..settings(basis, window, TOLERANCE) };
     let mut file = Vec::new();
     convert(&mut patterns.clone(), &config, Path::new("a.wspl"), &mut file, &Silent).unwrap();
@@ -132,7 +72,8 @@ fn check(patterns: &Patterns, basis: Basis, window: usize) -> Seen {
             let samples = Block::read(&reader, &codec, entry, voxels, &all).unwrap().samples(&codec);
             let block = entry.id.block as usize * voxels;
             let frames = samples.chunks_exact(voxels * 4).zip(window.first_frame as usize..);
-            let compared = frames.map(|(found, frame)| compare(found, |i| patterns.bits(frame, block + i)));
+            let compared =
+                frames.map(|(found, frame)| compare(found, |i| u32::from_le_bytes(patterns.at(frame, block + i))));
             compared.fold(Seen::default(), Add::add)
         };
         entries.par_iter().map(of_block).reduce(Seen::default, Add::add)
@@ -164,10 +105,14 @@ fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Seen {
 /// Patterns that are worked on at a time.
 const CHUNK: u64 = 1 << 26;
 
+fn consecutive(place: u64) -> u32 {
+    place as u32
+}
+
 #[test]
 fn every_pattern_of_32_bits_comes_back_within_the_bound() {
     let started = Instant::now();
-    let chunk = |first| check(&Patterns::new(first..first + CHUNK, |place| place as u32), Basis::Haar, 1);
+    let chunk = |first| check(&patterns(first..first + CHUNK, consecutive), Basis::Haar, 1);
     let seen = (0..1 << 32).step_by(CHUNK as usize).map(chunk).fold(Seen::default(), Add::add);
     report(&format!("every f32: {seen:?} in {:.1?}", started.elapsed()));
     assert_eq!((seen.missing, seen.finite), (1 << 24, (1 << 32) - (1 << 24)));
@@ -188,7 +133,7 @@ fn patterns_side_by_side_come_back_within_the_bound_in_windows() {
     let (mut place, mut all) = (0, Seen::default());
     for (basis, window) in [(Basis::Haar, 2), (Basis::Multi, 3), (Basis::Haar, 8), (Basis::Multi, 9)] {
         let end = place + (window * VOXELS) as u64;
-        let seen = check(&Patterns::new(place..end, shuffled), basis, window);
+        let seen = check(&patterns(place..end, shuffled), basis, window);
         assert!(seen.changed > (window * VOXELS) as u64 / 2, "few were coded: {seen:?}");
         (place, all) = (end, all + seen);
     }

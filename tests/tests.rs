@@ -5,6 +5,7 @@
 
 mod adversary;
 mod bounds;
+mod catalogue;
 mod certificates;
 mod cli;
 mod coefficients;

@@ -1,5 +1,6 @@
 //! What several topics share.
 
+pub(crate) mod computed;
 pub(crate) mod exact;
 pub(crate) mod memory;
 pub(crate) mod random;
