@@ -54,6 +54,11 @@ fn the_largest_numbers_do_not_overflow() {
             kept(ty, Mask::None, 40, &near, tolerance);
         }
     }
+    // The code of the largest double may stand for more than that.
+    for tolerance in (1..200).map(|n| 1e-9 * f64::from(n) / 1.234) {
+        let both = archive(SampleType::F64, 1, |i| [f64::MIN, f64::MAX][i % 2]);
+        kept(SampleType::F64, Mask::None, 40, &both, tolerance);
+    }
     let mut random = Random(38);
     let large = archive(SampleType::F32, 16, |_| 1e38 * random.signed());
     kept(SampleType::F32, Mask::None, 40, &large, 1e-3);
