@@ -22,7 +22,7 @@ struct Climber {
 
 impl Climber {
     fn new(target: &Target, random: &mut Random) -> Self {
-        let level = target.lo + (target.hi - target.lo) * random.unit();
+        let level = target.value(random.unit());
         Self { series: vec![level; target.case.frames], height: 0.0, stuck: 0 }
     }
 

@@ -49,7 +49,7 @@ impl Attack<'_> {
     fn series(&self, aim: Aim, random: &mut Random) -> Vec<f64> {
         let Self { target, basis, step, .. } = self;
         let (delta, frames) = (target.delta(), target.case.frames);
-        let base = target.lo + (target.hi - target.lo) * random.unit();
+        let base = target.value(random.unit());
         match aim {
             Aim::HalfSteps => {
                 let codes = self.codes(base, random);

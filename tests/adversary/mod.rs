@@ -41,7 +41,12 @@ impl Target {
     }
 
     fn delta(&self) -> f64 {
-        self.case.tolerance * (self.hi - self.lo)
+        self.case.tolerance * self.hi - self.case.tolerance * self.lo
+    }
+
+    /// A value of the range, from its lower end at 0 to its upper end at 1.
+    fn value(&self, share: f64) -> f64 {
+        self.lo * (1.0 - share) + self.hi * share
     }
 
     fn basis(&self) -> Box<dyn TimeBasis> {

@@ -10,7 +10,7 @@ use std::time::Instant;
 type Parts = (i8, i8, i8);
 
 fn value(target: &Target, step: f64, (deltas, steps, ulps): Parts) -> f64 {
-    let middle = target.lo + (target.hi - target.lo) / 2.0;
+    let middle = target.value(0.5);
     let away = f64::from(deltas) * target.delta() / 2.0 + f64::from(steps) * step / 2.0;
     middle + away + f64::from(ulps) * target.ulp()
 }
