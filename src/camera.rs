@@ -70,6 +70,11 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
     }
 
+    /// The depth of the nearest corner of `grid`, which may be a part of the one that depths are counted from.
+    pub fn nearest_of(&self, grid: &Grid) -> f64 {
+        corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
+    }
+
     /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of depth.
     pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();

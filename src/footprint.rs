@@ -87,7 +87,7 @@ impl Footprint {
         let peak = cell * libm::exp(tau * tau * sigma * sigma / 2.0) / (2.0 * std::f64::consts::PI * sigma * sigma);
         // At least a pixel: a voxel far smaller than that must still reach the nearest pixel's centre.
         let reach = (method.radius * in_pixels).max(1.0);
-        let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0);
+        let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
             let what = "the kernel's weights are beyond numbers: choose another --sigma, --tau or --scale";
             return Err(Error::usage(format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
@@ -120,11 +120,12 @@ impl Footprint {
     /// Each is the one before times a quotient that itself changes by a constant factor: two exponentials for a run.
     pub fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {
         out.clear();
-        for first in span.clone().step_by(RUN) {
+        let run = if self.decay > STEEP { 1 } else { RUN };
+        for first in span.clone().step_by(run) {
             let offset = first as f64 + 0.5 - centre;
             let mut weight = libm::exp(-self.decay * offset * offset);
             let mut quotient = libm::exp(-self.decay * (2.0 * offset + 1.0));
-            for _ in first..span.end.min(first + RUN) {
+            for _ in first..span.end.min(first + run) {
                 out.push(weight);
                 weight *= quotient;
                 quotient *= self.bend;
@@ -133,10 +134,16 @@ impl Footprint {
     }
 }
 
+/// Leaves room for sums of 1e20 products with the largest `f32`.
+const LARGEST_PEAK: f64 = 1e250;
+
 /// Pixels over which quotients are multiplied up; rounding grows with its square, to 3e-13.
 const RUN: usize = 64;
 /// More than the exponentials of both axes and of the peak, and the quotients of a run, can be off together.
 const EXPONENTIALS: f64 = 2e-12;
+
+/// Beyond this decay a weight may underflow where its quotient overflows. A span is then two pixels: each is computed.
+const STEEP: f64 = 100.0;
 
 #[cfg(test)]
 mod tests {
@@ -158,6 +165,22 @@ mod tests {
             for (pixel, w) in span.zip(&weights) {
                 let d = pixel as f64 + 0.5 - centre;
                 assert!((w - (-f.decay * d * d).exp()).abs() < 1e-11, "scale {scale} offset {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn weights_of_voxels_far_smaller_than_a_pixel_are_numbers() {
+        for scale in [1e-6, 1e-3, 0.01, 0.03, 0.1] {
+            let f = footprint(scale);
+            for centre in [10.0, 10.01, 10.49, 10.5, 10.99] {
+                let span = f.span(centre, 100);
+                let mut weights = Vec::new();
+                f.weights(centre, &span, &mut weights);
+                for (pixel, w) in span.zip(&weights) {
+                    let d = pixel as f64 + 0.5 - centre;
+                    assert!((w - (-f.decay * d * d).exp()).abs() < 1e-11, "scale {scale} offset {d}: {w}");
+                }
             }
         }
     }

@@ -4,10 +4,11 @@ use crate::common::exact::Limit;
 use crate::common::memory::Memory;
 use crate::common::samples::{TYPES, numbers};
 use crate::common::series::{KINDS, Kind, Mask, volume};
-use crate::common::{Stored, extracted, settings, stored};
+use crate::common::{Stored, extracted, settings, stored, times, tried};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
+use std::time::Instant;
 use wavesplat::bound::Bound;
 use wavesplat::codec::WindowCodec;
 use wavesplat::file::CoefficientFile;
@@ -18,28 +19,28 @@ use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 #[derive(Debug, Clone)]
-struct Case {
-    ty: SampleType,
-    kind: Kind,
-    mask: Mask,
-    basis: Basis,
-    bound: Bound,
-    tolerance: f64,
-    frames: usize,
+pub(crate) struct Case {
+    pub(crate) ty: SampleType,
+    pub(crate) kind: Kind,
+    pub(crate) mask: Mask,
+    pub(crate) basis: Basis,
+    pub(crate) bound: Bound,
+    pub(crate) tolerance: f64,
+    pub(crate) frames: usize,
     /// log2 of the window's length, or of one less.
-    window: u32,
-    edge: usize,
-    dims: [usize; 3],
-    seed: u64,
+    pub(crate) window: u32,
+    pub(crate) edge: usize,
+    pub(crate) dims: [usize; 3],
+    pub(crate) seed: u64,
 }
 
 /// What was converted, and what came back of it.
-struct Trial {
-    case: Case,
-    file: CoefficientFile,
-    source: Vec<f64>,
+pub(crate) struct Trial {
+    pub(crate) case: Case,
+    pub(crate) file: CoefficientFile,
+    pub(crate) source: Vec<f64>,
     missing: Vec<bool>,
-    found: Vec<f64>,
+    pub(crate) found: Vec<f64>,
 }
 
 impl Case {
@@ -50,19 +51,22 @@ impl Case {
         wavesplat::convert::ConvertConfig { bound: self.bound, block: Some(self.edge), missing_value, ..plain }
     }
 
-    /// Converts, compares everything, and returns the number of series: of a voxel in a window.
     fn check(&self) -> usize {
         let Self { ty, kind, mask, frames, dims, seed, .. } = *self;
-        let grid = Grid::unit(dims);
-        let bytes = volume(kind, ty, mask, grid.whole().voxels(), frames, seed);
-        let mut memory = Memory::new(grid, ty, bytes.clone());
+        self.trial(&volume(kind, ty, mask, dims.iter().product(), frames, seed)).check()
+    }
+
+    /// Converts these samples and extracts them again.
+    pub(crate) fn trial(&self, bytes: &[u8]) -> Trial {
+        let ty = self.ty;
+        let mut memory = Memory::new(Grid::unit(self.dims), ty, bytes.to_vec());
         let config = self.config();
         let stored: Stored = stored(&mut memory, &config);
         let file = stored.open();
         let back = extracted(&file);
         let report = verify(&file, Some(&mut memory), 64 << 20, &Silent).unwrap().against.unwrap();
         assert_eq!(report.series_outside, 0, "by verify: {self:?} {report:?}");
-        let source = numbers(ty, &bytes);
+        let source = numbers(ty, bytes);
         let missing: Vec<bool> = source.iter().map(|v| !v.is_finite() || Some(*v) == config.missing_value).collect();
         assert_eq!(report.missing, missing.iter().filter(|m| **m).count() as u64);
         for (i, (a, b)) in bytes.chunks(ty.size()).zip(back.chunks(ty.size())).enumerate() {
@@ -76,13 +80,16 @@ impl Case {
                 source[i]
             );
         }
-        let trial = Trial { case: self.clone(), file, source, missing, found };
-        let windows = trial.file.metadata().windows.len() as u32;
-        (0..windows).map(|w| trial.window(w)).sum()
+        Trial { case: self.clone(), file, source, missing, found }
     }
 }
 
 impl Trial {
+    /// Compares everything, and returns the number of series: of a voxel in a window.
+    pub(crate) fn check(&self) -> usize {
+        (0..self.file.metadata().windows.len() as u32).map(|w| self.window(w)).sum()
+    }
+
     fn window(&self, window: u32) -> usize {
         let frames = self.file.window_range(window);
         let voxels = self.file.grid.whole().voxels();
@@ -191,9 +198,10 @@ impl Trial {
     }
 }
 
-const TOLERANCES: [f64; 12] = [0.0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.02, 0.1, 0.3, 0.5];
+pub(crate) const TOLERANCES: [f64; 12] = [0.0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.02, 0.1, 0.3, 0.5];
 
-const BOUNDS: [Bound; 6] = [
+/// All that can be promised.
+pub(crate) const BOUNDS: [Bound; 6] = [
     Bound::Pointwise,
     Bound::Rms,
     Bound::Relative { floor: 0.0 },
@@ -232,32 +240,35 @@ fn cases() -> impl Strategy<Value = Case> {
     )
 }
 
-fn report(series: usize, started: std::time::Instant) {
-    std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{series} series in {:.1?}\n", started.elapsed()))
-        .unwrap();
+/// Runs `check`, which returns a number of series, on `cases` random `values` times [`times`]; returns the sum.
+pub(crate) fn search<S: Strategy>(cases: usize, values: S, check: impl Fn(S::Value) -> usize) -> usize {
+    let series = Cell::new(0);
+    let cases = (cases * times()) as u32;
+    let config = Config { cases, failure_persistence: None, max_shrink_iters: 1000, ..Config::default() };
+    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let found = runner.run(&values, |case| {
+        series.set(series.get() + check(case));
+        Ok(())
+    });
+    found.unwrap();
+    series.get()
 }
 
 #[test]
 fn no_series_breaks_its_bound() {
-    let (started, series) = (std::time::Instant::now(), Cell::new(0));
-    let config = Config { cases: 1300, failure_persistence: None, max_shrink_iters: 200, ..Config::default() };
-    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let found = runner.run(&cases(), |case| {
-        series.set(series.get() + case.check());
-        Ok(())
-    });
-    found.unwrap();
-    report(series.get(), started);
+    let started = Instant::now();
+    tried(search(900, cases(), |case| case.check()), 1_200_000, started);
 }
 
 #[test]
 fn no_kind_of_series_breaks_its_bound_for_any_type() {
-    let (started, mut series) = (std::time::Instant::now(), 0);
-    for (n, ty) in TYPES.into_iter().enumerate() {
+    let (started, mut series) = (Instant::now(), 0);
+    let rounds = (0..times()).flat_map(|round| TYPES.into_iter().enumerate().map(move |(n, ty)| (round, n, ty)));
+    for (round, n, ty) in rounds {
         for (m, kind) in KINDS.into_iter().enumerate() {
             let bases = |bound| [(Basis::Haar, bound), (Basis::Multi, bound)];
             for (k, (basis, bound)) in BOUNDS.into_iter().flat_map(bases).enumerate() {
-                let seed = (n * 1000 + m * 10 + k) as u64;
+                let seed = (round * 10_000 + n * 1000 + m * 10 + k) as u64;
                 let tolerance = TOLERANCES[2 + (n + 3 * m + 5 * k) % 10];
                 let (frames, window) = (33 + 9 * (k % 4), [5, 4, 3, 5][k % 4]);
                 let (edge, dims) = (8, [16, 8, 2]);
@@ -266,7 +277,7 @@ fn no_kind_of_series_breaks_its_bound_for_any_type() {
             }
         }
     }
-    report(series, started);
+    tried(series, 480_000, started);
 }
 
 #[test]

@@ -3,16 +3,20 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
 
+mod adversary;
 mod bounds;
+mod catalogue;
 mod certificates;
 mod cli;
 mod coefficients;
 mod common;
 mod determinism;
+mod every_float;
 mod images;
 mod layering;
 mod real;
 mod reference;
 mod sampled;
+mod scenes;
 mod truncation;
 mod wavelets;

@@ -48,7 +48,8 @@ impl Group {
         for (codes, coefficients) in self.codes.iter_mut().zip(&self.coefficients) {
             for (code, c) in codes.iter_mut().zip(coefficients) {
                 let q = nearest(c / step);
-                fits &= q.abs() < f64::from(i32::MAX); // false for NaN too
+                // False for NaN, too, and for what the decoder would find infinite.
+                fits &= q.abs() < f64::from(i32::MAX) && (q * step).abs() < f64::INFINITY;
                 *code = q as i32;
             }
         }

@@ -176,6 +176,9 @@ fn lap(clock: &mut Instant, stage: &mut f64) {
     *clock = Instant::now();
 }
 
+/// Means are of voxels of which some are not deeper than this over tau: exponentials lose digits at 708, and vanish.
+const DEEPEST: f64 = 640.0;
+
 /// Everything that is the same for all frames of a view.
 #[derive(Debug, Clone)]
 struct Eye {
@@ -202,6 +205,11 @@ impl Eye {
         };
         let camera = Camera::new(&config.view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
+        let nearest = camera.nearest_of(&grid.crop(&clip));
+        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
+            let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
+            return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
+        }
         Ok((Self { camera, footprint, grid, blocks, clip }, method))
     }
 

@@ -22,10 +22,10 @@ const CONVERT: &str = env!("CARGO_BIN_EXE_wavesplat");
 const RENDER: &str = env!("CARGO_BIN_EXE_wavesplat-render");
 
 /// A fresh folder in which programs run.
-struct Work(TempDir);
+pub(crate) struct Work(TempDir);
 
 impl Work {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
@@ -33,18 +33,18 @@ impl Work {
         self.0.path().join(name)
     }
 
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+    pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
 
-    fn read(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
     /// The names in the folder, sorted.
-    fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
@@ -52,7 +52,7 @@ impl Work {
     }
 
     /// Runs `wavesplat` with the words of `args`.
-    fn wavesplat(&self, args: &str) -> Run {
+    pub(crate) fn wavesplat(&self, args: &str) -> Run {
         self.run(CONVERT, args, b"")
     }
 
@@ -97,7 +97,7 @@ impl Work {
 
 /// What a program left.
 #[derive(Debug)]
-struct Run {
+pub(crate) struct Run {
     args: String,
     code: Option<i32>,
     out: Vec<u8>,
@@ -112,14 +112,14 @@ impl Run {
     }
 
     #[track_caller]
-    fn ok(self) -> Self {
+    pub(crate) fn ok(self) -> Self {
         assert_eq!(self.code, Some(0), "{}: {}", self.args, self.err);
         self
     }
 
     /// It failed with this code, said all these words on standard error and nothing on standard output.
     #[track_caller]
-    fn fails(self, code: i32, words: &[&str]) -> Self {
+    pub(crate) fn fails(self, code: i32, words: &[&str]) -> Self {
         let Self { args, err, out, .. } = &self;
         assert_eq!(self.code, Some(code), "{args}: {err}");
         assert!(out.is_empty(), "{args}: {} bytes on standard output", out.len());
@@ -214,7 +214,7 @@ impl Archive {
 }
 
 /// An `.npy` file by hand.
-fn npy(descr: &str, shape: &str, samples: &[u8]) -> Vec<u8> {
+pub(crate) fn npy(descr: &str, shape: &str, samples: &[u8]) -> Vec<u8> {
     npy_ordered(descr, shape, "False", samples)
 }
 

@@ -1,5 +1,6 @@
 //! What several topics share.
 
+pub(crate) mod computed;
 pub(crate) mod exact;
 pub(crate) mod memory;
 pub(crate) mod random;
@@ -9,6 +10,7 @@ pub(crate) mod views;
 
 use memory::Memory;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use tempfile::TempDir;
 use wavesplat::bound::Bound;
 use wavesplat::camera::View;
@@ -133,13 +135,31 @@ pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32
         pictures.extend_from_slice(rendered.picture);
         errors.extend_from_slice(rendered.error.unwrap_or_default());
         Ok(())
-    });
+    })
+    .unwrap();
     assert_eq!(numbers, config.frames);
     assert_eq!(errors.len(), if config.certify { pictures.len() } else { 0 });
-    (pictures, errors, report.unwrap())
+    (pictures, errors, report)
 }
 
 /// The frames of `memory` as they are.
 pub(crate) fn direct(memory: &Memory, missing_value: Option<f64>) -> wavesplat::render::FrameScene {
     wavesplat::render::FrameScene::new(Box::new(memory.clone()), missing_value)
+}
+
+/// Says something on standard error, whether or not the test fails.
+pub(crate) fn report(what: &str) {
+    std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{what}\n")).unwrap();
+}
+
+/// How many times as much to try as usual: `WAVESPLAT_CASES`.
+pub(crate) fn times() -> usize {
+    let asked = std::env::var("WAVESPLAT_CASES").ok();
+    asked.map_or(1, |n| n.parse().unwrap_or_else(|_| panic!("WAVESPLAT_CASES={n}: takes a whole number")))
+}
+
+/// Says how many series were tried since `started`, and fails if they are fewer than `least` times [`times`].
+pub(crate) fn tried(series: usize, least: usize, started: Instant) {
+    report(&format!("{series} series in {:.1?}", started.elapsed()));
+    assert!(series >= least * times(), "only {series} series");
 }

@@ -56,7 +56,7 @@ pub(crate) enum Mask {
 }
 
 /// Smallest and largest sample, and the smallest step from zero.
-fn extremes(ty: SampleType) -> (f64, f64, f64) {
+pub(crate) fn extremes(ty: SampleType) -> (f64, f64, f64) {
     match ty {
         SampleType::U8 => (0.0, 255.0, 1.0),
         SampleType::I8 => (-128.0, 127.0, 1.0),

@@ -50,7 +50,8 @@ pub(crate) fn truth(
     images(&lattice, &view, values, missing)
 }
 
-fn of_reference(grid: &Grid, config: &RenderConfig, scale: f64) -> (Lattice, camera::View) {
+/// The lattice and the view in the reference's own terms.
+pub(crate) fn of_reference(grid: &Grid, config: &RenderConfig, scale: f64) -> (Lattice, camera::View) {
     let View { azimuth, elevation, roll, size: [width, height], center, .. } = config.view;
     let (sigma, tau) = (config.kernel.sigma, config.kernel.tau);
     let lattice = Lattice { dims: grid.dims, spacing: grid.spacing, origin: grid.origin };
