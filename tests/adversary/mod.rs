@@ -116,11 +116,13 @@ fn ranges(ty: SampleType) -> Vec<(f64, f64)> {
 /// Targets of every type, with bounds from a fraction of an ulp to half of the range.
 fn targets() -> impl Strategy<Value = Target> {
     let data = (0..TYPES.len(), any::<prop::sample::Index>(), 1..=33_usize);
-    let coding = (any::<bool>(), 0..BOUNDS.len(), any::<bool>(), 0..TOLERANCES.len(), 0.5..1.0, 0..40_u32);
+    let coding = (any::<bool>(), 0..=BOUNDS.len(), any::<bool>(), 0..TOLERANCES.len(), 0.5..1.0, 0..40_u32);
     (data, coding).prop_map(|((ty, range, frames), (multi, bound, by_ulps, tolerance, share, halves))| {
-        let (basis, bound) = (if multi { Basis::Multi } else { Basis::Haar }, BOUNDS[bound]);
         let ty = TYPES[ty];
         let (lo, hi) = *range.get(&ranges(ty));
+        let basis = if multi { Basis::Multi } else { Basis::Haar };
+        let as_of_range = Bound::Relative { floor: (hi - lo).min(f64::MAX) };
+        let bound = BOUNDS.get(bound).copied().unwrap_or(as_of_range);
         let mut target = Target::new(ty, (lo, hi), TOLERANCES[tolerance] * share, (basis, bound), frames);
         let ulps = f64::from(halves) / 2.0 * target.ulp() / (hi - lo);
         if by_ulps && ulps <= 0.5 {

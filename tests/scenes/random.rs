@@ -1,8 +1,7 @@
 //! Random scenes.
 
 use super::Scene;
-use crate::bounds::BOUNDS;
-use crate::bounds::TOLERANCES;
+use crate::bounds::{BOUNDS, TOLERANCES};
 use crate::common::random::Random;
 use crate::common::samples::{TYPES, bytes, special};
 use crate::common::series::{KINDS, Kind, Mask, volume};
