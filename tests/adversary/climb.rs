@@ -112,5 +112,5 @@ fn no_climber_gets_over_the_bound() {
             series += tried;
         }
     }
-    tried(series, 500_000, started);
+    tried(series, 960_000, started);
 }
