@@ -136,6 +136,11 @@ impl CoefficientFile {
         self.reader.storage().check_unchanged()
     }
 
+    /// The error of a file whose parts contradict each other.
+    pub fn contradiction(&self, what: String) -> Error {
+        self.failed(wavesplat_format::Error::Invalid(what))
+    }
+
     fn failed(&self, source: wavesplat_format::Error) -> Error {
         Error::CoefficientFile { path: self.path.clone(), source }
     }

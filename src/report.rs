@@ -37,6 +37,13 @@ impl PromiseReport {
     }
 }
 
+impl PromiseReport {
+    /// What a line that says that the bound is kept must add.
+    pub fn caution(&self) -> &'static str {
+        if self.guaranteed { "" } else { "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images" }
+    }
+}
+
 fn words(bound: Bound, tolerance: f64, (lo, hi): (f64, f64)) -> String {
     match bound {
         Bound::Pointwise => format!("the error of every sample <= {tolerance:e} x ({lo:.4e} to {hi:.4e})"),

@@ -125,6 +125,11 @@ pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
     }
 }
 
+/// The largest absolute value in a range; 0 if it is empty.
+pub fn magnitude((lo, hi): (f64, f64)) -> f64 {
+    if lo <= hi { (-lo).max(hi) } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,10 +8,11 @@ use crate::file::CoefficientFile;
 use crate::memory::MOST_BLOCKS;
 use crate::progress::Progress;
 use crate::sample;
+use crate::scan::join_ranges;
 use crate::source::{FrameSource, FrameWindow, read_frames};
 use rayon::prelude::*;
 use serde::Serialize;
-use wavesplat_format::BlockEntry;
+use wavesplat_format::{BlockEntry, PartKind};
 
 /// What a check of the file alone found.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -41,8 +42,8 @@ pub struct Comparison {
     pub worst: Option<Place>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
-    /// Blocks with an error beyond the largest that the directory or the window's record states.
-    pub blocks_beyond_reached: u64,
+    /// Blocks with an error or a value beyond what the directory or the window's record states.
+    pub blocks_beyond_stated: u64,
     /// The first of them.
     pub first_beyond: Option<BlockPlace>,
     #[serde(skip)]
@@ -85,7 +86,7 @@ impl Comparison {
             missing: self.missing + other.missing,
             largest_share_of_bound: self.largest_share_of_bound.max(other.largest_share_of_bound),
             series_outside: self.series_outside + other.series_outside,
-            blocks_beyond_reached: self.blocks_beyond_reached + other.blocks_beyond_reached,
+            blocks_beyond_stated: self.blocks_beyond_stated + other.blocks_beyond_stated,
             first_beyond: self.first_beyond.or(other.first_beyond),
             squares: self.squares + other.squares,
         }
@@ -162,30 +163,56 @@ fn check_block(
     source: Option<&dyn FrameWindow>,
 ) -> Result<Comparison> {
     let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
+    check_coefficients(file, entry, &block, codec)?;
     let Some(source) = source else { return Ok(Comparison::default()) };
     let region = file.blocks.region(entry.id.block as usize);
     let original = read_frames(source, 0..codec.frames(), &region, codec.sample)?;
     let first_frame = file.window_range(entry.id.window).start;
     let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel) };
-    let mut found = compare(codec, &original, &block, place);
+    let (mut found, (lo, hi)) = compare(codec, &original, &block, place);
     let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
-    if found.largest_error > stated {
-        found.blocks_beyond_reached = 1;
+    if found.largest_error > stated || lo < entry.stats.min || hi > entry.stats.max {
+        found.blocks_beyond_stated = 1;
         found.first_beyond = Some(BlockPlace { window: entry.id.window, block: entry.id.block });
     }
     Ok(found)
 }
 
-/// Compares the samples of a block, `frame * voxels + voxel`, each of which is at `place(frame, voxel)`.
-fn compare(codec: &WindowCodec, original: &[u8], decoded: &Block, place: impl Fn(usize, usize) -> Place) -> Comparison {
+/// An error if a coefficient is larger than the directory says, on which skipping relies.
+fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
+    for part in &entry.parts {
+        let PartKind::Level(level) = part.kind else { continue };
+        let range = &codec.parts[usize::from(level)];
+        let codes = &block.codes[range.start * block.voxels..range.end * block.voxels];
+        let largest = codes.iter().map(|c| (f64::from(*c) * block.step).abs()).fold(0.0, f64::max);
+        if largest > part.stats.largest {
+            let what =
+                format!("{} holds {largest:e}, larger than the directory says: {:e}", entry.id, part.stats.largest);
+            return Err(file.contradiction(what));
+        }
+    }
+    Ok(())
+}
+
+/// Compares the samples of a block, `frame * voxels + voxel`, each of which is at `place(frame, voxel)`; and the range of
+/// those that are extracted and not missing.
+fn compare(
+    codec: &WindowCodec,
+    original: &[u8],
+    decoded: &Block,
+    place: impl Fn(usize, usize) -> Place,
+) -> (Comparison, (f64, f64)) {
     let size = codec.sample.size();
     let samples = original.len() / size;
     let voxels = samples / codec.frames();
     let mut source = vec![0.0; samples];
     sample::load(codec.sample, original, &mut source);
-    let (bytes, values) = decoded.samples_and_values(codec);
+    let (bytes, splatted) = decoded.samples_and_values(codec);
+    let mut extracted = vec![0.0; samples];
+    sample::load(codec.sample, &bytes, &mut extracted);
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
+    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
     for voxel in 0..voxels {
         let errors: Vec<(f64, f64)> = (voxel..samples)
             .step_by(voxels)
@@ -195,13 +222,16 @@ fn compare(codec: &WindowCodec, original: &[u8], decoded: &Block, place: impl Fn
                 match missing {
                     true if same(i) => (0.0, 0.0),
                     true => (f64::INFINITY, 0.0),
-                    false => (codec.error(values[i], source[i]), codec.promise.allowed(source[i])),
+                    false => {
+                        range = join_ranges(range, (extracted[i], extracted[i]));
+                        (codec.error(splatted[i], extracted[i], source[i]), codec.promise.allowed(source[i]))
+                    }
                 }
             })
             .collect();
         add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
     }
-    found
+    (found, range)
 }
 
 /// Adds the errors of a series, each with what is allowed.

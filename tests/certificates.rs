@@ -4,6 +4,7 @@
 //! the certificate itself.
 
 use crate::coefficients::{Trial, doubles, views};
+use crate::common::random::Random;
 use crate::common::views::{SKEWED, archive, field, truth, values, view};
 use crate::common::{direct, looking, pictures, rendered, settings, stored};
 use crate::images::{bits, under_less_memory};
@@ -256,4 +257,50 @@ fn memory_changes_no_bit_of_a_certificate() {
         assert!(under_less_memory(&mut coefficients(&trial), &config) >= 3);
         assert!(under_less_memory(&mut direct(&trial.memory, None), &config) >= 3);
     }
+}
+
+/// A picture whose only shown voxels are missing within the cut and present beyond it.
+fn masked_within_the_cut() -> Trial {
+    let grid = Grid::unit([21, 40, 1]);
+    let mut random = Random(4);
+    let hidden = |x: usize, y: usize, t: usize| x < 3 && (y < 20 || t.is_multiple_of(2));
+    let mut samples = Vec::new();
+    for t in 0..4 {
+        for [x, y, _] in grid.whole().iter() {
+            let value = random.unit();
+            samples.push(if hidden(x, y, t) { f64::NAN } else { value });
+        }
+    }
+    Trial::new("masked within the cut", archive(grid, SampleType::F64, &samples), settings(Basis::Haar, 4, 0.01))
+}
+
+#[test]
+fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
+    let trial = masked_within_the_cut();
+    for tau in [0.0, 0.05] {
+        let view = View { scale: Some(11.0), center: Some([-12.6, 20.0, 0.0]), ..view(0.0, 0.0, [24, 3]) };
+        let truth = Truth::new(&trial, (view, tau), Some(4.0));
+        for scene in [&mut coefficients(&trial) as &mut dyn Scene, &mut direct(&trial.memory, None)] {
+            for splat_error in [0.0, 0.02, 0.5, 2.0] {
+                let (found, errors, _) = rendered(scene, &RenderConfig { splat_error, ..truth.config.clone() });
+                for ((found, error), expected) in found.iter().zip(&errors).zip(&truth.images.mean) {
+                    assert_eq!(found.is_nan(), error.is_nan());
+                    let off = (f64::from(*found) - expected).abs();
+                    // The brightest place is far outside of the picture, so that the cut may leave out all that there is.
+                    assert!(found.is_nan() || expected.is_nan() || off <= f64::from(*error), "{found} for {expected}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_certified_is_infinitely_uncertain() {
+    let grid = Grid { origin: [1e16, 0.0, 0.0], ..Grid::unit([2, 2, 2]) };
+    let trial =
+        Trial::new("far away", archive(grid, SampleType::F64, &field(&grid, 2, 1)), settings(Basis::Haar, 2, 0.1));
+    let config = looking(view(0.0, 0.0, [8, 8]), 0.0, Quantity::Mean, &grid, 2);
+    let (found, errors, report) = rendered(&mut coefficients(&trial), &RenderConfig { certify: true, ..config });
+    assert!(found.iter().zip(&errors).all(|(v, e)| v.is_nan() == e.is_nan()));
+    assert_eq!(report.certified_error, Some(f64::INFINITY));
 }

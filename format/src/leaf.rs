@@ -191,9 +191,9 @@ pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u
         let sum = |of: fn(&LeafEntry) -> u64| leaves.iter().fold(0u64, |sum, leaf| sum.saturating_add(of(leaf)));
         let same = sum(|l| l.coded) == window.coded && sum(|l| l.outliers) == window.outliers;
         ensure(same, || format!("window {number}: coefficients or outliers differ from the metadata"))?;
-        let reached = leaves.iter().all(|leaf| leaf.reached <= window.reached);
-        ensure(reached && sum(|l| l.missing) <= window.missing, || {
-            format!("window {number}: error or missing samples differ from the metadata")
+        let held = |l: &LeafEntry| l.reached <= window.reached && window.min <= l.min && l.max <= window.max;
+        ensure(leaves.iter().all(held) && sum(|l| l.missing) <= window.missing, || {
+            format!("window {number}: errors, values or missing samples differ from the metadata")
         })
     })?;
     Ok(end)

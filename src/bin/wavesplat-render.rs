@@ -72,11 +72,12 @@ struct Cli {
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
     sigma: Option<f64>,
-    /// What splatting may add to the error, relative to the range; 0 asks for the exact method
-    /// [default: a tenth of the file's tolerance; 1e-4 for frames]
+    /// What splatting may add to the error: of means as a share of the range, of emissions as one of the brightest that
+    /// the largest sample could give; 0 asks for the exact method
+    /// [default: a tenth of --tolerance or the file's tolerance; 1e-4 for frames]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
-    /// Read and splat less, so that samples may be this share of the range off: more than the file's own tolerance
+    /// Read and splat less, so that samples may be this share of the range off: no less than the file itself is
     #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = "Error")]
     tolerance: Option<f64>,
     /// Write pictures of the certified error as well: no pixel is further than this from the picture of the source's
@@ -156,25 +157,30 @@ impl Cli {
     /// Where pictures go, and where those of their errors go.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Sink, Option<Sink>)> {
         let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
-        let coloured = |format| format != PictureFormat::Npy || self.colormap.is_some();
         let of_errors = self.error_image.as_deref().map(|path| Ok((path, format_of(path)?))).transpose()?;
-        if self.error_image.as_deref().is_some_and(|path| path == self.output || path == Path::new(STANDARD)) {
-            return Err(Error::usage("--error-image: takes a file of its own"));
+        let own = |path: &Path| path != self.output && path != Path::new(STANDARD);
+        if !self.error_image.as_deref().is_none_or(own) {
+            return Err(Error::usage(NOT_ITS_OWN));
         }
-        let needed = coloured(format) && self.range.is_none() || of_errors.is_some_and(|(_, format)| coloured(format));
+        let coloured_array = self.colormap.is_some();
+        let needed = (format != PictureFormat::Npy || coloured_array) && self.range.is_none()
+            || of_errors.is_some_and(|(_, format)| format != PictureFormat::Npy);
         let seen = if needed { Ranges::of(scene, config)? } else { Ranges::default() };
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
         }
-        let sink = |path: &Path, format, range| {
+        let sink = |path: &Path, format, range, coloured_array| {
             let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
             let (size, frames, fps, force) = (config.view.size, config.frames.clone(), self.fps, self.force);
-            let coloured_array = self.colormap.is_some();
             Sink::open(path, SinkConfig { format, size, frames, fps, colours, coloured_array, force })
         };
-        let errors = of_errors.map(|(path, format)| sink(path, format, seen.errors)).transpose()?;
-        Ok((sink(&self.output, format, range)?, errors))
+        let errors = of_errors.map(|(path, format)| sink(path, format, seen.errors, false)).transpose()?;
+        let pictures = sink(&self.output, format, range, coloured_array)?;
+        if errors.as_ref().is_some_and(|e| e.path() == pictures.path()) {
+            return Err(Error::usage(NOT_ITS_OWN));
+        }
+        Ok((pictures, errors))
     }
 
     /// What is rendered, and what it was converted with.
@@ -253,6 +259,7 @@ impl Cli {
     }
 }
 
+const NOT_ITS_OWN: &str = "--error-image: takes a file of its own";
 const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
 
 /// Says what to do about a file that holds no coefficients.

@@ -343,7 +343,8 @@ fn check_group(
         let present = |t: usize| group.weight[t][lane] > 0.0;
         for (t, error) in errors.iter_mut().enumerate() {
             let (decoded, source) = (group.decoded[t][lane], group.source[t][lane]);
-            let found = if present(t) { codec.error(decoded, source) } else { 0.0 };
+            let rounded = sample::round_to(codec.sample, decoded);
+            let found = if present(t) { codec.error(decoded, rounded, source) } else { 0.0 };
             *error = (found, codec.promise.allowed(source));
         }
         let holds = codec.promise.holds(errors.iter().copied());

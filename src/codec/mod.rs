@@ -69,13 +69,12 @@ impl WindowCodec {
         sample::is_missing(value, self.missing_value)
     }
 
-    /// The larger error of a decoded value as it is splatted and as it is extracted, rounded to its type; rounded up.
-    /// Infinite if it would be taken for a missing one.
-    pub fn error(&self, decoded: f64, source: f64) -> f64 {
-        let rounded = sample::round_to(self.sample, decoded);
-        let (splatted, extracted) = (difference_up(decoded, source), difference_up(rounded, source));
-        let lost = splatted.is_nan() || extracted.is_nan() || self.is_missing(rounded);
-        if lost { f64::INFINITY } else { splatted.max(extracted) }
+    /// The larger error of a decoded value as it is splatted and as it is extracted; rounded up. Infinite if it would be
+    /// taken for a missing one.
+    pub fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
+        let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
+        let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
+        if lost { f64::INFINITY } else { a.max(b) }
     }
 }
 

@@ -5,6 +5,7 @@ use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
+use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::Grid;
@@ -92,7 +93,7 @@ impl WindowReader<'_> {
     /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
     fn delta(&self, window: &dyn FrameWindow, seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
         let ConvertConfig { tolerance, missing_value, .. } = *self.config;
-        let magnitude = if seen.0 <= seen.1 { seen.1.max(-seen.0) } else { 0.0 }; // all missing
+        let magnitude = sample::magnitude(seen);
         match self.config.bound {
             Bound::Pointwise | Bound::Rms => Ok(bound::range_bound(tolerance, range)),
             Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),

@@ -171,6 +171,9 @@ fn block_edge(window: usize) -> usize {
 impl Plan {
     fn new(config: &ConvertConfig, archive: &Archive) -> Result<Self> {
         wavelet::check_window(config.basis, config.window)?;
+        if !(0.0..=1.0).contains(&config.tolerance) {
+            return Err(Error::usage("--tolerance: a share, 0 to 1; 2 % is 0.02"));
+        }
         let edge = config.block.unwrap_or(block_edge(config.window));
         let coefficients = wavelet::basis(config.basis, config.window).coefficients() as u64;
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;

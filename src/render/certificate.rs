@@ -2,20 +2,26 @@
 //!
 //! With w_i the weights of the uncut kernel and c_i those that are splatted, the true pictures are I = sum w_i v_i and
 //! g = I / sum w_i; the rendered ones have c_i for w_i and v^_i for v_i. Let r_i bound |v^_i - v_i|, let C = sum c_i,
-//! T = sum (w_i - c_i) be what lies beyond the cut, and V hold |v_i|. Then
+//! T = sum (w_i - c_i) be what lies beyond the cut, and the range V hold every v_i. Then
 //!
 //! ```text
 //! |I^ - I| <= sum c_i r_i + T max |V|
 //! |g^ - g| <= sum c_i r_i / C + T / (C + T) (max V - min V)
 //! ```
 //!
-//! since the mean over the cut and that beyond it are both means of values in V. Rounding comes on top: a sum of N
-//! terms is off by N units in the last place of the sum of their absolute values, and a weight by what
-//! [`weight_rounding`] says.
+//! since the mean over the cut and that beyond it are both means of values in V. Where samples are missing, C counts the
+//! weights that are present; T may count all, since T / (C + T) grows with T.
+//!
+//! The r_i come from the directory by way of [`super::reading`] into the error planes (`Terms::add_errors`), whose sums
+//! [`super::finish`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
+//! their absolute values, a weight by what [`weight_rounding`] says, and the inverse transform by [`INVERSE`]. A mean is
+//! off by that of its emission, and by that of its weights times itself.
 
-use super::scene::FrameErrors;
+use super::scene::FrameBounds;
 use super::weights::PixelWeight;
 use super::{Eye, Quantity};
+use crate::footprint::Method;
+use crate::sample::magnitude;
 
 /// The rounding of the inverse transform, as a share of the sum of absolute terms: at most ten levels of up to seven
 /// products each, whose intermediate sums are at most a few hundred times larger.
@@ -35,41 +41,53 @@ impl Certificate {
     }
 
     /// The error of a pixel that holds `value`: `errors` is sum c_i r_i, `absent` the weights that are missing.
-    pub(super) fn error(&self, frame: &FrameErrors, weight: &PixelWeight, absent: f64, errors: f64, value: f64) -> f32 {
+    pub(super) fn error(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64, value: f64) -> f32 {
         let errors = errors * (1.0 + self.rounding);
         let bound = match self.quantity {
             Quantity::Emission => self.emission(frame, weight, errors),
             Quantity::Mean => self.mean(frame, weight, absent, errors),
         };
         let stored = (f64::from(value as f32) - value).abs();
-        // Up by a unit of a single, so by far more than the few roundings of this formula.
-        if bound.is_nan() || value.is_nan() { f32::NAN } else { ((bound + stored) as f32).next_up() }
+        match bound + stored {
+            _ if value.is_nan() => f32::NAN,
+            error if error.is_nan() => f32::INFINITY, // numbers too large to say
+            error => (error as f32).next_up(),        // by far more than the few roundings of this formula
+        }
     }
 
-    fn emission(&self, frame: &FrameErrors, weight: &PixelWeight, errors: f64) -> f64 {
-        errors + weight.beyond * magnitude(frame.range) + self.rounding * weight.sum * frame.terms
+    fn emission(&self, frame: &FrameBounds, weight: &PixelWeight, errors: f64) -> f64 {
+        errors + weight.beyond * magnitude(frame.range) + self.rounding * weight.sum * frame.absolute_sum
     }
 
-    fn mean(&self, frame: &FrameErrors, weight: &PixelWeight, absent: f64, errors: f64) -> f64 {
-        let present = weight.sum - absent;
-        let own = (errors / present).min(frame.largest); // a mean of errors
+    fn mean(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64) -> f64 {
+        let present = weight.sum - absent; // more than 0, or the pixel is background
+        let own = (errors / present).min(frame.error); // a mean of errors
         let span = (frame.range.1 - frame.range.0).max(0.0);
         let cut = weight.beyond / (present + weight.beyond) * span;
-        own + cut + 2.0 * self.rounding * (weight.sum / present) * (frame.terms + magnitude(frame.range))
+        own + cut + 2.0 * self.rounding * (weight.sum / present) * (frame.absolute_sum + magnitude(frame.range))
     }
 }
 
+/// The kernel that cuts are measured against; nothing is splatted with it but weights.
+pub(super) const WHOLE: Method = Method { name: "whole", radius: 8.0, stated_error: 5.07e-14 };
+/// exp(-R^2 / 2) at its cut: the share of its peak that a voxel further away has at most.
+const BEYOND_WHOLE: f64 = 1.27e-14;
+
+/// Turns the sums of weights of the whole kernel, as seen by `eye`, into at least what a cut leaves out, whose sums are
+/// `cut`.
+pub(super) fn leave_beyond(eye: &Eye, cut: &[f64], whole: &mut [f64]) {
+    let rounding = sum_rounding(eye);
+    let further = eye.clip.voxels() as f64 * eye.footprint.at_depth(0.0) * BEYOND_WHOLE * (1.0 + rounding);
+    let left = |cut: f64, whole: f64| (whole - cut).max(0.0) + 2.0 * rounding * whole + further;
+    whole.iter_mut().zip(cut).for_each(|(whole, cut)| *whole = left(*cut, *whole));
+}
+
 /// How far rounding moves a sum of weights, as a share of it.
-pub(super) fn sum_rounding(eye: &Eye) -> f64 {
+fn sum_rounding(eye: &Eye) -> f64 {
     weight_rounding(eye) + (eye.clip.voxels() as f64 + 64.0) * f64::EPSILON
 }
 
 /// How far rounding moves a single weight, as a share of it: in the position, the depth and the exponentials.
 fn weight_rounding(eye: &Eye) -> f64 {
     eye.footprint.rounding(eye.camera.rounding(&eye.grid), eye.camera.depth(&eye.grid))
-}
-
-/// The largest absolute value in a range; 0 if it is empty.
-pub(super) fn magnitude((lo, hi): (f64, f64)) -> f64 {
-    if lo <= hi { (-lo).max(hi) } else { 0.0 }
 }

@@ -1,14 +1,13 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
 use super::RenderConfig;
-use super::certificate::magnitude;
-use super::reading::{Reader, Reading};
-use super::scene::{Contents, FrameErrors, Group, Layout, Order, SampleErrors, Scene, Terms};
+use super::reading::{Allowance, Kept};
+use super::scene::{Contents, FrameBounds, Group, Layout, Order, SampleErrors, Scene, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::error::Result;
 use crate::file::CoefficientFile;
-use crate::sample::SampleType;
+use crate::sample::{SampleType, magnitude};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -101,7 +100,7 @@ struct CoefficientGroup<'a> {
     wanted: Vec<bool>,
     kept: Vec<usize>,
     layout: Layout,
-    reader: Reader,
+    allowance: Allowance,
     errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
@@ -127,13 +126,13 @@ impl<'a> CoefficientGroup<'a> {
             frames: frames.len(),
             values: samples || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
-            errors: error_planes(config, codec.parts.len()),
+            error_planes: error_planes(config, codec.parts.len()),
             order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
         // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        let reader = Reader::new(&codec, config.allowed.filter(|_| !samples));
+        let allowance = Allowance::new(&codec, config.allowed.filter(|_| !samples));
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
-        let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, reader, errors, leaf };
+        let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, allowance, errors, leaf };
         if config.certify {
             group.errors = group.sample_errors(config.allowed)?;
         }
@@ -143,21 +142,27 @@ impl<'a> CoefficientGroup<'a> {
     fn sample_errors(&self, allowed: Option<f64>) -> Result<SampleErrors> {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
-        let mut terms = 0.0_f64;
+        let mut sum = 0.0_f64;
         for leaf in self.file.leaves(self.window) {
-            terms = self.file.leaf(leaf)?.iter().map(|entry| self.reader.terms(entry)).fold(terms, f64::max);
+            sum = self.file.leaf(leaf)?.iter().map(|entry| self.allowance.absolute_sum(entry)).fold(sum, f64::max);
         }
-        // What overrides a sample is the sample less what the coefficients give.
-        let terms = 2.0 * terms + magnitude(range);
-        let frame = FrameErrors { largest: record.reached.max(allowed.unwrap_or(0.0)), range, terms };
+        let frame = FrameBounds {
+            error: record.reached.max(allowed.unwrap_or(0.0)),
+            range,
+            // What overrides a sample is the sample less what the coefficients give.
+            absolute_sum: 2.0 * sum + magnitude(range),
+        };
         let of_part = |gains: &Vec<f64>| self.frames.iter().map(|f| gains[*f]).collect();
-        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.reader.gains.iter().map(of_part));
-        Ok(SampleErrors { factors: factors.take(self.layout.errors).collect(), frames: vec![frame; self.frames.len()] })
+        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.allowance.gains.iter().map(of_part));
+        Ok(SampleErrors {
+            factors: factors.take(self.layout.error_planes).collect(),
+            frames: vec![frame; self.frames.len()],
+        })
     }
 
     /// Whether a block adds nothing to any plane.
-    fn adds_nothing(&self, reading: &Reading) -> bool {
-        reading.entry.parts.is_empty() && (self.layout.errors == 0 || reading.errors.iter().all(|e| *e == 0.0))
+    fn adds_nothing(&self, kept: &Kept) -> bool {
+        kept.entry.parts.is_empty() && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
     }
 
     /// The entries of the directory's leaf that lists a block.
@@ -179,8 +184,10 @@ impl<'a> CoefficientGroup<'a> {
 
     fn terms_of_samples(&self, block: &Block, samples: &[u8], errors: &[f64]) -> Terms {
         let ty: SampleType = self.codec.sample;
-        let is_missing =
-            |i: usize, _: f64| block.is_missing(self.frames[i / block.voxels] * block.voxels + i % block.voxels);
+        let is_missing = |i: usize, value: f64| {
+            let at = self.frames[i / block.voxels] * block.voxels + i % block.voxels;
+            block.is_missing(at) || self.codec.is_missing(value) // an exact block may do without a mask
+        };
         let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), errors, is_missing);
         terms.bytes_read = block.bytes_read;
         terms
@@ -231,10 +238,10 @@ impl Group for CoefficientGroup<'_> {
         let mut found = Contents { empty: self.file.blocks.len() as u64, ..Contents::default() };
         for entries in self.file.entries(self.window, region) {
             for entry in entries? {
-                let reading = self.reader.reading(&entry);
-                found.left_out += reading.left_out;
+                let kept = self.allowance.keep(&entry);
+                found.left_out += kept.left_out;
                 found.empty -= u64::from(!entry.parts.is_empty());
-                if !self.adds_nothing(&reading) {
+                if !self.adds_nothing(&kept) {
                     found.blocks.push(entry.id.block as usize);
                 }
             }
@@ -244,7 +251,7 @@ impl Group for CoefficientGroup<'_> {
 
     fn terms(&self, block: usize) -> Result<Terms> {
         let leaf = self.leaf_of(block as u32)?;
-        let Reading { entry, errors, .. } = self.reader.reading(&leaf[block - leaf[0].id.block as usize]);
+        let Kept { entry, errors, .. } = self.allowance.keep(&leaf[block - leaf[0].id.block as usize]);
         let block = self.file.block(&self.codec, &entry, &self.wanted)?;
         Ok(match (&block.exact, self.what) {
             (Some(exact), _) => self.terms_of_samples(&block, exact, &errors),

@@ -1,10 +1,9 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
 use super::RenderConfig;
-use super::certificate::magnitude;
-use super::scene::{Contents, FrameErrors, Group, Layout, Order, SampleErrors, Scene, Terms};
+use super::scene::{Contents, FrameBounds, Group, Layout, Order, SampleErrors, Scene, Terms};
 use crate::error::Result;
-use crate::sample::{self, is_missing};
+use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::{BlockGrid, Grid, Region};
@@ -68,9 +67,15 @@ impl Scene for FrameScene {
         let looked_at = if can_miss || config.certify { frames } else { &[] };
         let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
         let absent = seen.iter().any(|s| s.missing > 0);
-        let layout =
-            Layout { coefficients: 0, frames: frames.len(), values: true, absent, errors: 0, order: Order::Pixels };
-        let errors = seen.iter().map(|s| FrameErrors { largest: 0.0, range: s.range, terms: magnitude(s.range) });
+        let layout = Layout {
+            coefficients: 0,
+            frames: frames.len(),
+            values: true,
+            absent,
+            error_planes: 0,
+            order: Order::Pixels,
+        };
+        let errors = seen.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
         let blocks = self.blocks();

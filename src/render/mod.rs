@@ -63,8 +63,9 @@ pub struct RenderConfig {
     pub frames: Vec<usize>,
     /// Which voxels; by default all.
     pub region: Option<Region>,
-    /// What splatting may add to the error: of an emission relative to the image of the largest |v|, of a mean
-    /// relative to the value range. 0 asks for the exact method.
+    /// What splatting may add to the error: of an emission relative to the image of the largest |v| at the brightest
+    /// place of the plane of the picture, of a mean relative to the value range, if that place is in the picture. 0 asks
+    /// for the exact method.
     pub splat_error: f64,
     /// How far a sample may be from the source's, in its unit, so that less is read and splatted; none: as near as the
     /// file is.
@@ -142,10 +143,7 @@ pub fn render(
     let budget = Budget::new(config, scene)?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = match config.quantity {
-        Quantity::Emission => method.stated_error,
-        Quantity::Mean => method.stated_error / weights::BACKGROUND, // weights there are down to so much of the largest
-    };
+    report.stated_splat_error = stated_splat_error(config.quantity, method);
     let mut clock = Instant::now();
     let weights = Weights::new(&eye, config, &budget)?;
     lap(&mut clock, &mut report.weight_seconds);
@@ -168,6 +166,23 @@ pub fn render(
     progress.finish();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
+}
+
+/// The cheapest splat method within an error.
+pub fn splat_method(quantity: Quantity, error: f64) -> Method {
+    match quantity {
+        Quantity::Emission => Method::within(error),
+        // A pixel that is not background must keep some of its weights.
+        Quantity::Mean => Method::within((error * weights::BACKGROUND).min(0.9 * weights::BACKGROUND)),
+    }
+}
+
+/// The error that a splat method states.
+pub fn stated_splat_error(quantity: Quantity, method: Method) -> f64 {
+    match quantity {
+        Quantity::Emission => method.stated_error,
+        Quantity::Mean => method.stated_error / weights::BACKGROUND, // weights are down to so much of the largest
+    }
 }
 
 /// Adds the seconds since `clock` to a stage, and restarts it.
@@ -198,11 +213,7 @@ impl Eye {
             let d = grid.dims;
             return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
         }
-        let method = match config.quantity {
-            Quantity::Emission => Method::within(config.splat_error),
-            // A pixel that is not background must keep some of its weights.
-            Quantity::Mean => Method::within((config.splat_error * weights::BACKGROUND).min(weights::BACKGROUND / 2.0)),
-        };
+        let method = splat_method(config.quantity, config.splat_error);
         let camera = Camera::new(&config.view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
         let nearest = camera.nearest_of(&grid.crop(&clip));

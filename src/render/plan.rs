@@ -21,7 +21,7 @@ pub(super) struct Budget {
 }
 
 /// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
-const WEIGHT_BYTES: usize = 24;
+const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl Budget {
     /// For pictures of a scene.

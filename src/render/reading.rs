@@ -1,24 +1,25 @@
 //! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
 
-use super::certificate::magnitude;
 use super::scene::LeftOut;
 use crate::codec::WindowCodec;
+use crate::sample::magnitude;
+use std::ops::Range;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
 /// What is read of a block.
 #[derive(Debug)]
-pub(super) struct Reading {
+pub(super) struct Kept {
     /// Its entry, without the parts that are left out.
     pub(super) entry: BlockEntry,
     /// The error of its samples: first what holds in every frame, then for each level part what counts
-    /// [`Reader::gains`] times in a frame.
+    /// [`Allowance::gains`] times in a frame.
     pub(super) errors: Vec<f64>,
     pub(super) left_out: LeftOut,
 }
 
 /// Decides what of a window's blocks is read.
 #[derive(Debug)]
-pub(super) struct Reader {
+pub(super) struct Allowance {
     /// `gains[part][frame]`: the sum of |u_k(t)| over the coefficients of a level part. Leaving the part out moves a
     /// sample of the frame by at most so many times its largest coefficient.
     pub(super) gains: Vec<Vec<f64>>,
@@ -28,58 +29,56 @@ pub(super) struct Reader {
     allowed: Option<f64>,
 }
 
-impl Reader {
+impl Allowance {
     pub(super) fn new(codec: &WindowCodec, allowed: Option<f64>) -> Self {
-        let gain =
-            |range: &std::ops::Range<usize>, t: usize| codec.synthesis[range.clone()].iter().map(|u| u[t].abs()).sum();
+        let gain = |range: &Range<usize>, t: usize| codec.synthesis[range.clone()].iter().map(|u| u[t].abs()).sum();
         let of_part = |range| (0..codec.frames()).map(|t| gain(range, t)).collect();
         let gains: Vec<Vec<f64>> = codec.parts.iter().map(of_part).collect();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
         Self { gains, largest_gain, allowed }
     }
 
-    /// What is read of a block.
-    pub(super) fn reading(&self, entry: &BlockEntry) -> Reading {
+    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts, from
+    /// the finest on, whose largest effect fits in what is allowed.
+    pub(super) fn keep(&self, entry: &BlockEntry) -> Kept {
         let mut errors = vec![0.0; 1 + self.gains.len()];
         errors[0] = entry.stats.reached;
         let mut kept = entry.clone();
-        if let Some(allowed) = self.allowed {
-            kept.parts.retain(self.keep(entry, allowed, &mut errors));
+        let as_zero = (magnitude((entry.stats.min, entry.stats.max)) + entry.stats.reached).next_up();
+        match self.allowed {
+            Some(allowed) if as_zero <= allowed => {
+                errors[0] = as_zero;
+                kept.parts.retain(|p| p.kind == PartKind::Missing);
+            }
+            Some(allowed) => self.leave_out_levels(allowed, &mut kept, &mut errors),
+            None => {}
         }
         let left_out = left_out(entry, &kept);
-        Reading { entry: kept, errors, left_out }
+        Kept { entry: kept, errors, left_out }
     }
 
-    /// Which parts to keep: none if the block is as good as zero, else all but those, from the finest on, whose largest
-    /// effect fits in what is allowed. Notes in `errors` what that costs.
-    fn keep(&self, entry: &BlockEntry, allowed: f64, errors: &mut [f64]) -> impl Fn(&PartEntry) -> bool + use<> {
-        let all = (magnitude((entry.stats.min, entry.stats.max)) + entry.stats.reached).next_up();
-        let mut spared = Vec::new();
-        if all <= allowed {
-            errors[0] = all;
-        } else {
-            let mut total = entry.stats.reached;
-            for (level, part) in entry.parts.iter().rev().filter_map(level_of) {
-                let with = (total + part.stats.largest * self.largest_gain[level]).next_up();
-                if with <= allowed {
-                    total = with;
-                    errors[1 + level] = part.stats.largest;
-                    spared.push(part.kind);
-                }
+    fn leave_out_levels(&self, allowed: f64, kept: &mut BlockEntry, errors: &mut [f64]) {
+        let mut total = errors[0];
+        let levels: Vec<(usize, PartEntry)> = kept.parts.iter().rev().filter_map(level_of).collect();
+        for (level, part) in levels {
+            let with = (total + part.stats.largest * self.largest_gain[level]).next_up();
+            if with <= allowed {
+                total = with;
+                errors[1 + level] = part.stats.largest;
+                kept.parts.retain(|p| p.kind != part.kind);
             }
         }
-        move |part| part.kind == PartKind::Missing || all > allowed && !spared.contains(&part.kind)
     }
 
     /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
-    pub(super) fn terms(&self, entry: &BlockEntry) -> f64 {
+    pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
         let levels = entry.parts.iter().filter_map(level_of);
         levels.map(|(level, part)| part.stats.largest * self.largest_gain[level]).sum()
     }
 }
 
-fn level_of(part: &PartEntry) -> Option<(usize, &PartEntry)> {
-    if let PartKind::Level(level) = part.kind { Some((level.into(), part)) } else { None }
+fn level_of(part: &PartEntry) -> Option<(usize, PartEntry)> {
+    if let PartKind::Level(level) = part.kind { Some((level.into(), *part)) } else { None }
 }
 
 /// The difference between a whole entry and what is kept of it.

@@ -95,18 +95,18 @@ pub struct SampleErrors {
     /// `factors[plane][frame]`: how much the sums of an error plane count in a frame.
     pub factors: Vec<Vec<f64>>,
     /// What holds for all samples of a frame.
-    pub frames: Vec<FrameErrors>,
+    pub frames: Vec<FrameBounds>,
 }
 
 /// What holds for all samples of a frame.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct FrameErrors {
-    /// No sample's error is above this.
-    pub largest: f64,
-    /// A range that holds the source's samples; (inf, -inf) if all are missing.
+pub struct FrameBounds {
+    /// No sample is further off.
+    pub error: f64,
+    /// A range that holds the source's samples; out of order if all are missing.
     pub range: (f64, f64),
-    /// An upper bound of the sum of the absolute terms that make up one sample.
-    pub terms: f64,
+    /// No sample is made of terms whose absolute values sum to more.
+    pub absolute_sum: f64,
 }
 
 /// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
@@ -122,7 +122,7 @@ pub struct Layout {
     /// Whether anything is missing.
     pub absent: bool,
     /// Planes of errors; none unless pictures are certified.
-    pub errors: usize,
+    pub error_planes: usize,
     /// How tiles should keep the planes.
     pub order: Order,
 }
@@ -155,7 +155,7 @@ impl Layout {
 
     /// Number of planes.
     pub fn planes(&self) -> usize {
-        self.first_error() + self.errors
+        self.first_error() + self.error_planes
     }
 }
 
@@ -254,16 +254,18 @@ mod tests {
 
     #[test]
     fn planes_follow_one_another() {
-        let layout = Layout { coefficients: 5, frames: 3, values: true, absent: true, errors: 2, order: Order::Planes };
+        let layout =
+            Layout { coefficients: 5, frames: 3, values: true, absent: true, error_planes: 2, order: Order::Planes };
         assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all()), (5, 8, 11));
         assert_eq!((layout.first_error(), layout.planes()), (12, 14));
-        let plain = Layout { values: false, absent: false, errors: 0, ..layout };
+        let plain = Layout { values: false, absent: false, error_planes: 0, ..layout };
         assert_eq!(plain.planes(), 5);
     }
 
     #[test]
     fn missing_samples_take_weights_instead_of_values() {
-        let layout = Layout { coefficients: 0, frames: 2, values: true, absent: true, errors: 0, order: Order::Planes };
+        let layout =
+            Layout { coefficients: 0, frames: 2, values: true, absent: true, error_planes: 0, order: Order::Planes };
         let samples: Vec<u8> = [f32::NAN, 1.0, 3.0, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         let terms = Terms::of_samples(&layout, SampleType::F32, &samples, &[], |_, v| v.is_nan());
         assert_eq!(terms.of_voxel(0), (&[1u16, 2][..], &[3.0, 1.0][..]));

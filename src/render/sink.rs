@@ -78,6 +78,14 @@ impl Sink {
         Ok(Self { target, config })
     }
 
+    /// Where the first picture goes.
+    pub fn path(&self) -> PathBuf {
+        match &self.target {
+            Target::One { out, .. } => out.path().into(),
+            Target::Many(names) => names.of(self.config.frames.first().copied().unwrap_or(0)),
+        }
+    }
+
     /// Writes the picture of a frame.
     pub fn picture(&mut self, frame: usize, picture: Picture<'_>) -> Result<()> {
         let config = &self.config;

@@ -1,6 +1,6 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
-use super::certificate::sum_rounding;
+use super::certificate;
 use super::plan::Budget;
 use super::scene::{Layout, Terms};
 use super::splat::{Order, Tile};
@@ -10,6 +10,8 @@ use crate::footprint::{Footprint, Method};
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
 pub(super) const BACKGROUND: f64 = 0.01;
+/// Of a pixel's weights this share must not be missing.
+const LEAST_PRESENT: f64 = 1e-6;
 
 /// The sums of weights of all voxels of a view.
 #[derive(Debug)]
@@ -36,9 +38,12 @@ pub(super) struct PixelWeight {
 }
 
 impl PixelWeight {
-    /// The weighted mean of an emission, less weights that are missing; NaN in the background.
+    /// The weighted mean of an emission, less weights that are missing; NaN in the background, and where so much is
+    /// missing that rounding is what is left.
     pub(super) fn mean(&self, emission: f64, absent: f64) -> f64 {
-        if self.uncut - absent < self.threshold { f64::NAN } else { emission / (self.sum - absent) }
+        let present = self.sum - absent;
+        let enough = self.uncut - absent >= self.threshold && present > LEAST_PRESENT * self.sum;
+        if enough { emission / present } else { f64::NAN }
     }
 }
 
@@ -50,11 +55,17 @@ impl Weights {
             return Ok(None);
         }
         let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
-        let sums_by = |footprint: Footprint| sums(&Eye { footprint, ..eye.clone() }, budget);
+        let seen_by = |footprint: Footprint| Eye { footprint, ..eye.clone() };
         let sums = sums(eye, budget)?;
         let exact = by(Method::EXACT)?;
-        let uncut = if mean && eye.footprint.reach < exact.reach { sums_by(exact)? } else { Vec::new() };
-        let beyond = if config.certify { beyond(eye, &sums, &sums_by(by(Method::WHOLE)?)?) } else { Vec::new() };
+        let uncut =
+            if mean && eye.footprint.reach < exact.reach { self::sums(&seen_by(exact), budget)? } else { Vec::new() };
+        let mut beyond = Vec::new();
+        if config.certify {
+            let whole = seen_by(by(certificate::WHOLE)?);
+            beyond = self::sums(&whole, budget)?;
+            certificate::leave_beyond(&whole, &sums, &mut beyond);
+        }
         let largest = if uncut.is_empty() { &sums } else { &uncut }.iter().copied().fold(0.0, f64::max);
         Ok(Some(Self { width: eye.camera.size[0], sums, uncut, beyond, threshold: BACKGROUND * largest }))
     }
@@ -69,17 +80,9 @@ impl Weights {
     }
 }
 
-/// At least the weights that the cut leaves out: those up to the reach of the whole method, and for each voxel further
-/// away the share of its peak that it has at most.
-fn beyond(eye: &Eye, sums: &[f64], whole: &[f64]) -> Vec<f64> {
-    let further = eye.clip.voxels() as f64 * eye.footprint.at_depth(0.0) * Method::WHOLE.stated_error;
-    let rounding = sum_rounding(eye);
-    let left = |(sum, whole): (&f64, &f64)| (whole - sum).max(0.0) + 2.0 * rounding * whole + further;
-    sums.iter().zip(whole).map(left).collect()
-}
-
 fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
-    let layout = Layout { coefficients: 1, frames: 1, values: false, absent: false, errors: 0, order: Order::Planes };
+    let layout =
+        Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();

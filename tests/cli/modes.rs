@@ -4,8 +4,9 @@ use super::{Run, Work, small};
 use crate::common::memory::Memory;
 use crate::common::{settings, stored_with_a_lie};
 use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
+use wavesplat::volume::{BlockGrid, Grid};
 use wavesplat::wavelet::Basis;
+use wavesplat_format::{Compressor, EncodedBlock, Metadata, PartKind, PartStats, pack_missing};
 
 const MODES: [(&str, &str); 5] = [
     ("pointwise", "--bound pointwise"),
@@ -119,20 +120,46 @@ fn samples_outside_a_bound_give_code_4() {
     }
 }
 
-#[test]
-fn a_block_that_is_further_off_than_it_says_gives_code_4() {
+/// Block 5 of window 1 of an archive lies; what `verify --against` says to that.
+fn verify_a_lie(lie: impl Fn(&mut EncodedBlock, &mut Metadata)) -> Run {
     let (work, archive) = (Work::new(), small());
     work.write("a.npy", archive.npy());
     let memory = Memory::new(Grid::unit(archive.dims), SampleType::F32, archive.bytes());
     let config = wavesplat::convert::ConvertConfig { block: Some(8), ..settings(Basis::Haar, 32, 0.01) };
-    for (share, code) in [(1.0, 0), (0.999, 4), (0.0, 4)] {
-        work.write("lie.wspl", stored_with_a_lie(&memory, &config, (1, 5), share));
-        work.wavesplat("verify lie.wspl").ok();
-        let run = work.wavesplat("verify lie.wspl --against a.npy -q");
-        if code == 0 {
-            run.ok();
-        } else {
-            run.fails(code, &["further off than the file says: 1", "block 5 of window 1"]);
-        }
-    }
+    work.write("lie.wspl", stored_with_a_lie(&memory, &config, (1, 5), lie));
+    work.wavesplat("verify lie.wspl --against a.npy -q")
+}
+
+#[test]
+fn a_block_that_is_further_off_than_it_says_gives_code_4() {
+    verify_a_lie(|_, _| ()).ok();
+    let words = ["further off than the file says: 1", "block 5 of window 1"];
+    verify_a_lie(|b, _| b.stats.reached *= 0.999).fails(4, &words);
+    verify_a_lie(|b, _| b.stats.reached = 0.0).fails(4, &words);
+    verify_a_lie(|b, _| b.stats.max = b.stats.max.next_down()).fails(4, &words);
+    verify_a_lie(|b, _| b.stats.min = b.stats.min.next_up()).fails(4, &words);
+}
+
+#[test]
+fn a_block_whose_coefficients_are_larger_than_it_says_gives_code_3() {
+    let lie = |b: &mut EncodedBlock, _: &mut Metadata| b.parts[0].stats.largest = b.parts[0].stats.largest.next_down();
+    verify_a_lie(lie).fails(3, &["window 1 block 5", "larger than the directory says"]);
+}
+
+#[test]
+fn a_sample_that_is_masked_but_was_not_missing_gives_code_4() {
+    let lie = |b: &mut EncodedBlock, m: &mut Metadata| {
+        let mut mask = vec![false; 8 * 8 * 8 * m.windows[1].frames as usize];
+        let (nx, ny, nz) = (m.dims[0] as usize, m.dims[1] as usize, m.dims[2] as usize);
+        let blocks = BlockGrid { dims: [nx, ny, nz], edge: 8 };
+        mask.truncate(blocks.region(5).voxels() * m.windows[1].frames as usize);
+        mask[7] = true;
+        let mut raw = Vec::new();
+        pack_missing(&mask, &f32::NAN.to_le_bytes(), 4, &mut raw);
+        let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
+        b.parts.push(Compressor::new(1).unwrap().part(PartKind::Missing, stats, &raw).unwrap());
+        b.parts.sort_by_key(|p| p.kind);
+        m.windows[1].missing += 1;
+    };
+    verify_a_lie(lie).fails(4, &["1 series outside the bound"]);
 }

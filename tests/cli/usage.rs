@@ -7,8 +7,8 @@ fn bad_values_of_convert_are_named() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     let cases: [(&str, &[&str]); 34] = [
-        ("--tolerance -1", &["--tolerance", "0 or more"]),
-        ("--tolerance nan", &["--tolerance", "0 or more"]),
+        ("--tolerance -1", &["--tolerance", "0 to 1"]),
+        ("--tolerance nan", &["--tolerance", "0 to 1"]),
         ("--tolerance much", &["--tolerance"]),
         ("--window 30", &["--window 30", "haar", "32"]),
         ("--window 0", &["--window 0"]),

@@ -25,7 +25,7 @@ use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::{BlockId, Writer};
+use wavesplat_format::{BlockId, EncodedBlock, Metadata, Writer};
 
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
@@ -76,9 +76,15 @@ pub(crate) fn stored(source: &mut dyn FrameSource, config: &ConvertConfig) -> St
     stored
 }
 
-/// A coefficient file one of whose blocks, (window, block), says that it reached only a `share` of what it did.
-pub(crate) fn stored_with_a_lie(memory: &Memory, config: &ConvertConfig, lie: (u32, u32), share: f64) -> Vec<u8> {
+/// A coefficient file one of whose blocks, (window, block), lies, and whose metadata goes along with it.
+pub(crate) fn stored_with_a_lie(
+    memory: &Memory,
+    config: &ConvertConfig,
+    place: (u32, u32),
+    lie: impl Fn(&mut EncodedBlock, &mut Metadata),
+) -> Vec<u8> {
     let file = stored(&mut memory.clone(), config).open();
+    let mut metadata = file.metadata().clone();
     let mut encoder = Encoder::new(config.level).unwrap();
     let mut writer = Writer::new(Vec::new(), file.id()).unwrap();
     for window in 0..file.metadata().windows.len() as u32 {
@@ -89,11 +95,13 @@ pub(crate) fn stored_with_a_lie(memory: &Memory, config: &ConvertConfig, lie: (u
             let bytes = read_frames(samples.as_ref(), 0..frames.len(), &region, file.sample()).unwrap();
             let id = BlockId { window, block: block as u32, channel: 0 };
             let mut encoded = encoder.block(&codec, id, &bytes).unwrap().block;
-            encoded.stats.reached *= if (id.window, id.block) == lie { share } else { 1.0 };
+            if (id.window, id.block) == place {
+                lie(&mut encoded, &mut metadata);
+            }
             writer.append(&encoded).unwrap();
         }
     }
-    writer.finish(file.metadata()).unwrap().0
+    writer.finish(&metadata).unwrap().0
 }
 
 /// All samples of a file.

@@ -20,7 +20,8 @@ Examples:
 Inputs: .npy, .nrrd/.nhdr, .vti, .pvd, headerless data with --dims and --dtype.
 The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass;
 --range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of
-every view is then within the tolerance of its own value. --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker
+every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range:
+wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker
 than the mean, and single frames, may be off by many times the tolerance.")]
 pub(crate) struct ConvertArgs {
     /// Frame files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
@@ -125,12 +126,6 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
 
 impl ConvertArgs {
     fn config(&self) -> Result<ConvertConfig> {
-        if !(self.tolerance.is_finite() && self.tolerance >= 0.0) {
-            return Err(Error::usage("--tolerance: takes a number of 0 or more"));
-        }
-        if self.tolerance > 1.0 {
-            return Err(Error::usage("--tolerance: a share, at most 1; 2 % is 0.02"));
-        }
         let (basis, window) = match self.basis {
             BasisName::Haar => (Basis::Haar, 32),
             BasisName::Multi => (Basis::Multi, 33),
@@ -213,7 +208,7 @@ fn summary(r: &ConvertReport, bound: Bound) -> String {
             format!("rms error of every series within {:.4e}, largest single error {:.4e}", r.delta, r.reached)
         }
     };
-    let estimate = if r.promise.guaranteed { "" } else { "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE" };
+    let estimate = r.promise.caution();
     format!(
         "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
         r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample

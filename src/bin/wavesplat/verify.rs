@@ -2,10 +2,10 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, InputArgs, narrow, print};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
+use wavesplat::report::PromiseReport;
 use wavesplat::source::FrameSource;
 use wavesplat::verify::{BlockPlace, Comparison, VerifyReport, verify};
 
@@ -42,7 +42,8 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     if args.common.json {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {
-        print(&summary(&report, file.metadata().bound))?;
+        let m = file.metadata();
+        print(&summary(&report, &PromiseReport::new(m.bound, m.tolerance, m.range)))?;
     }
     match report.against.as_ref().and_then(missed) {
         Some(what) => Err(Error::BoundMissed { path: args.file.clone(), what }),
@@ -58,7 +59,7 @@ fn missed(c: &Comparison) -> Option<String> {
         return Some(format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound"));
     }
     let BlockPlace { window, block } = c.first_beyond?;
-    let blocks = c.blocks_beyond_reached;
+    let blocks = c.blocks_beyond_stated;
     Some(format!("blocks further off than the file says: {blocks}, the first of them block {block} of window {window}"))
 }
 
@@ -77,22 +78,15 @@ impl VerifyArgs {
     }
 }
 
-const ESTIMATE: &str = "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images";
-
-fn summary(r: &VerifyReport, bound: Bound) -> String {
-    let estimate = if matches!(bound, Bound::Sampled { .. }) { ESTIMATE } else { "" };
+fn summary(r: &VerifyReport, promise: &PromiseReport) -> String {
+    let estimate = promise.caution();
     let mut text = format!("{} blocks, {} bytes: whole\n", r.blocks, r.bytes);
     if let Some(c) = &r.against {
         let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
             "{} bound {held}: largest error {:.4e} ({:.4} of the bound used), rms error {:.4e}, {} missing samples as they were, \
              {} samples compared{estimate}\n",
-            bound.name(),
-            c.largest_error,
-            c.largest_share_of_bound,
-            c.rms_error,
-            c.missing,
-            c.samples
+            promise.bound, c.largest_error, c.largest_share_of_bound, c.rms_error, c.missing, c.samples
         );
     }
     text
