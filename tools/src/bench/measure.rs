@@ -217,6 +217,7 @@ fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> R
         promised: voxel.zip(run.stated_splat_error).map(|(voxel, splat)| voxel + splat),
         image_error: run.error,
         certified_error: run.certified_error,
+        beyond_certificate: run.beyond_certificate,
         peak_bytes: most(runs),
     }
 }

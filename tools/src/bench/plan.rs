@@ -7,6 +7,7 @@ use std::iter::successors;
 use wavesplat::bound::Bound;
 use wavesplat::error::{Error, Result};
 use wavesplat::footprint::Method;
+use wavesplat::render::{Quantity, splat_method, stated_splat_error};
 use wavesplat::wavelet::Basis;
 
 /// A basis, and the window it is measured with.
@@ -52,8 +53,6 @@ pub const TEXTBOOK_CUT: f64 = 3.0;
 const SHARED_GROUP: usize = 32;
 /// The program's default: what splatting may add, as a share of the tolerance.
 const SPLAT_SHARE: f64 = 0.1;
-/// Splat errors of means are judged where weights are down to 1 % of the largest.
-const MEAN_FACTOR: f64 = 100.0;
 
 /// What to measure.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,7 +90,7 @@ impl Default for Sweep {
 impl Sweep {
     /// A sweep of seconds that shows whether everything works.
     pub fn quick() -> Self {
-        let splats = [Method::within(1.0), Method::EXACT].to_vec();
+        let splats = [splat_method(Quantity::Mean, f64::MAX), Method::EXACT].to_vec();
         Self { dims: [12, 10, 8, 33], size: 40, tolerances: vec![1e-1, 1e-3], splats, repeats: 1, ..Self::default() }
     }
 
@@ -126,16 +125,16 @@ impl Sweep {
         self.splats.iter().map(move |method| {
             let coefficients = BASES.iter().map(|b| Contender::Coefficients(b, &BOUNDS[0]));
             let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(method.radius)]).collect();
-            let splat_error = MEAN_FACTOR * method.stated_error * (1.0 + 1e-9);
+            let splat_error = stated_splat_error(Quantity::Mean, *method) * (1.0 + 1e-9);
             Group { kind, tolerance: self.fine, splat_error, splat: Some(method.name), contenders }
         })
     }
 }
 
-/// All splat methods of the library, cheapest first.
+/// All splat methods of the library for means, cheapest first.
 fn splat_methods() -> Vec<Method> {
     let next = |m: &Method| (*m != Method::EXACT).then(|| Method::within(m.stated_error.next_down()));
-    successors(Some(Method::within(1.0)), next).collect()
+    successors(Some(splat_method(Quantity::Mean, f64::MAX)), next).collect()
 }
 
 /// What is measured in turns, so that what happens to the machine happens to all.
@@ -246,9 +245,9 @@ mod tests {
     #[test]
     fn all_splat_methods_are_found_and_asked_for() {
         let methods = splat_methods();
-        assert_eq!((methods[0].name, methods[methods.len() - 1]), ("footprint-3", Method::EXACT));
+        assert_eq!((methods[0].name, methods[methods.len() - 1]), ("footprint-3.5", Method::EXACT));
         for group in Sweep::default().by_splat(Kind::Smooth) {
-            assert_eq!(Method::within(group.splat_error / MEAN_FACTOR).name, group.splat.unwrap_or_default());
+            assert_eq!(splat_method(Quantity::Mean, group.splat_error).name, group.splat.unwrap_or_default());
         }
     }
 

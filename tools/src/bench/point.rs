@@ -92,6 +92,8 @@ pub struct Rendering {
     pub image_error: ImageError,
     /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
     pub certified_error: Option<f64>,
+    /// Compared pixels that are further off than certified.
+    pub beyond_certificate: usize,
     /// The most memory of the process, pages of mapped files included.
     pub peak_bytes: Option<u64>,
 }
@@ -138,6 +140,7 @@ impl Point {
             promised: None,
             image_error: ImageError { largest: 0.5, rms: 0.25 },
             certified_error: None,
+            beyond_certificate: 0,
             peak_bytes: Some(1),
         };
         let (group, sweep) = ("tolerance/smooth/1e-1".into(), "tolerance".into());

@@ -29,6 +29,9 @@ fn alone(point: &Point) -> Vec<String> {
     expect(error.rms <= error.largest && error.largest.is_finite(), "a pixel is background that should not be");
     expect(r.promised.is_none_or(|p| error.largest <= p + ROUNDING), "a pixel is further off than promised");
     expect(r.certified_error.is_none_or(|c| error.largest <= c), "a pixel is further off than certified");
+    expect(r.beyond_certificate == 0, "a pixel is beyond its own certificate");
+    let by_library = point.method != "textbook" && point.sweep == "splat";
+    expect(!by_library || point.group.ends_with(&r.splat), "another splat method was taken");
     expect(r.first_view.min > 0.0 && r.further_view.min > 0.0, "it took no time");
     wrong
 }

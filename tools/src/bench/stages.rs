@@ -77,13 +77,15 @@ pub(super) fn render(step: &Render) -> Result<Rendered> {
         differences.extend(truth.differences(frame, picture));
     })?;
     let further = method.view(step, &step.look.further(), &mut |_, _| {})?;
+    let certified = if step.certify { method.certified(step, &truth)? } else { Vec::new() };
     Ok(Rendered {
         first_seconds: opening + first.seconds,
         further_seconds: further.seconds,
         splat: first.splat,
         stated_splat_error: first.stated_error,
         error: Truth::error(&differences),
-        certified_error: if step.certify { method.certified(step)?.map(|e| e / truth.range) } else { None },
+        certified_error: certified.iter().copied().reduce(f64::max),
+        beyond_certificate: certified.iter().zip(&differences).filter(|(c, d)| d > c).count(),
     })
 }
 
@@ -99,8 +101,6 @@ struct Viewed {
     seconds: f64,
     splat: String,
     stated_error: Option<f64>,
-    /// The largest certified error of a pixel, in the samples' unit, if that was asked for.
-    certified: Option<f64>,
 }
 
 impl Method {
@@ -118,19 +118,22 @@ impl Method {
 
     fn view(&mut self, step: &Render, look: &Look, sink: &mut dyn FnMut(usize, &[f32])) -> Result<Viewed> {
         match self {
-            Self::Library(scene) => by_library(scene.as_mut(), step, look, false, sink),
+            Self::Library(scene) => by_library(scene.as_mut(), step, look, false, &mut |r| sink(r.frame, r.picture)),
             Self::Textbook(source, radius) => by_textbook(source.as_mut(), step, look, *radius, sink),
         }
     }
 }
 
 impl Method {
-    /// The largest certified error of the first view's pixels.
-    fn certified(&mut self, step: &Render) -> Result<Option<f64>> {
-        match self {
-            Self::Library(scene) => Ok(by_library(scene.as_mut(), step, &step.look, true, &mut |_, _| {})?.certified),
-            Self::Textbook(..) => Ok(None),
+    /// The certified errors of the first view's compared pixels, as shares of the value range; none of the textbook form.
+    fn certified(&mut self, step: &Render, truth: &Truth) -> Result<Vec<f64>> {
+        let mut all = Vec::new();
+        if let Self::Library(scene) = self {
+            by_library(scene.as_mut(), step, &step.look, true, &mut |r| {
+                all.extend(truth.at_pixels(r.frame, r.error.unwrap_or_default()));
+            })?;
         }
+        Ok(all)
     }
 }
 
@@ -139,7 +142,7 @@ fn by_library(
     step: &Render,
     look: &Look,
     certify: bool,
-    sink: &mut dyn FnMut(usize, &[f32]),
+    sink: &mut dyn FnMut(wavesplat::render::Rendered<'_>),
 ) -> Result<Viewed> {
     let config = RenderConfig {
         view: look.view(),
@@ -153,11 +156,11 @@ fn by_library(
         memory: MEMORY,
     };
     let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
-        sink(rendered.frame, rendered.picture);
+        sink(rendered);
         Ok(())
     })?;
     let stated_error = Some(report.stated_splat_error);
-    Ok(Viewed { seconds: report.seconds, splat: report.method.into(), stated_error, certified: report.certified_error })
+    Ok(Viewed { seconds: report.seconds, splat: report.method.into(), stated_error })
 }
 
 fn by_textbook(
@@ -174,5 +177,5 @@ fn by_textbook(
         in_sink += clock.elapsed().as_secs_f64();
     })?;
     let seconds = clock.elapsed().as_secs_f64() - in_sink;
-    Ok(Viewed { seconds, splat: format!("table-{radius}"), stated_error: None, certified: None })
+    Ok(Viewed { seconds, splat: format!("table-{radius}"), stated_error: None })
 }

@@ -85,8 +85,10 @@ pub(super) struct Rendered {
     pub(super) stated_splat_error: Option<f64>,
     /// Of the first view.
     pub(super) error: ImageError,
-    /// The largest error that the renderer certifies for any pixel of the first view, as a share of the value range.
+    /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
     pub(super) certified_error: Option<f64>,
+    /// Compared pixels that are further off than certified.
+    pub(super) beyond_certificate: usize,
 }
 
 /// What a process answers.

@@ -22,7 +22,7 @@ pub(super) struct Truth {
     /// Frame by frame, pixel by pixel.
     means: Vec<f64>,
     /// Highest less lowest value of the archive.
-    pub(super) range: f64,
+    range: f64,
 }
 
 /// Errors of pictures as shares of the value range.
@@ -61,6 +61,13 @@ impl Truth {
         let difference = |(pixel, mean): (&usize, &f64)| (f64::from(picture[*pixel]) - mean).abs() / self.range;
         let finite = |d: f64| if d.is_nan() { f64::INFINITY } else { d };
         self.pixels.iter().zip(means).map(difference).map(finite).collect()
+    }
+
+    /// What a picture of errors says of the compared pixels; none where the frame is not compared.
+    pub(super) fn at_pixels(&self, frame: usize, errors: &[f32]) -> Vec<f64> {
+        let compared = self.frames.contains(&frame);
+        let at = |pixel: &usize| f64::from(errors[*pixel]) / self.range;
+        self.pixels.iter().filter(|_| compared).map(at).collect()
     }
 
     /// The error over all differences.
