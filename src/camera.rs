@@ -112,6 +112,7 @@ fn axes(view: &View) -> [[f64; 3]; 3] {
 
 /// Sine and cosine, exact at multiples of 90 degrees.
 fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+    let degrees = degrees % 360.0;
     let turns = (degrees / 90.0).round();
     let (s, c) = libm::sincos((degrees - turns * 90.0).to_radians());
     match turns.rem_euclid(4.0) as u8 {

@@ -41,8 +41,8 @@
 //!
 //! # Who may call whom
 //!
-//! `bin, cli, tools -> convert | render | extract | verify -> source, scan, codec, file, camera, footprint
-//! -> wavelet, bound, sample, volume, mapped, output, error -> format`. A test reads the sources and holds this.
+//! `bin, cli, tools -> convert | render | extract | verify | report -> source, scan, codec, file, camera, footprint
+//! -> wavelet, bound, sample, volume, mapped, npy, output, error -> format`. A test reads the sources and holds this.
 //!
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.

@@ -2,7 +2,8 @@
 
 use super::RenderConfig;
 use super::reading::{Allowance, Kept};
-use super::scene::{Contents, FrameBounds, Group, Layout, Order, SampleErrors, Scene, Terms};
+use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
+use super::terms::{Layout, Order, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::error::Result;

@@ -2,8 +2,9 @@
 
 use super::Quantity;
 use super::certificate::Certificate;
-use super::scene::{Group, Layout};
+use super::scene::Group;
 use super::splat::Tile;
+use super::terms::Layout;
 use super::weights::Weights;
 use crate::wavelet::{LANES, Lane};
 

@@ -1,7 +1,8 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
 use super::RenderConfig;
-use super::scene::{Contents, FrameBounds, Group, Layout, Order, SampleErrors, Scene, Terms};
+use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
+use super::terms::{Layout, Order, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};

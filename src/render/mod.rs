@@ -19,6 +19,7 @@ mod reading;
 mod scene;
 pub mod sink;
 mod splat;
+mod terms;
 mod weights;
 
 pub use coefficients::{CoefficientScene, What};
@@ -34,11 +35,12 @@ use certificate::Certificate;
 use finish::Finish;
 use plan::Budget;
 use rayon::prelude::*;
-use scene::{Contents, Group, Layout, Terms};
+use scene::{Contents, Group};
 use serde::Serialize;
 use splat::{Splats, Tile, overlap, rows_reached};
 use std::ops::Range;
 use std::time::{Duration, Instant};
+use terms::{Layout, Terms};
 use weights::Weights;
 
 /// What a pixel means (method.md section 2).

@@ -3,8 +3,9 @@
 //! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
 
 use super::RenderConfig;
-use super::scene::{Layout, Scene};
+use super::scene::Scene;
 use super::splat::TILE;
+use super::terms::Layout;
 use crate::error::{Error, Result};
 use crate::memory;
 use std::ops::Range;

@@ -3,7 +3,7 @@
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.
 
-use super::scene::Terms;
+use super::terms::Terms;
 use crate::camera::Camera;
 use crate::footprint::Footprint;
 use crate::volume::{Grid, Region};

@@ -2,8 +2,8 @@
 
 use super::certificate;
 use super::plan::Budget;
-use super::scene::{Layout, Terms};
 use super::splat::{Order, Tile};
+use super::terms::{Layout, Terms};
 use super::{Eye, Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
 use crate::footprint::{Footprint, Method};

@@ -52,9 +52,13 @@ fn order(points: &[Point]) -> Vec<String> {
     wrong
 }
 
-/// Whether two points differ in tolerance alone.
+/// Whether two points differ in tolerance alone. A sampled bound may be so tight that blocks are stored exactly, which
+/// can be smaller.
 fn alike(a: &Point, b: &Point) -> bool {
-    a.sweep == "tolerance" && b.sweep == a.sweep && (&a.kind, &a.method, &a.bound) == (&b.kind, &b.method, &b.bound)
+    a.bound.as_deref() != Some("sampled")
+        && a.sweep == "tolerance"
+        && b.sweep == a.sweep
+        && (&a.kind, &a.method, &a.bound) == (&b.kind, &b.method, &b.bound)
 }
 
 /// Whether a larger tolerance keeps no more. Blocks that are stored exactly have no coefficients, so that a smaller
