@@ -46,8 +46,10 @@ impl PromiseReport {
 
 fn words(bound: Bound, tolerance: f64, (lo, hi): (f64, f64)) -> String {
     match bound {
-        Bound::Pointwise => format!("the error of every sample <= {tolerance:e} x ({lo:.4e} to {hi:.4e})"),
-        Bound::Rms => format!("the rms error of every voxel in every window <= {tolerance:e} x ({lo:.4e} to {hi:.4e})"),
+        Bound::Pointwise => format!("the error of every sample <= {tolerance:e} x range ({lo:.4e} to {hi:.4e})"),
+        Bound::Rms => {
+            format!("the rms error of every voxel in every window <= {tolerance:e} x range ({lo:.4e} to {hi:.4e})")
+        }
         Bound::Relative { floor: 0.0 } => format!("the error of every sample v <= {tolerance:e} x |v|"),
         Bound::Relative { floor } => format!("the error of every sample v <= {tolerance:e} x max(|v|, {floor:e})"),
         Bound::Sampled { samples, seed } => format!(

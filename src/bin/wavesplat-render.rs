@@ -77,11 +77,12 @@ struct Cli {
     /// [default: a tenth of --tolerance or the file's tolerance; 1e-4 for frames]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
-    /// Read and splat less, so that samples may be this share of the range off: no less than the file itself is
+    /// Read and splat less, so that samples may be this share of the range off: no less than the file's largest sample error
     #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = "Error")]
     tolerance: Option<f64>,
     /// Write pictures of the certified error as well: no pixel is further than this from the picture of the source's
-    /// samples, splatted without a cut (a file or pattern as for -o; .npy in units of --quantity)
+    /// samples, splatted without a cut (a file or pattern as for -o; .npy in units of --quantity, colours from 0 to the
+    /// largest of small pictures)
     #[arg(long, value_name = "OUT", help_heading = "Error")]
     error_image: Option<PathBuf>,
     /// What a pixel means
@@ -151,6 +152,9 @@ impl Cli {
         errors.map_or(Ok(()), Sink::finish)?;
         sink.finish()?;
         self.common.detail(summary(&report));
+        if let Some(error) = report.certified_error {
+            self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
+        }
         self.common.report(&report, self.output == Path::new(STANDARD))
     }
 
@@ -314,10 +318,9 @@ impl Ranges {
 fn summary(r: &RenderReport) -> String {
     let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
     let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
-    let error = r.certified_error.map_or(String::new(), |e| format!("; no pixel is off by more than {e:.4e}"));
     format!(
         "{} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
-         {} coefficients, {} left out{error}",
+         {} coefficients, {} left out",
         r.frames, r.method, r.seconds, r.coefficients, r.left_out.coefficients
     )
 }

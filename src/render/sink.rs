@@ -72,6 +72,9 @@ impl Sink {
             let names = Numbered::new(path, config.frames.len())?;
             config.frames.iter().try_for_each(|frame| Output::check(&names.of(*frame), config.force))?;
             Target::Many(names)
+        } else if path != Path::new(STANDARD) && Numbered::new(path, 1)?.digits.is_some() {
+            let what = format!("{}: a pattern numbers .png files; other formats hold all frames", path.display());
+            return Err(Error::usage(what));
         } else {
             Target::One { out: Box::new(Output::create(path, config.force)?), begun: false }
         };

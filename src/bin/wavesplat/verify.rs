@@ -84,9 +84,9 @@ fn summary(r: &VerifyReport, promise: &PromiseReport) -> String {
     if let Some(c) = &r.against {
         let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
-            "{} bound {held}: largest error {:.4e} ({:.4} of the bound used), rms error {:.4e}, {} missing samples as they were, \
+            "{} bound {held}: {:.4} of it used; largest sample error {:.4e}, rms error {:.4e}, {} missing samples as they were, \
              {} samples compared{estimate}\n",
-            promise.bound, c.largest_error, c.largest_share_of_bound, c.rms_error, c.missing, c.samples
+            promise.bound, c.largest_share_of_bound, c.largest_error, c.rms_error, c.missing, c.samples
         );
     }
     text
