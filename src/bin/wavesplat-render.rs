@@ -167,9 +167,10 @@ impl Cli {
             return Err(Error::usage(NOT_ITS_OWN));
         }
         let coloured_array = self.colormap.is_some();
-        let needed = (format != PictureFormat::Npy || coloured_array) && self.range.is_none()
-            || of_errors.is_some_and(|(_, format)| format != PictureFormat::Npy);
-        let seen = if needed { Ranges::of(scene, config)? } else { Ranges::default() };
+        let certify = of_errors.is_some_and(|(_, format)| format != PictureFormat::Npy);
+        let needed = (format != PictureFormat::Npy || coloured_array) && self.range.is_none() || certify;
+        let looking = RenderConfig { certify, ..config.clone() };
+        let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
@@ -291,10 +292,9 @@ impl Default for Ranges {
 impl Ranges {
     /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
     /// they show nothing; errors begin at 0.
-    fn of(scene: &mut dyn Scene, config: &RenderConfig) -> Result<Self> {
+    fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
         const PIXELS: f64 = 64.0;
         const FRAMES: usize = 16;
-        let mut small = config.clone();
         let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
         small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
         small.view.scale = small.view.scale.map(|s| s * shrink);

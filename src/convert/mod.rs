@@ -75,6 +75,26 @@ pub struct ConvertConfig {
     pub settings: Vec<(String, String)>,
 }
 
+impl ConvertConfig {
+    /// Pointwise within a share of the range; missing samples refused, and all else as the program has it by default.
+    pub fn new(basis: Basis, window: usize, tolerance: f64, memory: usize) -> Self {
+        Self {
+            basis,
+            window,
+            tolerance,
+            bound: Bound::Pointwise,
+            range: None,
+            missing: MissingPolicy::Error,
+            missing_value: None,
+            block: None,
+            level: 3,
+            memory,
+            reserved: 0,
+            settings: Vec::new(),
+        }
+    }
+}
+
 /// What a conversion did.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConvertReport {

@@ -12,7 +12,6 @@ use memory::Memory;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tempfile::TempDir;
-use wavesplat::bound::Bound;
 use wavesplat::camera::View;
 use wavesplat::codec::encode::Encoder;
 use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
@@ -32,20 +31,8 @@ pub(crate) const MEMORY: usize = 256 << 20;
 
 /// Pointwise, missing samples kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
-    ConvertConfig {
-        basis,
-        window,
-        tolerance,
-        bound: Bound::Pointwise,
-        range: None,
-        missing: MissingPolicy::Mask,
-        missing_value: None,
-        block: None,
-        level: 1,
-        memory: MEMORY,
-        reserved: 0,
-        settings: Vec::new(),
-    }
+    let plain = ConvertConfig::new(basis, window, tolerance, MEMORY);
+    ConvertConfig { missing: MissingPolicy::Mask, level: 1, ..plain }
 }
 
 /// A coefficient file in a folder of its own.

@@ -6,9 +6,8 @@ use crate::sheet::{Image, contact_sheet, difference_images};
 use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use wavesplat::bound::Bound;
 use wavesplat::camera::View;
-use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
+use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
@@ -102,20 +101,7 @@ fn conventional(files: &Files) -> Result<Run> {
 
 fn by_coefficients(files: &Files, name: &'static str, basis: Basis, window: usize) -> Result<Run> {
     let path = files.folder.join(format!("{}.wspl", name.to_lowercase()));
-    let config = ConvertConfig {
-        basis,
-        window,
-        tolerance: TOLERANCE,
-        bound: Bound::Pointwise,
-        range: None,
-        missing: MissingPolicy::Error,
-        missing_value: None,
-        block: None,
-        level: 3,
-        memory: MEMORY,
-        reserved: 0,
-        settings: Vec::new(),
-    };
+    let config = ConvertConfig::new(basis, window, TOLERANCE, MEMORY);
     let mut out = Output::create(&path, true)?;
     let report = convert(open_frames(files)?.as_mut(), &config, &path, &mut out, &Silent)?;
     out.commit()?;

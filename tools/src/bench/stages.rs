@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Instant;
-use wavesplat::convert::{ConvertConfig, MissingPolicy};
+use wavesplat::convert::ConvertConfig;
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
@@ -34,20 +34,8 @@ pub(super) fn convert(step: &Convert) -> Result<Converted> {
     let unknown = || Error::usage(format!("bench-step: there is no {} or no {}", step.basis, step.bound));
     let basis = BASES.iter().find(|b| b.name == step.basis).ok_or_else(unknown)?;
     let bound = BOUNDS.iter().find(|b| b.name == step.bound).ok_or_else(unknown)?;
-    let config = ConvertConfig {
-        basis: basis.basis,
-        window: basis.window,
-        tolerance: step.tolerance,
-        bound: bound.bound,
-        range: None,
-        missing: MissingPolicy::Error,
-        missing_value: None,
-        block: None,
-        level: 3,
-        memory: MEMORY,
-        reserved: 0,
-        settings: Vec::new(),
-    };
+    let plain = ConvertConfig::new(basis.basis, basis.window, step.tolerance, MEMORY);
+    let config = ConvertConfig { bound: bound.bound, ..plain };
     let clock = Instant::now();
     let mut frames = open_frames(&step.frames, step.count)?;
     let mut out = Output::create(&step.output, true)?;
