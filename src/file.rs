@@ -122,8 +122,8 @@ impl CoefficientFile {
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
-        let voxels = self.blocks.region(entry.id.block as usize).voxels();
-        Block::read(&self.reader, codec, entry, voxels, wanted).map_err(|e| self.failed(e))
+        let size = self.blocks.region(entry.id.block as usize).dims();
+        Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
     /// Checks that every byte of the file outside the parts is accounted for.

@@ -47,7 +47,7 @@
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
 //! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`) are pure functions over slices: no
-//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`,
+//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`,
 //!    `extract.rs` and `verify.rs`.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.

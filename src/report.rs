@@ -1,6 +1,7 @@
 //! What a coefficient file promises and what it reached, in numbers and words, for `convert` and `info`.
 
 use crate::bound::Bound;
+use crate::codec::scheme::Scheme;
 use serde::Serialize;
 use wavesplat_format::Window;
 
@@ -68,6 +69,8 @@ pub struct WindowReport {
     pub frames: u32,
     /// The transform along time.
     pub basis: String,
+    /// The whole scheme in words.
+    pub scheme: String,
     /// Coefficients of one voxel.
     pub coefficients_per_voxel: u32,
     /// The largest error, or root mean square of a series, that the bound allows.
@@ -97,7 +100,8 @@ impl WindowReport {
         Self {
             first_frame: w.first_frame,
             frames: w.frames,
-            basis: format!("{:?}", w.basis).to_lowercase(),
+            basis: w.basis.name().into(),
+            scheme: Scheme::of_window(w).name(),
             coefficients_per_voxel: w.coefficients,
             promised: w.delta,
             reached: w.reached,
@@ -113,7 +117,7 @@ impl WindowReport {
 
     /// One line: what was promised and reached in the bound's own measure, and the errors of samples.
     pub fn line(&self, bound: Bound, tolerance: f64) -> String {
-        let Self { first_frame, basis, promised, reached, share, rms, .. } = self;
+        let Self { first_frame, scheme, promised, reached, share, rms, .. } = self;
         let end = first_frame + u64::from(self.frames);
         let (measure, kind, promised) = match bound {
             Bound::Pointwise => ("error", "promised", *promised),
@@ -122,7 +126,7 @@ impl WindowReport {
             Bound::Sampled { .. } => ("rms of a series", "estimated", *promised),
         };
         format!(
-            "frames {first_frame}..{end} {basis}: {measure} {kind} {promised:.4e}, reached {:.4e}; largest sample error \
+            "frames {first_frame}..{end} {scheme}: {measure} {kind} {promised:.4e}, reached {:.4e}; largest sample error \
              {reached:.4e}, rms of all {rms:.4e}",
             share * promised
         )

@@ -182,9 +182,7 @@ fn check_block(
 fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
     for part in &entry.parts {
         let PartKind::Level(level) = part.kind else { continue };
-        let range = &codec.parts[usize::from(level)];
-        let codes = &block.codes[range.start * block.voxels..range.end * block.voxels];
-        let largest = codes.iter().map(|c| (f64::from(*c) * block.step).abs()).fold(0.0, f64::max);
+        let largest = block.largest(codec, level.into());
         if largest > part.stats.largest {
             let what =
                 format!("{} holds {largest:e}, larger than the directory says: {:e}", entry.id, part.stats.largest);

@@ -155,7 +155,7 @@ fn in_levels(bound: Bound) -> Trial {
 fn added(trial: &Trial, allowed: f64) -> Vec<Vec<f64>> {
     let file = trial.file.open();
     let codec = file.codec(0).unwrap();
-    let gain = |part: usize, t: usize| codec.parts[part].clone().map(|k| codec.synthesis[k][t].abs()).sum::<f64>();
+    let gain = |part: usize, t: usize| codec.levels[part].clone().map(|k| codec.synthesis[k][t].abs()).sum::<f64>();
     let most = |part: usize| (0..codec.frames()).map(|t| gain(part, t)).fold(0.0, f64::max);
     let of_block = |entry: BlockEntry| {
         let stats = entry.stats;

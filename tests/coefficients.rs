@@ -4,7 +4,7 @@ use crate::common::memory::Memory;
 use crate::common::random::Random;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
-use crate::common::{Stored, direct, looking, pictures, settings, stored};
+use crate::common::{Stored, direct, looking, pictures, settings, stored, windows};
 use crate::images::{bits, under_less_memory};
 use wavesplat::bound::Bound;
 use wavesplat::camera::View;
@@ -102,6 +102,20 @@ pub(crate) fn doubles() -> Vec<Trial> {
         Trial::new("multi, outliers", near_the_missing_value(grid), declared(multi(0.02))),
         Trial::new("flat", archive(grid, SampleType::F64, &vec![0.1; FRAMES * 315]), haar(0.02)),
         Trial::new("one frame", archive(grid, SampleType::F64, &field(&grid, 1, 2)), haar(0.1)),
+        Trial::new("pyramid", plain(), settings(Basis::Samples, 10, 0.02)),
+        Trial::new("pyramid, fine", plain(), settings(Basis::Samples, 32, 1e-6)),
+        Trial::new("pyramid, rms", plain(), rms(Basis::Samples, 8)),
+        Trial::new("pyramid, masked", masked(grid), settings(Basis::Samples, 8, 0.01)),
+        Trial::new("pyramid, hard", hard(grid), settings(Basis::Samples, 8, HARD)),
+        Trial::new("pyramid, outliers", near_the_missing_value(grid), declared(settings(Basis::Samples, 8, 0.02))),
+        Trial::new(
+            "pyramid, one frame",
+            archive(grid, SampleType::F64, &field(&grid, 1, 2)),
+            settings(Basis::Samples, 4, 0.1),
+        ),
+        Trial::new("learned", plain(), settings(Basis::Learned, 10, 0.02)),
+        Trial::new("learned, rms", plain(), rms(Basis::Learned, 32)),
+        Trial::new("learned, masked", masked(grid), settings(Basis::Learned, 8, 0.01)),
         Trial::new("one frame, multi", archive(grid, SampleType::F64, &field(&grid, 1, 2)), multi(0.1)),
     ]
 }
@@ -195,8 +209,7 @@ fn pictures_of_any_type_are_within_the_bound() {
         for (m, kind) in [Kind::Noise, Kind::Wave, Kind::Flash, Kind::Ramp, Kind::SignedZero].into_iter().enumerate() {
             let mask = if ty.is_float() { Mask::Special } else { Mask::Declared(3.0) };
             let samples = volume(kind, ty, mask, grid.whole().voxels(), 12, (10 * n + m) as u64);
-            let basis = if (n + m) % 2 == 0 { Basis::Haar } else { Basis::Multi };
-            let window = if basis == Basis::Haar { 8 } else { 9 };
+            let (basis, window) = windows(8)[(n + m) % 4];
             let missing_value = if let Mask::Declared(value) = mask { Some(value) } else { None };
             let config = ConvertConfig { missing_value, ..settings(basis, window, [0.003, 0.05, 0.2][m % 3]) };
             check_within_the_bound(&Trial::new("types", Memory::new(grid, ty, samples), config), None);
@@ -230,8 +243,8 @@ fn memory_changes_no_bit_of_a_picture_from_coefficients() {
             let missing = |i: usize| i.is_multiple_of(3) || i % 5760 < 900;
             samples.iter_mut().enumerate().filter(|(i, _)| missing(*i)).for_each(|(_, v)| *v = f64::NAN);
         }
-        for basis in [Basis::Haar, Basis::Multi] {
-            let config = settings(basis, if basis == Basis::Haar { 8 } else { 9 }, 0.01);
+        for (basis, window) in windows(8) {
+            let config = settings(basis, window, 0.01);
             let trial = Trial::new("memory", archive(grid, SampleType::F64, &samples), config);
             let config = looking(view(30.0, 25.0, [200, 150]), 0.05, Quantity::Mean, &grid, FRAMES);
             let mut scene = CoefficientScene::new(trial.file.open(), What::Coefficients);

@@ -3,7 +3,7 @@
 use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::view;
-use crate::common::{direct, extracted, looking, pictures, settings, stored};
+use crate::common::{BASES, direct, extracted, looking, pictures, settings, stored};
 use crate::images::bits;
 use std::path::Path;
 use std::process::Command;
@@ -32,7 +32,8 @@ fn under<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 
 #[test]
 fn threads_change_no_byte_and_no_pixel() {
-    for (basis, mask) in [(Basis::Haar, Mask::None), (Basis::Multi, Mask::Special)] {
+    let masks = [Mask::None, Mask::Special, Mask::None, Mask::Special];
+    for (basis, mask) in BASES.into_iter().zip(masks) {
         let run = |threads| {
             under(threads, || {
                 let memory = memory(mask);

@@ -21,7 +21,16 @@ const HOMES: [(&str, &[&str]); 12] = [
     ("crossbeam::", &["convert/"]),
     (
         "rayon::",
-        &["convert/mod.rs", "convert/sampled.rs", "scan.rs", "render/mod.rs", "extract.rs", "verify.rs", "cli/mod.rs"],
+        &[
+            "convert/mod.rs",
+            "convert/choose.rs",
+            "convert/sampled.rs",
+            "scan.rs",
+            "render/mod.rs",
+            "extract.rs",
+            "verify.rs",
+            "cli/mod.rs",
+        ],
     ),
     ("clap::", &["cli/", "bin/"]),
     ("indicatif::", &["cli/"]),

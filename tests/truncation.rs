@@ -63,7 +63,7 @@ fn compare(kind: &str, frames: usize, config: &ConvertConfig, analysis: &Matrix,
     let values = archive(kind, frames);
     let measure = if config.bound == Bound::Rms { Measure::Rms } else { Measure::Largest };
     let (found, delta) = kept(&values, config);
-    let exact = config.basis == Basis::Haar && config.bound == Bound::Rms;
+    let exact = config.coding.basis == Some(Basis::Haar) && config.bound == Bound::Rms;
     let (mut ours, mut best) = (0, 0);
     for (voxel, count) in found.into_iter().enumerate() {
         let series: Vec<f64> = values.iter().skip(voxel).step_by(VOXELS).copied().collect();

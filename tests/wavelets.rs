@@ -57,7 +57,7 @@ fn haar_is_the_reference_matrix_for_every_length() {
     let mut random = Random(1);
     for n in 1..=70 {
         let analysis = haar_matrix(n);
-        check(basis(Basis::Haar, n).as_ref(), &analysis, &transpose(&analysis), &mut random);
+        check(basis(Basis::Haar, &[], n).as_ref(), &analysis, &transpose(&analysis), &mut random);
     }
 }
 
@@ -66,7 +66,7 @@ fn multi_is_the_reference_matrix_times_root_two_on_the_continued_series() {
     let mut random = Random(2);
     let mut whole = Vec::new();
     for n in 1..=70 {
-        let multi = basis(Basis::Multi, n);
+        let multi = basis(Basis::Multi, &[], n);
         let unscaled = ghm_matrix((multi.coefficients() - 1) / 2);
         let times = |m: &Matrix, by: f64| m.iter().map(|r| r.iter().map(|v| v * by).collect()).collect::<Matrix>();
         let root = std::f64::consts::SQRT_2;
@@ -82,9 +82,9 @@ fn multi_is_the_reference_matrix_times_root_two_on_the_continued_series() {
 fn levels_are_those_of_the_reference_order() {
     for p in 1..=5 {
         let n = (1 << p) + 1;
-        let levels = basis(Basis::Multi, n).levels();
+        let levels = basis(Basis::Multi, &[], n).levels();
         assert_eq!(levels, std::iter::once(3).chain((1..p).map(|l| 1 << l)).collect::<Vec<_>>(), "{n} frames");
     }
-    assert_eq!(basis(Basis::Haar, 5).levels(), [1, 1, 1, 2]);
-    assert_eq!(basis(Basis::Haar, 8).levels(), [1, 1, 2, 4]);
+    assert_eq!(basis(Basis::Haar, &[], 5).levels(), [1, 1, 1, 2]);
+    assert_eq!(basis(Basis::Haar, &[], 8).levels(), [1, 1, 2, 4]);
 }

@@ -2,31 +2,56 @@
 
 use crate::block::PartKind;
 use crate::bytes::{Check, ensure};
+use crate::cells::max_packed;
 use crate::directory::PartEntry;
+use crate::metadata::Window;
 use crate::planes::bitmap_len;
+use crate::pyramid::Pyramid;
 
 /// The sizes of one block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockGeometry<'a> {
-    /// Voxels of its box, clipped at the volume's far faces.
-    pub voxels: usize,
-    /// Frames of its window.
-    pub frames: usize,
-    /// Coefficients of one voxel in each level part, coarse to fine.
-    pub levels: &'a [u32],
+    /// Voxels of its box along x, y, z, clipped at the volume's far faces.
+    pub size: [usize; 3],
+    /// Its window.
+    pub window: &'a Window,
     /// Bytes of one sample.
     pub sample_size: usize,
 }
 
 impl BlockGeometry<'_> {
+    /// Voxels of its box.
+    pub fn voxels(&self) -> usize {
+        self.size.iter().product()
+    }
+
     /// Frames x voxels.
     pub fn samples(&self) -> usize {
-        self.frames.saturating_mul(self.voxels)
+        (self.window.frames as usize).saturating_mul(self.voxels())
+    }
+
+    /// Level parts that a block can have.
+    pub fn levels(&self) -> u8 {
+        match &self.window.pyramid {
+            Some(_) => Pyramid::PARTS,
+            None => self.window.levels.len() as u8,
+        }
     }
 
     /// Codes in the part of a level; none for a level that the window lacks.
     pub fn codes(&self, level: u8) -> Option<usize> {
-        self.levels.get(usize::from(level)).map(|&k| (k as usize).saturating_mul(self.voxels))
+        match &self.window.pyramid {
+            Some(_) => (level < Pyramid::PARTS).then(|| self.boxes(level).iter().map(box_len).sum()),
+            None => self.window.levels.get(usize::from(level)).map(|&k| (k as usize).saturating_mul(self.voxels())),
+        }
+    }
+
+    /// The nodes that the passes of a pyramid add in the part of a level, along x, y, z, k.
+    pub(crate) fn boxes(&self, level: u8) -> Vec<[usize; 4]> {
+        let Some(pyramid) = &self.window.pyramid else { return Vec::new() };
+        let [x, y, z] = self.size;
+        let shape = [x, y, z, self.window.coefficients as usize];
+        pyramid.passes(shape).iter().filter(|pass| pass.part == level).map(|pass| pass.extent(shape)).collect()
     }
 
     /// The largest `count` of a part.
@@ -52,20 +77,30 @@ impl BlockGeometry<'_> {
 
     /// The largest possible payload of a part before compression, in bytes.
     pub fn max_raw_len(&self, kind: PartKind) -> u64 {
-        self.raw_len(kind, self.max_count(kind), 4)
+        match kind {
+            PartKind::Level(level) if self.window.pyramid.is_some() => max_packed(&self.boxes(level)) as u64,
+            _ => self.raw_len(kind, self.max_count(kind), 4),
+        }
     }
 
     /// Whether a part can have its count and its length here.
     pub(crate) fn check(&self, part: &PartEntry) -> Check {
         let (kind, count, raw_len) = (part.kind, part.stats.count, u64::from(part.raw_len));
         if let PartKind::Level(level) = kind {
-            ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.levels.len()))?;
+            ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.levels()))?;
         }
         let most = self.max_count(kind);
         let least = if kind == PartKind::Exact { most } else { 1 };
         ensure((least..=most).contains(&count), || format!("{kind}: a count of {count}, at most {most}"))?;
-        let widths = if matches!(kind, PartKind::Level(_)) { 1..=4 } else { 1..=1 };
-        let possible = widths.into_iter().any(|width| self.raw_len(kind, count, width) == raw_len);
+        let possible = match kind {
+            PartKind::Level(_) if self.window.pyramid.is_some() => raw_len <= self.max_raw_len(kind),
+            PartKind::Level(_) => (1..=4).any(|width| self.raw_len(kind, count, width) == raw_len),
+            _ => self.raw_len(kind, count, 1) == raw_len,
+        };
         ensure(possible, || format!("{kind}: {raw_len} bytes do not fit a count of {count}"))
     }
+}
+
+fn box_len(extent: &[usize; 4]) -> usize {
+    extent.iter().product()
 }

@@ -6,6 +6,7 @@
 
 mod block;
 mod bytes;
+mod cells;
 mod directory;
 mod error;
 mod footer;
@@ -16,6 +17,7 @@ pub mod limits;
 mod metadata;
 pub mod payload;
 mod planes;
+mod pyramid;
 mod reader;
 mod sample;
 mod section;
@@ -27,6 +29,7 @@ mod tests;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
+pub use cells::{max_packed, pack_cells, unpack_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use geometry::BlockGeometry;
@@ -37,6 +40,7 @@ pub use payload::{
     Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,
     unpack_outliers,
 };
+pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
 pub use sample::SampleType;
 pub use writer::{Summary, Writer};

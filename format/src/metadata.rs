@@ -6,7 +6,7 @@
 use crate::bytes::{Check, ensure};
 use crate::directory::{finite_amount, is_amount, is_range};
 use crate::limits::*;
-use crate::{BlockGeometry, BlockId, Error, Result, SampleType};
+use crate::{BlockGeometry, BlockId, Error, Pyramid, Result, SampleType};
 use bincode::{Decode, Encode, config};
 
 /// Fixed-width little-endian integers, nothing larger than the limit.
@@ -62,6 +62,22 @@ pub enum Basis {
     Haar,
     /// The multiwavelet of Geronimo, Hardin and Massopust.
     Multi,
+    /// None: the samples themselves.
+    Samples,
+    /// Orthonormal functions that suit the window's own series, then Haar functions that complete them.
+    Learned,
+}
+
+impl Basis {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Haar => "haar",
+            Self::Multi => "multi",
+            Self::Samples => "samples",
+            Self::Learned => "learned",
+        }
+    }
 }
 
 /// A run of frames that is coded together.
@@ -75,8 +91,12 @@ pub struct Window {
     pub basis: Basis,
     /// Coefficients of one voxel; may exceed `frames`.
     pub coefficients: u32,
-    /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`.
+    /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`. Empty with a pyramid.
     pub levels: Vec<u32>,
+    /// Of a learned basis: the learned functions, `frames` values each, in units of 2^-15; else empty.
+    pub functions: Vec<i16>,
+    /// How coefficients are refined in space, or samples in space and time.
+    pub pyramid: Option<Pyramid>,
     /// The largest error that the bound allows in this window, in units of the samples.
     pub delta: f64,
     /// Largest error of a sample, rounded up; at least that of every block.
@@ -252,9 +272,8 @@ impl Metadata {
     pub fn geometry(&self, id: BlockId) -> Option<BlockGeometry<'_>> {
         let window = self.windows.get(id.window as usize).filter(|_| id.channel < self.channels)?;
         let (_, size) = self.block_box(id.block)?;
-        let voxels = usize::try_from(size.iter().product::<u64>()).ok()?;
-        let (frames, levels, sample_size) = (window.frames as usize, &window.levels, self.sample.size());
-        Some(BlockGeometry { voxels, frames, levels, sample_size })
+        usize::try_from(size.iter().product::<u64>()).ok()?;
+        Some(BlockGeometry { size: size.map(|n| n as usize), window, sample_size: self.sample.size() })
     }
 }
 
@@ -266,9 +285,7 @@ impl Window {
         ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
         let samples = voxels.saturating_mul(frames.max(coefficients).into());
         ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples}, at most {MAX_BLOCK_SAMPLES} samples"))?;
-        let levels = (1..=MAX_LEVELS).contains(&self.levels.len()) && !self.levels.contains(&0);
-        let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
-        ensure(levels && sum == coefficients.into(), || format!("{coefficients} coefficients in levels of {sum}"))?;
+        self.check_coding()?;
         let counted = voxels_in_all.saturating_mul(frames.into());
         let coded = voxels_in_all.saturating_mul(coefficients.into());
         let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
@@ -276,6 +293,22 @@ impl Window {
         let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
         ensure(errors && is_range(self.min, self.max), || "an error or value range out of range".into())?;
         ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
+    }
+
+    fn check_coding(&self) -> Check {
+        let Self { frames, coefficients, .. } = *self;
+        let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
+        let levels = match self.pyramid {
+            Some(_) => self.levels.is_empty(),
+            None => (1..=MAX_LEVELS).contains(&self.levels.len()) && !self.levels.contains(&0),
+        };
+        let levels = levels && (self.pyramid.is_some() || sum == coefficients.into());
+        ensure(levels, || format!("{coefficients} coefficients in levels of {sum}"))?;
+        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.check(self.basis == Basis::Samples))?;
+        let (functions, frames) = (self.functions.len(), frames as usize);
+        let learned = functions.is_multiple_of(frames) && functions / frames <= frames;
+        let fits = if self.basis == Basis::Learned { learned } else { functions == 0 };
+        ensure(fits, || format!("functions of {functions} values for {frames} frames"))
     }
 }
 

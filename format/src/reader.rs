@@ -3,6 +3,7 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{Check, Fields, ensure};
+use crate::cells::unpack_cells;
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
 use crate::footer::{FOOTER, Footer};
 use crate::geometry::BlockGeometry;
@@ -122,10 +123,12 @@ impl<S: Storage> Reader<S> {
         decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
     }
 
-    /// Fills `codes[k * voxels + voxel]` with the codes of a level; all zero where the block lacks the part.
+    /// Fills `codes[k * voxels + voxel]`, or with a pyramid pass after pass, with the codes of a level; all zero where the
+    /// block lacks the part.
     /// [`Error::Invalid`] for a level that the window lacks, or a slice of another length than its codes.
     pub fn codes(&self, block: &BlockEntry, level: u8, codes: &mut [i32]) -> Result<()> {
-        if self.geometry(block.id)?.codes(level) != Some(codes.len()) {
+        let geometry = self.geometry(block.id)?;
+        if geometry.codes(level) != Some(codes.len()) {
             return Err(Error::Invalid(format!("{}: no level {level} of {} codes", block.id, codes.len())));
         }
         let Some(part) = block.part(PartKind::Level(level)) else {
@@ -133,7 +136,11 @@ impl<S: Storage> Reader<S> {
             return Ok(());
         };
         let raw = self.part(block, part)?;
-        unpacked(block, part, unpack_codes(&raw, codes), |&count| count).map(|_| ())
+        let found = match &geometry.window.pyramid {
+            Some(_) => unpack_cells(&raw, &geometry.boxes(level), codes),
+            None => unpack_codes(&raw, codes),
+        };
+        unpacked(block, part, found, |&count| count).map(|_| ())
     }
 
     /// The outliers of a block; empty where it has none.

@@ -1,18 +1,21 @@
 //! A coded block back to samples: the one decoder of the project.
 
-use super::{WindowCodec, lane_groups, reconstruct};
+use super::field::Field;
+use super::{WindowCodec, lane_groups};
 use crate::sample;
 use crate::wavelet::{LANES, Lane};
-use wavesplat_format::{BlockEntry, Outliers, PartKind, Reader, Result, Storage};
+use wavesplat_format::{Basis, BlockEntry, Outliers, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
 pub struct Block {
+    /// Voxels of the block along x, y, z.
+    pub size: [usize; 3],
     /// Voxels of the block.
     pub voxels: usize,
-    /// A coefficient is its code times this.
+    /// What codes count.
     pub step: f64,
-    /// Codes, `k * voxels + voxel`; empty if no level part was read.
+    /// Codes, `k * voxels + voxel`, or with a pyramid pass after pass; empty if no level part was read.
     pub codes: Vec<i32>,
     /// Samples stored exactly because the coefficients miss them.
     pub outliers: Outliers,
@@ -30,11 +33,12 @@ impl Block {
         reader: &Reader<S>,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        voxels: usize,
+        size: [usize; 3],
         wanted: &[bool],
     ) -> Result<Self> {
         let mut block = Self {
-            voxels,
+            size,
+            voxels: size.iter().product(),
             step: entry.stats.step,
             codes: Vec::new(),
             outliers: reader.outliers(entry)?,
@@ -42,18 +46,31 @@ impl Block {
             exact: reader.exact(entry)?,
             bytes_read: 0,
         };
+        let ranges = codec.part_ranges(size);
         for part in &entry.parts {
             if let PartKind::Level(level) = part.kind {
-                let range = codec.parts[usize::from(level)].clone();
-                if !wanted[range.clone()].contains(&true) {
+                if !codec.needs_part(level.into(), wanted) {
                     continue;
                 }
-                block.codes.resize(codec.basis.coefficients() * voxels, 0);
-                reader.codes(entry, level, &mut block.codes[range.start * voxels..range.end * voxels])?;
+                block.codes.resize(codec.basis.coefficients() * block.voxels, 0);
+                reader.codes(entry, level, &mut block.codes[ranges[usize::from(level)].clone()])?;
             }
             block.bytes_read += u64::from(part.stored_len);
         }
         Ok(block)
+    }
+
+    /// What the codes give.
+    pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
+        Field::decode(codec, self.size, self.step, &self.codes)
+    }
+
+    /// The largest coefficient of a level part.
+    pub fn largest(&self, codec: &WindowCodec, level: usize) -> f64 {
+        let codes = &self.codes[codec.part_ranges(self.size)[level].clone()];
+        let of_run =
+            |(step, codes): &(f64, &[i32])| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * step).abs()));
+        codec.runs(self.size, self.step, level, codes).iter().map(of_run).fold(0.0, f64::max)
     }
 
     /// Whether a sample is missing.
@@ -63,28 +80,23 @@ impl Block {
 
     /// Calls `visit(first voxel, count, series)` for every group of voxels, with what the coefficients give:
     /// outliers and missing samples not yet in place.
-    pub fn for_each_group(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, usize, &[Lane])) {
+    pub fn for_each_group(&self, codec: &WindowCodec, field: &Field<'_>, mut visit: impl FnMut(usize, usize, &[Lane])) {
         let mut work = vec![Lane::default(); codec.basis.coefficients()];
         let mut series = vec![Lane::default(); codec.frames()];
-        for (first, count) in lane_groups(self.voxels) {
-            let code = |k: usize| {
-                let codes = &self.codes[k * self.voxels + first..][..count];
-                std::array::from_fn(|l| codes.get(l).copied().unwrap_or(0))
-            };
-            if !self.codes.is_empty() {
-                reconstruct(codec.basis.as_ref(), self.step, code, &mut work, &mut series);
+        for part in lane_groups(self.voxels) {
+            if !field.is_zero() {
+                field.series(codec.basis.as_ref(), self.voxels, part, &mut work, &mut series);
             }
-            visit(first, count, &series);
+            visit(part.0, part.1, &series);
         }
     }
 
     /// The series of one voxel as the coefficients give it.
-    pub fn series(&self, codec: &WindowCodec, voxel: usize) -> Vec<f64> {
+    pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
         let mut work = vec![Lane::default(); codec.basis.coefficients()];
         let mut series = vec![Lane::default(); codec.frames()];
-        let code = |k: usize| [self.codes[k * self.voxels + voxel]; LANES];
-        if !self.codes.is_empty() {
-            reconstruct(codec.basis.as_ref(), self.step, code, &mut work, &mut series);
+        if !field.is_zero() {
+            field.series(codec.basis.as_ref(), self.voxels, (voxel, 1), &mut work, &mut series);
         }
         series.iter().map(|lane| lane[0]).collect()
     }
@@ -115,8 +127,14 @@ impl Block {
             Some(exact) => exact.clone(),
             None => vec![0; codec.frames() * self.voxels * size],
         };
-        if self.exact.is_none() {
-            self.for_each_group(codec, |first, count, series| {
+        let field = self.field(codec);
+        if self.exact.is_none() && codec.scheme.basis == Basis::Samples {
+            field.for_each_run(out.len() / size, |at, values| {
+                visit(at, values);
+                sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
+            });
+        } else if self.exact.is_none() {
+            self.for_each_group(codec, &field, |first, count, series| {
                 for (frame, lane) in series.iter().enumerate() {
                     let (at, values) = (frame * self.voxels + first, &lane[..count.min(LANES)]);
                     visit(at, values);

@@ -4,20 +4,32 @@
 //! the one decoder that the encoder checks with, and that `extract`, `verify` and the renderer use. A scheme beyond a
 //! transform along time replaces this folder's use of [`crate::wavelet`] and nothing else.
 
+mod check;
 pub mod decode;
 pub mod encode;
+pub mod field;
+mod gain;
+mod load;
+mod pyramid;
+mod real;
+mod refine;
+pub mod scheme;
 mod truncate;
 mod weigh;
 
 use crate::bound::{Promise, difference_up};
 use crate::sample::{self, SampleType};
-use crate::wavelet::{self, LANES, Lane, TimeBasis};
+use crate::wavelet::{self, LANES, TimeBasis};
+use pyramid::Passes;
+use scheme::Scheme;
 use std::ops::Range;
-use wavesplat_format::{Metadata, Window};
+use wavesplat_format::{Metadata, Pyramid, Window};
 
 /// Everything that coding and decoding the blocks of one window share.
 #[derive(Debug)]
 pub struct WindowCodec {
+    /// How blocks are coded.
+    pub scheme: Scheme,
     /// The temporal basis.
     pub basis: Box<dyn TimeBasis>,
     /// The basis as numbers: `synthesis[k][t]` is u_k(t).
@@ -30,33 +42,92 @@ pub struct WindowCodec {
     pub promise: Promise,
     /// The sample that stands for "missing" besides NaN and infinities.
     pub missing_value: Option<f64>,
-    /// The coefficients in each level part of a block, coarse to fine.
-    pub parts: Vec<Range<usize>>,
+    /// Without a pyramid: the coefficients in each level part of a block, coarse to fine.
+    pub levels: Vec<Range<usize>>,
 }
 
 impl WindowCodec {
-    /// The codec of a window whose blocks are at most `edge` voxels a side.
-    pub fn new(basis: Box<dyn TimeBasis>, sample: SampleType, promise: Promise, edge: usize) -> Self {
+    /// The codec of a window of `frames` frames whose blocks are at most `edge` voxels a side.
+    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, promise: Promise, edge: usize) -> Self {
+        let basis = scheme.time_basis(frames);
+        let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
+        Self::with_levels(scheme, basis, sample, promise, &levels)
+    }
+
+    fn with_levels(
+        scheme: Scheme,
+        basis: Box<dyn TimeBasis>,
+        sample: SampleType,
+        promise: Promise,
+        levels: &[usize],
+    ) -> Self {
         let synthesis = wavelet::synthesis(basis.as_ref());
-        let parts = wavelet::ranges(&join_levels(&basis.levels(), edge));
         let gain = wavelet::gain(&synthesis);
-        Self { basis, synthesis, gain, sample, promise, missing_value: None, parts }
+        let levels = wavelet::ranges(levels);
+        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, levels }
     }
 
     /// The codec of a window as a coefficient file describes it; says what contradicts the basis.
     pub fn of_file(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
-        let basis = wavelet::basis(window.basis, window.frames as usize);
+        let scheme = Scheme::of_window(window);
+        let basis = scheme.time_basis(window.frames as usize);
         if basis.coefficients() != window.coefficients as usize {
             let what =
                 format!("{} coefficients for {} frames of {:?}", window.coefficients, window.frames, window.basis);
             return Err(wavesplat_format::Error::Invalid(what));
         }
-        let lengths: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
+        let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
         let promise = Promise { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
-        let mut codec = Self::new(basis, file.sample, promise, 1);
-        codec.missing_value = file.missing_value;
-        codec.parts = wavelet::ranges(&lengths);
-        Ok(codec)
+        let codec = Self::with_levels(scheme, basis, file.sample, promise, &levels);
+        Ok(Self { missing_value: file.missing_value, ..codec })
+    }
+
+    /// The number of level parts that a block can have.
+    pub fn parts(&self) -> usize {
+        if self.scheme.pyramid.is_some() { usize::from(Pyramid::PARTS) } else { self.levels.len() }
+    }
+
+    /// Whether a level part says anything about the coefficients that `wanted` marks.
+    fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
+        match &self.scheme.pyramid {
+            None => wanted[self.levels[part].clone()].contains(&true),
+            // Along time, the last pass adds the odd frames alone.
+            Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
+            Some(_) => true,
+        }
+    }
+
+    /// The codes of a level part of a block of `size` voxels, in runs of one step, and those steps.
+    pub(crate) fn runs<'c>(
+        &self,
+        size: [usize; 3],
+        step: f64,
+        part: usize,
+        mut codes: &'c [i32],
+    ) -> Vec<(f64, &'c [i32])> {
+        let Some(pyramid) = &self.scheme.pyramid else { return vec![(step, codes)] };
+        let shape = self.shape(size);
+        let passes = pyramid.passes(shape).into_iter().filter(|pass| usize::from(pass.part) == part);
+        let run = |pass: wavesplat_format::Pass| {
+            let (of_pass, rest) = codes.split_at(pass.codes(shape));
+            codes = rest;
+            (pyramid.step(step, pass.level), of_pass)
+        };
+        passes.map(run).collect()
+    }
+
+    /// Nodes of a block of `size` voxels along x, y, z and k.
+    fn shape(&self, [x, y, z]: [usize; 3]) -> [usize; 4] {
+        [x, y, z, self.basis.coefficients()]
+    }
+
+    /// The codes of each level part of a block of `size` voxels.
+    fn part_ranges(&self, size: [usize; 3]) -> Vec<Range<usize>> {
+        let voxels: usize = size.iter().product();
+        match &self.scheme.pyramid {
+            Some(pyramid) => wavelet::ranges(&Passes::new(pyramid, self.shape(size)).part_lengths()),
+            None => self.levels.iter().map(|k| k.start * voxels..k.end * voxels).collect(),
+        }
     }
 
     /// Frames of the window.
@@ -78,6 +149,9 @@ impl WindowCodec {
     }
 }
 
+/// The level part of a pyramid that holds the last pass along time.
+const ODD_FRAMES: usize = Pyramid::PARTS as usize - 1;
+
 /// Joins the small coarse levels, so that a part of a whole block holds at least this many coefficients.
 const PART_COEFFICIENTS: usize = 1 << 17;
 
@@ -96,24 +170,6 @@ fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
         _ => {}
     }
     parts
-}
-
-/// The series of [`LANES`] voxels from their codes: coefficient = code * step, then the inverse transform.
-///
-/// `codes(k)` are the codes of coefficient k. Encoder and decoder both come through here, so they agree to the bit.
-fn reconstruct(
-    basis: &dyn TimeBasis,
-    step: f64,
-    codes: impl Fn(usize) -> [i32; LANES],
-    work: &mut [Lane],
-    series: &mut [Lane],
-) {
-    for (k, lane) in work.iter_mut().enumerate() {
-        for (c, code) in lane.iter_mut().zip(codes(k)) {
-            *c = f64::from(code) * step;
-        }
-    }
-    basis.inverse(work, series);
 }
 
 /// Voxels in groups of [`LANES`]: (first voxel, number in the group).

@@ -1,6 +1,6 @@
 //! Which coefficients to keep (method.md section 4): the smallest are dropped for as long as the promise holds.
 
-use super::{WindowCodec, reconstruct};
+use super::WindowCodec;
 use crate::bound::Measure;
 use crate::wavelet::{LANES, Lane};
 
@@ -104,8 +104,10 @@ impl Group {
     }
 
     fn reconstruct(&mut self, codec: &WindowCodec, step: f64) {
-        let code = |k: usize| kept(&self.codes[k], &self.rank[k], &self.dropped);
-        reconstruct(codec.basis.as_ref(), step, code, &mut self.work, &mut self.decoded);
+        for (k, c) in self.work.iter_mut().enumerate() {
+            *c = kept(&self.codes[k], &self.rank[k], &self.dropped).map(|code| f64::from(code) * step);
+        }
+        codec.basis.inverse(&mut self.work, &mut self.decoded);
     }
 
     /// The weighed error of each lane: the largest over the frames, or the root of the mean square.

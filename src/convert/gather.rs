@@ -1,5 +1,6 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
+use super::choose::Chooser;
 use super::sampled::{self, Pixel};
 use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
@@ -9,7 +10,6 @@ use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::Grid;
-use crate::wavelet;
 use crossbeam::channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -82,8 +82,9 @@ impl WindowReader<'_> {
         self.range = Some(range);
         let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
-        let basis = wavelet::basis(config.basis, window.frames());
-        let mut codec = WindowCodec::new(basis, ty, promise, self.plan.blocks.edge);
+        let magnitude = sample::magnitude(seen.range);
+        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude }.choose()?;
+        let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
         let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
@@ -153,10 +154,10 @@ impl WindowReader<'_> {
 /// A name for the file that follows from settings and data: the same conversion has the same one everywhere.
 fn file_id(config: &ConvertConfig, archive: &Archive, plan: &Plan, digest: u64) -> FileId {
     let Grid { dims, spacing, origin } = archive.grid;
-    let ConvertConfig { basis, window, tolerance, bound, range, missing, missing_value, level, settings, .. } = config;
+    let ConvertConfig { coding, window, tolerance, bound, range, missing, missing_value, level, settings, .. } = config;
     let bound: &Bound = bound;
     let all = format!(
-        "{dims:?} {spacing:?} {origin:?} {} {basis:?} {window} {tolerance:?} {bound:?} {range:?} {missing:?} \
+        "{dims:?} {spacing:?} {origin:?} {} {coding:?} {window} {tolerance:?} {bound:?} {range:?} {missing:?} \
          {missing_value:?} {} {level} {settings:?} {digest}",
         archive.sample, plan.blocks.edge
     );

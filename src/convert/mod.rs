@@ -11,7 +11,9 @@
 //! the tolerance refers to the value range, from that of all frames up to its end, which never exceeds that of the archive:
 //! no first pass over the data is needed, and a pipe gives the same bytes as files.
 
+mod choose;
 mod gather;
+mod learn;
 mod record;
 pub mod sampled;
 
@@ -25,7 +27,8 @@ use crate::report::{PromiseReport, WindowReport};
 use crate::sample::{self, SampleType};
 use crate::source::{Archive, FrameSource};
 use crate::volume::BlockGrid;
-use crate::wavelet::{self, Basis};
+use crate::wavelet;
+pub use choose::{Coding, Space};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
@@ -35,7 +38,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use wavesplat_format::FileId;
+use wavesplat_format::{Basis, FileId};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +52,8 @@ pub enum MissingPolicy {
 /// How to convert.
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
-    /// The temporal basis.
-    pub basis: Basis,
+    /// The scheme, or what of it is fixed.
+    pub coding: Coding,
     /// Frames in a window.
     pub window: usize,
     /// The error allowed, as a share of what the bound refers to; 0 keeps every bit.
@@ -77,9 +80,9 @@ pub struct ConvertConfig {
 
 impl ConvertConfig {
     /// Pointwise within a share of the range; missing samples refused, and all else as the program has it by default.
-    pub fn new(basis: Basis, window: usize, tolerance: f64, memory: usize) -> Self {
+    pub fn new(coding: impl Into<Coding>, window: usize, tolerance: f64, memory: usize) -> Self {
         Self {
-            basis,
+            coding: coding.into(),
             window,
             tolerance,
             bound: Bound::Pointwise,
@@ -160,7 +163,7 @@ pub fn convert<W: Write>(
         // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
         let plan = &plan;
         let reader = scope.spawn(move || gather::read(source, config, plan, &to_workers));
-        let workers = scope.spawn(move || encode(config.level, &from_reader, &to_writer));
+        let workers = scope.spawn(move || encode(config.level, plan.blocks, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -183,19 +186,25 @@ struct Plan {
     batch: usize,
 }
 
-/// Voxels a side of a block unless one is given: 32, less for long windows so that a block stays near 4 MiB.
-fn block_edge(window: usize) -> usize {
-    [32, 16, 8, 4, 2].into_iter().find(|e| e * e * e * window <= 33 * 32 * 32 * 32).unwrap_or(1)
+/// Voxels a side of a block unless one is given: 32, less for long windows so that a block stays near 4 MiB. With a
+/// pyramid up to 48, which it codes in fewer bytes, and so that the blocks along the longest axis are alike.
+fn block_edge(coding: Coding, dims: [usize; 3], window: usize) -> usize {
+    let (largest, samples) =
+        if coding.space == Space::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
+    let fits = |e: &usize| e * e * e * window <= samples;
+    let edge = [largest, largest / 2, largest / 4, 4, 2].into_iter().find(fits).unwrap_or(1);
+    let longest = dims.into_iter().max().unwrap_or(1);
+    if coding.space == Space::Alone { edge } else { longest.div_ceil(longest.div_ceil(edge)) }
 }
 
 impl Plan {
     fn new(config: &ConvertConfig, archive: &Archive) -> Result<Self> {
-        wavelet::check_window(config.basis, config.window)?;
+        wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         if !(0.0..=1.0).contains(&config.tolerance) {
             return Err(Error::usage("--tolerance: a share, 0 to 1; 2 % is 0.02"));
         }
-        let edge = config.block.unwrap_or(block_edge(config.window));
-        let coefficients = wavelet::basis(config.basis, config.window).coefficients() as u64;
+        let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
+        let coefficients = most_coefficients(config) as u64;
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
         if edge == 0 || (edge as u64).saturating_pow(3).saturating_mul(coefficients) > most {
             return Err(Error::usage(format!("--block {edge}: a block holds 1 to {most} samples over a window")));
@@ -214,8 +223,9 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
     let raw = samples * sample.size();
-    let codes = voxels * wavelet::basis(config.basis, config.window).coefficients() * size_of::<i32>();
-    let scratch = samples + 2 * codes + raw + ZSTD_SCRATCH;
+    let codes = voxels * most_coefficients(config) * size_of::<i32>();
+    let field = if config.coding.space == Space::Alone { 0 } else { 2 * codes };
+    let scratch = samples + 2 * codes + field + raw + ZSTD_SCRATCH;
     let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + memory::FIXED;
     let fits = (1..=memory::MOST_BLOCKS).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {
@@ -226,12 +236,20 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     })
 }
 
+/// Coefficients of a voxel in a whole window.
+fn most_coefficients(config: &ConvertConfig) -> usize {
+    match config.coding.basis {
+        Some(basis @ (Basis::Haar | Basis::Multi)) => wavelet::basis(basis, &[], config.window).coefficients(),
+        _ => config.window,
+    }
+}
+
 /// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
 
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
+fn encode(level: i32, grid: BlockGrid, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
     let idle = Mutex::new(Vec::new());
     let mut busy = Duration::ZERO;
     for batch in batches {
@@ -242,7 +260,8 @@ fn encode(level: i32, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> 
             .map(|(id, samples)| {
                 let reused = idle.lock().ok().and_then(|mut e| e.pop());
                 let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-                let encoded = encoder.block(&batch.window.codec, *id, samples).map_err(bug);
+                let size = grid.region(id.block as usize).dims();
+                let encoded = encoder.block(&batch.window.codec, *id, size, samples).map_err(bug);
                 if let Ok(mut idle) = idle.lock() {
                     idle.push(encoder);
                 }

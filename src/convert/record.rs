@@ -65,7 +65,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         }
         let new = self.metadata.windows.len() <= batch.window.index as usize;
         if new {
-            self.metadata.windows.push(window_record(self.config, &batch.window));
+            self.metadata.windows.push(window_record(&batch.window));
         }
         let window = self.metadata.windows.last_mut().expect("a window was just there");
         let writer = self.writer.as_mut().expect("made with the first batch");
@@ -130,13 +130,15 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 }
 
-fn window_record(config: &ConvertConfig, job: &WindowJob) -> Window {
+fn window_record(job: &WindowJob) -> Window {
     Window {
         first_frame: job.first_frame,
         frames: job.codec.frames() as u32,
-        basis: config.basis,
+        basis: job.codec.scheme.basis,
         coefficients: job.codec.basis.coefficients() as u32,
-        levels: job.codec.parts.iter().map(|r| r.len() as u32).collect(),
+        levels: job.codec.levels.iter().map(|r| r.len() as u32).collect(),
+        functions: job.codec.scheme.functions.clone(),
+        pyramid: job.codec.scheme.pyramid.clone(),
         delta: job.codec.promise.delta,
         reached: 0.0,
         share: 0.0,

@@ -6,13 +6,14 @@ use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
+use crate::codec::field::Field;
 use crate::error::Result;
 use crate::file::CoefficientFile;
 use crate::sample::{SampleType, magnitude};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, Window};
+use wavesplat_format::{BlockEntry, Pyramid, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,16 +56,19 @@ impl Scene for CoefficientScene {
 
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize {
         let windows = &self.file.metadata().windows;
-        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, w.levels.len())).max();
+        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, parts(w))).max();
         most.unwrap_or(0) + 2 * frames + 1
     }
 
     fn block_bytes(&self, config: &RenderConfig) -> usize {
         let windows = &self.file.metadata().windows;
-        let errors = windows.iter().map(|w| error_planes(config, w.levels.len())).max().unwrap_or(0);
-        // Codes, payload and samples, and a term of ten bytes for each; where samples are missing, a mask and overrides.
+        let errors = windows.iter().map(|w| error_planes(config, parts(w))).max().unwrap_or(0);
+        // Codes, payload and samples, and a term of ten bytes for each; what a pyramid gives; where samples are missing, a
+        // mask and overrides.
+        let refined = if windows.iter().any(|w| w.pyramid.is_some()) { 8 } else { 0 };
         let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
-        self.file.largest_block() * (4 + 5 + 8 + 10 + missing) + self.blocks().region(0).voxels() * errors * 10
+        self.file.largest_block() * (4 + 5 + 8 + 10 + refined + missing)
+            + self.blocks().region(0).voxels() * errors * 10
     }
 
     fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
@@ -84,9 +88,14 @@ fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     }
 }
 
+/// Level parts of a window's blocks.
+fn parts(window: &Window) -> usize {
+    if window.pyramid.is_some() { Pyramid::PARTS.into() } else { window.levels.len() }
+}
+
 /// Whether most coefficients are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
 fn is_dense(window: &Window, voxels: usize) -> bool {
-    2 * window.coded > voxels as u64 * u64::from(window.coefficients)
+    window.pyramid.is_some() || 2 * window.coded > voxels as u64 * u64::from(window.coefficients)
 }
 
 /// Some frames of one window of a file.
@@ -127,11 +136,11 @@ impl<'a> CoefficientGroup<'a> {
             frames: frames.len(),
             values: samples || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
-            error_planes: error_planes(config, codec.parts.len()),
+            error_planes: error_planes(config, codec.parts()),
             order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
         // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        let allowance = Allowance::new(&codec, config.allowed.filter(|_| !samples));
+        let allowance = Allowance::new(&codec, &file.blocks, config.allowed.filter(|_| !samples));
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
         let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, allowance, errors, leaf };
         if config.certify {
@@ -196,11 +205,13 @@ impl<'a> CoefficientGroup<'a> {
 
     fn terms_of_codes(&self, block: &Block, errors: &[f64]) -> Terms {
         let mut terms = Terms::new(block.bytes_read);
-        let overrides = Overrides::of(block, &self.codec, &self.frames);
+        let field = block.field(&self.codec);
+        terms.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
+        let overrides = Overrides::of(block, &self.codec, &field, &self.frames);
         let mut next = overrides.values.iter().peekable();
         for voxel in 0..block.voxels {
-            if !block.codes.is_empty() {
-                self.add_codes(block, voxel, &mut terms);
+            if !field.is_zero() {
+                self.add_coefficients(&field, block.voxels, voxel, &mut terms);
             }
             while let Some((_, frame, amount)) = next.next_if(|(v, _, _)| *v == voxel) {
                 terms.add(self.layout.value(*frame), *amount);
@@ -219,12 +230,11 @@ impl<'a> CoefficientGroup<'a> {
         terms
     }
 
-    fn add_codes(&self, block: &Block, voxel: usize, terms: &mut Terms) {
+    fn add_coefficients(&self, field: &Field<'_>, voxels: usize, voxel: usize, terms: &mut Terms) {
         for (plane, k) in self.kept.iter().enumerate() {
-            let code = block.codes[k * block.voxels + voxel];
-            if code != 0 {
-                terms.add(plane, f64::from(code) * block.step);
-                terms.coefficients += 1;
+            let c = field.at(k * voxels + voxel);
+            if c != 0.0 {
+                terms.add(plane, c);
             }
         }
     }
@@ -294,7 +304,7 @@ struct Overrides {
 }
 
 impl Overrides {
-    fn of(block: &Block, codec: &WindowCodec, frames: &[usize]) -> Self {
+    fn of(block: &Block, codec: &WindowCodec, field: &Field<'_>, frames: &[usize]) -> Self {
         let mut wanted = vec![None; codec.frames()];
         frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
         let place =
@@ -308,7 +318,7 @@ impl Overrides {
             .filter_map(|(index, sample)| place(index).map(|(voxel, f, t)| (voxel, f, t, sample)))
             .collect();
         targets.sort_unstable_by_key(|(voxel, f, _, _)| (*voxel, *f));
-        Self { values: subtract_series(block, codec, &targets) }
+        Self { values: subtract_series(block, codec, field, &targets) }
     }
 }
 
@@ -316,11 +326,12 @@ impl Overrides {
 fn subtract_series(
     block: &Block,
     codec: &WindowCodec,
+    field: &Field<'_>,
     targets: &[(usize, usize, usize, f64)],
 ) -> Vec<(usize, usize, f64)> {
     let mut out = Vec::new();
     for of_voxel in targets.chunk_by(|a, b| a.0 == b.0) {
-        let series = block.series(codec, of_voxel[0].0);
+        let series = block.series(codec, field, of_voxel[0].0);
         out.extend(of_voxel.iter().map(|(v, f, t, sample)| (*v, *f, sample - series[*t])).filter(|o| o.2 != 0.0));
     }
     out

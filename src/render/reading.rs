@@ -3,7 +3,7 @@
 use super::scene::LeftOut;
 use crate::codec::WindowCodec;
 use crate::sample::magnitude;
-use std::ops::Range;
+use crate::volume::BlockGrid;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
 /// What is read of a block.
@@ -20,8 +20,7 @@ pub(super) struct Kept {
 /// Decides what of a window's blocks is read.
 #[derive(Debug)]
 pub(super) struct Allowance {
-    /// `gains[part][frame]`: the sum of |u_k(t)| over the coefficients of a level part. Leaving the part out moves a
-    /// sample of the frame by at most so many times its largest coefficient.
+    /// `gains[part][frame]`: [`WindowCodec::part_gains`].
     pub(super) gains: Vec<Vec<f64>>,
     /// The largest of each part's gains.
     largest_gain: Vec<f64>,
@@ -30,10 +29,8 @@ pub(super) struct Allowance {
 }
 
 impl Allowance {
-    pub(super) fn new(codec: &WindowCodec, allowed: Option<f64>) -> Self {
-        let gain = |range: &Range<usize>, t: usize| codec.synthesis[range.clone()].iter().map(|u| u[t].abs()).sum();
-        let of_part = |range| (0..codec.frames()).map(|t| gain(range, t)).collect();
-        let gains: Vec<Vec<f64>> = codec.parts.iter().map(of_part).collect();
+    pub(super) fn new(codec: &WindowCodec, blocks: &BlockGrid, allowed: Option<f64>) -> Self {
+        let gains = codec.part_gains(blocks);
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
         Self { gains, largest_gain, allowed }
     }

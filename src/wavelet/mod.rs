@@ -4,10 +4,14 @@
 //! coarse to fine. Series are transformed [`LANES`] voxels at a time, so that plain loops become vector code.
 
 mod haar;
+mod learned;
 mod multi;
+mod samples;
 
 pub use haar::Haar;
+pub use learned::Learned;
 pub use multi::Multi;
+pub use samples::Samples;
 pub use wavesplat_format::Basis;
 
 use crate::error::{Error, Result};
@@ -38,11 +42,13 @@ pub trait TimeBasis: Send + Sync + Debug {
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]);
 }
 
-/// The basis of a window of `frames` frames.
-pub fn basis(kind: Basis, frames: usize) -> Box<dyn TimeBasis> {
+/// The basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
+pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis> {
     match kind {
         Basis::Haar => Box::new(Haar::new(frames)),
         Basis::Multi => Box::new(Multi::new(frames)),
+        Basis::Samples => Box::new(Samples(frames)),
+        Basis::Learned => Box::new(Learned::new(functions, frames)),
     }
 }
 
@@ -51,6 +57,7 @@ pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
     let (fits, rule) = match kind {
         Basis::Haar => (frames.is_power_of_two(), "a power of two, as 32"),
         Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, as 33"),
+        Basis::Samples | Basis::Learned => (frames >= 1, "at least one frame"),
     };
     let most = wavesplat_format::limits::MAX_WINDOW_FRAMES as usize;
     if fits && frames <= most {
@@ -100,7 +107,15 @@ mod tests {
     use super::*;
 
     fn every_basis() -> impl Iterator<Item = Box<dyn TimeBasis>> {
-        (1..=70).flat_map(|n| [basis(Basis::Haar, n), basis(Basis::Multi, n)])
+        let kinds = [Basis::Haar, Basis::Multi, Basis::Samples, Basis::Learned];
+        (1..=70).flat_map(move |n| kinds.map(|kind| basis(kind, &some_functions(kind, n), n)))
+    }
+
+    /// Up to three functions, the third nearly a sum of the others.
+    fn some_functions(kind: Basis, n: usize) -> Vec<i16> {
+        let row = |k: usize, t: usize| [3000, (t * 911 % 7919) as i16, (t * 911 % 7919) as i16 + 2999][k];
+        let rows = if kind == Basis::Learned { n.min(3) } else { 0 };
+        (0..rows).flat_map(|k| (0..n).map(move |t| row(k, t))).collect()
     }
 
     fn some_series(n: usize) -> Vec<Lane> {
@@ -130,9 +145,21 @@ mod tests {
     }
 
     #[test]
+    fn learned_functions_come_first_and_are_made_orthonormal() {
+        let functions: Vec<i16> = (0..5).map(|t| 4000 * t).chain([9000; 5]).collect();
+        let u = synthesis(&Learned::new(&functions, 5));
+        let dot = |a: usize, b: usize| (0..5).map(|t| u[a][t] * u[b][t]).sum::<f64>();
+        for (a, b) in (0..5).flat_map(|a| (0..5).map(move |b| (a, b))) {
+            assert!((dot(a, b) - f64::from(u8::from(a == b))).abs() < 1e-14);
+        }
+        let norm = 30f64.sqrt();
+        (0..5).for_each(|t| assert!((u[0][t] - t as f64 / norm).abs() < 1e-12));
+    }
+
+    #[test]
     fn a_constant_series_has_one_haar_coefficient() {
         for n in 1..=70 {
-            let b = basis(Basis::Haar, n);
+            let b = basis(Basis::Haar, &[], n);
             let mut coefficients = vec![Lane::default(); n];
             b.forward(&vec![[3.0; LANES]; n], &mut coefficients);
             assert!((coefficients[0][0] - 3.0 * (n as f64).sqrt()).abs() < 1e-12);
@@ -142,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_frame_needs_few_haar_coefficients() {
-        let u = synthesis(basis(Basis::Haar, 32).as_ref());
+        let u = synthesis(basis(Basis::Haar, &[], 32).as_ref());
         let one = needed(&u, &[11]);
         assert_eq!(one.iter().filter(|n| **n).count(), 6);
         assert!(needed(&u, &(0..32).collect::<Vec<_>>()).iter().all(|n| *n));
@@ -150,7 +177,7 @@ mod tests {
 
     #[test]
     fn haar_gain_is_the_closed_form() {
-        let u = synthesis(basis(Basis::Haar, 32).as_ref());
+        let u = synthesis(basis(Basis::Haar, &[], 32).as_ref());
         let expected = (1.0 + (0..5).map(|l| 2f64.powf(f64::from(l) / 2.0)).sum::<f64>()) / 32f64.sqrt();
         assert!((gain(&u) - expected).abs() < 1e-12);
     }

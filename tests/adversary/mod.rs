@@ -50,7 +50,7 @@ impl Target {
     }
 
     fn basis(&self) -> Box<dyn TimeBasis> {
-        basis(self.case.basis, self.case.frames)
+        basis(self.case.basis, &[], self.case.frames)
     }
 
     /// The samples of the archive whose voxels, after the two that pin the range, are these series.

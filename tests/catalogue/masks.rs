@@ -6,7 +6,7 @@ use crate::common::random::Random;
 use crate::common::samples::{append, special};
 use crate::common::series::Mask;
 use crate::common::views::{SKEWED, field, rounding, truth, view};
-use crate::common::{Stored, extracted, looking, pictures, settings, stored};
+use crate::common::{Stored, extracted, looking, pictures, settings, stored, windows};
 use crate::images::bits;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
@@ -95,7 +95,7 @@ fn of_coefficients(file: &Stored, look: &RenderConfig) -> Vec<f32> {
 fn masks_that_touch_every_border_are_kept_and_not_shown() {
     for (n, missing) in BORDERS.into_iter().enumerate() {
         let (memory, values, holes) = masked(missing);
-        for (basis, window) in [(Basis::Haar, 8), (Basis::Multi, 9)] {
+        for (basis, window) in windows(8) {
             let config = ConvertConfig { block: Some(4), ..settings(basis, window, 0.01) };
             let file = stored(&mut memory.clone(), &config);
             assert_eq!(file.report.missing, holes.iter().filter(|h| **h).count() as u64);
@@ -124,7 +124,7 @@ fn what_is_under_a_mask_changes_nothing_else() {
         let filled = samples.flat_map(|(old, hole)| if *hole { bytes } else { old.try_into().unwrap() });
         Memory::new(SKEWED, SampleType::F64, filled.collect())
     };
-    for (basis, window) in [(Basis::Haar, 8), (Basis::Multi, 9)] {
+    for (basis, window) in windows(8) {
         let config = ConvertConfig { missing_value: Some(-1e30), ..settings(basis, window, 0.01) };
         let run = |memory: &Memory| {
             let file = stored(&mut memory.clone(), &config);

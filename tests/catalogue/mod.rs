@@ -9,17 +9,17 @@ mod shapes;
 mod values;
 
 use crate::bounds::{BOUNDS, Case, Trial};
+use crate::common::BASES;
 use crate::common::series::{Kind, Mask};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::sample::SampleType;
-use wavesplat::wavelet::Basis;
 
-/// Samples of voxels in a row, t slowest, with both bases and every bound: converts, extracts and compares exactly.
+/// Samples of voxels in a row, t slowest, with every basis and every bound: converts, extracts and compares exactly.
 /// Returns what came back.
 fn kept(ty: SampleType, mask: Mask, voxels: usize, samples: &[u8], tolerance: f64) -> Vec<Trial> {
     let frames = samples.len() / (voxels * ty.size());
-    let codings = [Basis::Haar, Basis::Multi].map(|basis| BOUNDS.map(|bound| (basis, bound)));
+    let codings = BASES.map(|basis| BOUNDS.map(|bound| (basis, bound)));
     let trial = |(basis, bound)| {
         let (kind, window, edge, dims, seed) = (Kind::Mixed, 5, 8, [voxels, 1, 1], 0);
         let case = Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed };

@@ -5,7 +5,7 @@ use super::{Archive, Work};
 fn some_file() -> (Work, Vec<u8>) {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([20, 14, 10], 40).npy());
-    work.wavesplat("convert a.npy -o a.wspl --block 8").ok();
+    work.wavesplat("convert a.npy -o a.wspl --basis haar --block 8").ok();
     let file = work.read("a.wspl");
     (work, file)
 }

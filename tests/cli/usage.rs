@@ -10,7 +10,7 @@ fn bad_values_of_convert_are_named() {
         ("--tolerance -1", &["--tolerance", "0 to 1"]),
         ("--tolerance nan", &["--tolerance", "0 to 1"]),
         ("--tolerance much", &["--tolerance"]),
-        ("--window 30", &["--window 30", "haar", "32"]),
+        ("--basis haar --window 30", &["--window 30", "haar", "32"]),
         ("--window 0", &["--window 0"]),
         ("--basis multi --window 32", &["--window 32", "multi", "33"]),
         ("--basis fourier", &["--basis", "haar", "multi"]),

@@ -29,6 +29,14 @@ use wavesplat_format::{BlockId, EncodedBlock, Metadata, Writer};
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
 
+/// Every basis; those beyond the paper's come with a pyramid.
+pub(crate) const BASES: [Basis; 4] = [Basis::Haar, Basis::Multi, Basis::Samples, Basis::Learned];
+
+/// The paper's bases, and a window's length of `n`, or of one more where the basis asks for it, for every basis.
+pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
+    BASES.map(|basis| (basis, n + usize::from(basis == Basis::Multi)))
+}
+
 /// Pointwise, missing samples kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
     let plain = ConvertConfig::new(basis, window, tolerance, MEMORY);
@@ -81,7 +89,7 @@ pub(crate) fn stored_with_a_lie(
             let region = file.blocks.region(block);
             let bytes = read_frames(samples.as_ref(), 0..frames.len(), &region, file.sample()).unwrap();
             let id = BlockId { window, block: block as u32, channel: 0 };
-            let mut encoded = encoder.block(&codec, id, &bytes).unwrap().block;
+            let mut encoded = encoder.block(&codec, id, region.dims(), &bytes).unwrap().block;
             if (id.window, id.block) == place {
                 lie(&mut encoded, &mut metadata);
             }

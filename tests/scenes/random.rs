@@ -6,7 +6,7 @@ use crate::common::random::Random;
 use crate::common::samples::{TYPES, bytes, special};
 use crate::common::series::{KINDS, Kind, Mask, volume};
 use crate::common::views::field;
-use crate::common::{looking, settings};
+use crate::common::{BASES, looking, settings};
 use wavesplat::camera::{Camera, View};
 use wavesplat::convert::ConvertConfig;
 use wavesplat::footprint::Kernel;
@@ -91,7 +91,7 @@ fn samples(grid: &Grid, ty: SampleType, frames: usize, random: &mut Random) -> (
 }
 
 fn conversion(random: &mut Random) -> ConvertConfig {
-    let (basis, bound) = (random.of(&[Basis::Haar, Basis::Multi]), random.of(&BOUNDS));
+    let (basis, bound) = (random.of(&BASES), random.of(&BOUNDS));
     let window = (1 << (1 + random.below(4))) + usize::from(basis == Basis::Multi);
     let block = Some(1 + random.below(8));
     ConvertConfig { bound, block, ..settings(basis, window, random.of(&TOLERANCES) * (0.5 + 0.5 * random.unit())) }

@@ -4,7 +4,8 @@ use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow};
-use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
+use wavesplat::codec::scheme::Stencil;
+use wavesplat::convert::{Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, convert};
 use wavesplat::error::{Error, Result};
 use wavesplat::output::{Output, STANDARD};
 use wavesplat::wavelet::Basis;
@@ -33,9 +34,12 @@ pub(crate) struct ConvertArgs {
     /// Replace an existing file
     #[arg(long)]
     force: bool,
-    /// Temporal basis
-    #[arg(long, value_enum, default_value = "haar")]
+    /// What series, or samples, are made of
+    #[arg(long, value_enum, default_value = "auto")]
     basis: BasisName,
+    /// What coefficients are predicted from in space [default: none for haar and multi, else auto]
+    #[arg(long, value_enum)]
+    space: Option<SpaceName>,
     /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
     #[arg(long, value_name = "T")]
     window: Option<usize>,
@@ -89,6 +93,24 @@ enum BasisName {
     Haar,
     /// The multiwavelet of Geronimo, Hardin and Massopust
     Multi,
+    /// Orthonormal functions that suit the window's own series
+    Learned,
+    /// No functions of time: samples are predicted in space and time
+    Pyramid,
+    /// learned or pyramid, and their variants: what makes some boxes of the window smallest
+    Auto,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SpaceName {
+    /// Each series by itself
+    None,
+    /// From two neighbours along an axis
+    Linear,
+    /// From four
+    Cubic,
+    /// linear or cubic, whichever makes some boxes smaller
+    Auto,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -126,13 +148,10 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
 
 impl ConvertArgs {
     fn config(&self) -> Result<ConvertConfig> {
-        let (basis, window) = match self.basis {
-            BasisName::Haar => (Basis::Haar, 32),
-            BasisName::Multi => (Basis::Multi, 33),
-        };
+        let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
         let streamed = self.inputs == [PathBuf::from(STANDARD)];
         Ok(ConvertConfig {
-            basis,
+            coding: self.coding()?,
             window: self.window.unwrap_or(window),
             tolerance: self.tolerance,
             bound: self.bound()?,
@@ -180,6 +199,27 @@ impl ConvertArgs {
             BoundName::Pointwise | BoundName::Rms => return Ok(Some((lo, hi))),
         };
         Err(Error::usage(refused))
+    }
+
+    fn coding(&self) -> Result<Coding> {
+        let basis = match self.basis {
+            BasisName::Haar => Some(Basis::Haar),
+            BasisName::Multi => Some(Basis::Multi),
+            BasisName::Learned => Some(Basis::Learned),
+            BasisName::Pyramid => Some(Basis::Samples),
+            BasisName::Auto => None,
+        };
+        let space = match self.space {
+            None => return Ok(basis.map_or(Coding::AUTO, Coding::from)),
+            Some(SpaceName::None) if matches!(self.basis, BasisName::Pyramid | BasisName::Auto) => {
+                return Err(Error::usage("--space none: takes --basis haar, multi or learned"));
+            }
+            Some(SpaceName::None) => Space::Alone,
+            Some(SpaceName::Linear) => Space::Pyramid(Stencil::Linear),
+            Some(SpaceName::Cubic) => Space::Pyramid(Stencil::Cubic),
+            Some(SpaceName::Auto) => Space::Any,
+        };
+        Ok(Coding { basis, space })
     }
 
     /// What `verify --against` must know to read the same samples again.

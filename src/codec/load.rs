@@ -1,0 +1,75 @@
+//! The samples of a block, loaded a few series at a time; missing ones are found, and filled.
+
+use super::WindowCodec;
+use super::truncate::Group;
+use super::weigh::Weighing;
+use crate::sample;
+use crate::wavelet::Lane;
+
+/// Which samples of a block are missing, and the largest of the others.
+pub(super) struct Missing {
+    pub(super) mask: Vec<bool>,
+    pub(super) count: u64,
+    pub(super) magnitude: f64,
+}
+
+impl Missing {
+    pub(super) fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
+        let mut found = Self { mask: vec![false; samples.len() / codec.sample.size()], count: 0, magnitude: 0.0 };
+        sample::for_each_run(codec.sample, samples, |first, values| {
+            if let Some((lo, hi)) = sample::range_unless_missing(values, codec.missing_value) {
+                found.magnitude = found.magnitude.max(-lo).max(hi);
+                return;
+            }
+            for (i, value) in values.iter().enumerate() {
+                found.mask[first + i] = codec.is_missing(*value);
+                found.count += u64::from(found.mask[first + i]);
+                found.magnitude =
+                    if found.mask[first + i] { found.magnitude } else { found.magnitude.max(value.abs()) };
+            }
+        });
+        found
+    }
+
+    /// The very bytes of the missing samples.
+    pub(super) fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
+        let each = samples.chunks_exact(codec.sample.size());
+        each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
+    }
+}
+
+/// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
+pub(super) fn load_group(
+    codec: &WindowCodec,
+    weighing: &Weighing,
+    samples: &[u8],
+    missing: &Missing,
+    first: usize,
+    count: usize,
+    group: &mut Group,
+) {
+    let voxels = missing.mask.len() / codec.frames();
+    let size = codec.sample.size();
+    for (frame, (source, weight)) in group.source.iter_mut().zip(&mut group.weight).enumerate() {
+        let at = frame * voxels + first;
+        *source = Lane::default();
+        sample::load(codec.sample, &samples[at * size..(at + count) * size], &mut source[..count]);
+        let weights = weighing.weights(source);
+        *weight = std::array::from_fn(|l| if l < count && !missing.mask[at + l] { weights[l] } else { 0.0 });
+    }
+    if missing.count > 0 {
+        (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));
+    }
+}
+
+fn fill(source: &mut [Lane], weight: &[Lane], lane: usize) {
+    let present = (0..source.len()).find(|t| weight[*t][lane] > 0.0);
+    let mut last = present.map_or(0.0, |t| source[t][lane]);
+    for (value, weight) in source.iter_mut().zip(weight) {
+        if weight[lane] > 0.0 {
+            last = value[lane];
+        } else {
+            value[lane] = last;
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The two floating-point types in which a pyramid can be computed.
+
+use std::ops::{Add, Mul, Sub};
+
+/// `f32` or `f64`. All operations are correctly rounded, so that every machine gets the same bits.
+pub(crate) trait Real:
+    Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Codes are smaller than this: whole numbers up to it, and halves between them, are exact.
+    const MOST_CODE: Self;
+
+    /// A block with larger samples is stored exactly: sums of its coefficients could overflow.
+    const LARGEST: f64;
+
+    /// Adding and taking away this rounds smaller numbers to the nearest whole one.
+    const BIG: Self;
+
+    /// Rounded to the type.
+    fn of(x: f64) -> Self;
+
+    /// Of a code.
+    fn of_code(code: i32) -> Self;
+
+    /// Exactly.
+    fn to_f64(self) -> f64;
+
+    /// A whole number in the range of `i32`; 0 of what is not a number.
+    fn to_code(self) -> i32;
+}
+
+impl Real for f32 {
+    const MOST_CODE: Self = 2_097_152.0;
+    const LARGEST: f64 = f32::MAX as f64 / 4096.0;
+    const BIG: Self = 12_582_912.0;
+
+    fn of(x: f64) -> Self {
+        x as Self
+    }
+
+    fn of_code(code: i32) -> Self {
+        code as Self
+    }
+
+    fn to_f64(self) -> f64 {
+        self.into()
+    }
+
+    fn to_code(self) -> i32 {
+        self as i32
+    }
+}
+
+impl Real for f64 {
+    const MOST_CODE: Self = 1_073_741_824.0;
+    const LARGEST: f64 = f64::MAX / 4096.0;
+    const BIG: Self = 6_755_399_441_055_744.0;
+
+    fn of(x: f64) -> Self {
+        x
+    }
+
+    fn of_code(code: i32) -> Self {
+        code.into()
+    }
+
+    fn to_f64(self) -> f64 {
+        self
+    }
+
+    fn to_code(self) -> i32 {
+        self as i32
+    }
+}
