@@ -4,8 +4,10 @@
 //! and maps no memory; it reads through [`Storage`] and writes to any `std::io::Write` without a seek.
 #![forbid(unsafe_code)]
 
+mod bits;
 mod block;
 mod bytes;
+mod cells;
 mod directory;
 mod error;
 mod footer;
@@ -16,9 +18,11 @@ pub mod limits;
 mod metadata;
 pub mod payload;
 mod planes;
+mod rans;
 mod reader;
 mod sample;
 mod section;
+mod segments;
 mod structure;
 #[cfg(test)]
 mod testing;
@@ -27,6 +31,7 @@ mod tests;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
+pub use cells::{max_packed, pack_cells, unpack_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use geometry::BlockGeometry;
