@@ -86,7 +86,7 @@ struct Grid {
     cells: [usize; 3],
     /// Nonzero codes of each cell of the latest frame, with a row of zeros before each plane and a plane before all.
     counts: Vec<u8>,
-    /// Those of the neighbours at y-1, z-1, t-1 of each cell of a row, together.
+    /// Those of the neighbours at y-1, z-1, t-1 of each cell of a row, together; then 8 that are not zero.
     around: Vec<u8>,
 }
 
@@ -104,7 +104,7 @@ impl Grid {
     fn new(extents: [usize; 4]) -> Self {
         let [x, y, z, _] = extents.map(|extent| extent.div_ceil(2));
         let counts = if volume(&extents) == 0 { 0 } else { x * (y + 1) * (z + 1) };
-        Self { extents, cells: [x, y, z], counts: vec![0; counts], around: vec![0; x.min(counts)] }
+        Self { extents, cells: [x, y, z], counts: vec![0; counts], around: vec![1; x + 8] }
     }
 
     /// All rows in their order.

@@ -37,7 +37,7 @@ pub(crate) fn normalise(counts: &[u32; 256], bits: u32) -> Frequencies {
 pub(crate) fn put_frequencies(frequencies: &Frequencies, bits: u32, out: &mut Vec<u8>) {
     let mut writer = BitWriter::new(out);
     let (mut previous, mut sum) = (bits, 0);
-    for &frequency in frequencies.iter().map(|f| u32::from(*f)).collect::<Vec<_>>().iter() {
+    for frequency in frequencies.iter().map(|&f| u32::from(f)) {
         if sum == 1 << bits {
             break;
         }
@@ -230,4 +230,53 @@ fn pop<const S: usize>(state: &mut u32, slots: &Slots<S>, words: &[[u8; 2]], nex
     *state = if short { low << 16 | u32::from(word) } else { low };
     *next = next.wrapping_add(usize::from(short));
     symbol
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sum(frequencies: &Frequencies) -> u32 {
+        frequencies.iter().map(|&f| u32::from(f)).sum()
+    }
+
+    #[test]
+    fn rare_symbols_keep_a_frequency() {
+        let mut counts = [1; 256];
+        counts[9] = u32::MAX;
+        let frequencies = normalise(&counts, 12);
+        assert_eq!((frequencies[9], frequencies[10], sum(&frequencies)), (4096 - 255, 1, 4096));
+        assert_eq!(normalise(&[u32::MAX; 256], 14), [64; 256]);
+    }
+
+    #[test]
+    fn hostile_frequencies_are_refused() {
+        let message = |bytes: &[u8]| take_frequencies(&mut &bytes[..], 12).expect_err("hostile");
+        assert!(message(&[0b1]).contains("too long"), "one more than all bits");
+        assert!(message(&[0b11_0111]).contains("too long"), "13 bits");
+        assert!(message(&[0b00_0011; 100]).contains("add up"), "none");
+        assert!(message(&[0, 0x20, 0]).contains("add up"), "too many");
+        assert!(message(&[0b0]).contains("within"), "no bytes left");
+    }
+
+    proptest! {
+        #[test]
+        fn symbols_round_trip(
+            symbols in prop::collection::vec(prop_oneof![9 => 0u8..4, 1 => any::<u8>()], 2..3000),
+            bits in prop::sample::select(vec![12u32, 14]),
+        ) {
+            let mut counts = [0; 256];
+            [0, 1].iter().chain(&symbols).for_each(|&symbol| counts[usize::from(symbol)] += 1);
+            let frequencies = normalise(&counts, bits);
+            prop_assert_eq!(sum(&frequencies), 1 << bits);
+            let mut out = Vec::new();
+            put_frequencies(&frequencies, bits, &mut out);
+            encode(&symbols, &frequencies, bits, &mut out);
+            let (mut rest, mut back) = (&out[..], vec![0; symbols.len()]);
+            prop_assert_eq!(take_frequencies(&mut rest, bits).expect("packed"), frequencies);
+            decode(&mut rest, &frequencies, bits, &mut back).expect("packed");
+            prop_assert!(rest.is_empty() && back == symbols);
+        }
+    }
 }

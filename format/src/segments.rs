@@ -200,3 +200,54 @@ fn histogram(symbols: &[u8]) -> [u32; 256] {
     tail.iter().for_each(|&symbol| counts[0][usize::from(symbol)] += 1);
     std::array::from_fn(|symbol| counts.iter().map(|counts| counts[symbol]).sum())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packed(streams: &[&[u8]]) -> Vec<u8> {
+        let lengths: Vec<usize> = streams.iter().map(|stream| stream.len()).collect();
+        let (symbols, mut out) = (streams.concat(), Vec::new());
+        pack_segments(&symbols, &lengths, &mut out);
+        assert!(out.len() <= max_segments(symbols.len(), streams.len()));
+        let (mut rest, mut back) = (&out[..], vec![0; symbols.len()]);
+        unpack_segments(&mut rest, &mut back).expect("packed");
+        assert!(rest.is_empty() && back == symbols);
+        out
+    }
+
+    /// Small numbers in no simple order, 255 now and then.
+    fn noise(count: u32, kinds: u32) -> Vec<u8> {
+        let scramble = |i: u32| (i.wrapping_mul(0x9E37_79B1) ^ i >> 3).wrapping_mul(0x85EB_CA6B) >> 13;
+        (0..count).map(|i| if scramble(i) % 1000 == 0 { 255 } else { (scramble(i) % kinds) as u8 }).collect()
+    }
+
+    #[test]
+    fn every_kind_is_used_where_it_is_shortest() {
+        let kind = |symbols: &[u8]| usize::from(packed(&[symbols])[0] & 3);
+        assert_eq!(kind(&[7; 9]), CONSTANT);
+        assert_eq!(kind(&[7, 8, 9]), RAW);
+        assert_eq!(kind(&noise(5000, 256)), RAW);
+        assert_eq!(kind(&noise(5000, 5)), COARSE);
+        let rare: Vec<u8> = (0..200_000u32).map(|i| if i % 2000 == 0 { (i / 2000) as u8 } else { 0 }).collect();
+        assert_eq!(kind(&rare), FINE);
+    }
+
+    #[test]
+    fn streams_are_joined_where_alike_and_cut_where_not() {
+        let (few, many) = (noise(2 * PIECE as u32, 3), noise(2 * PIECE as u32, 90));
+        let apart = packed(&[&few]).len() + packed(&[&many]).len();
+        assert_eq!(packed(&[&few, &many]).len(), apart);
+        assert_eq!(packed(&[&[few, many].concat()]).len(), apart);
+        let (a, b) = (noise(300, 9), noise(301, 9));
+        assert!(packed(&[&a, &b]).len() + 5 < packed(&[&a]).len() + packed(&[&b]).len());
+    }
+
+    #[test]
+    fn logarithms_are_close() {
+        for value in [1u32, 2, 3, 100, 4095, 4096, 1_000_003, u32::MAX] {
+            let exact = f64::from(value).log2() * 65536.0;
+            assert!((log2(value) as f64 - exact).abs() < 4.0, "{value}");
+        }
+    }
+}

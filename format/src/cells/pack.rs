@@ -52,9 +52,7 @@ impl<'a> Streams<'a> {
             mark(lines, &mut significant);
             let (around, counts) = grid.around(row);
             let mut before = 0;
-            for (((activity, count), &byte), &around) in
-                activity.iter_mut().zip(counts).zip(&significant).zip(around)
-            {
+            for (((activity, count), &byte), &around) in activity.iter_mut().zip(counts).zip(&significant).zip(around) {
                 *activity = around.wrapping_add(before);
                 *count = ONES[usize::from(byte)];
                 before = *count;

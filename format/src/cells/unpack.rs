@@ -25,6 +25,33 @@ pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Resu
 /// Bytes behind the symbols, so that 8 can be looked at from each.
 const BEHIND: usize = 8;
 
+/// Classes by the activity without x-1 (up to 24), 4 bits for each count of x-1 from 0 to 8.
+static CLASSES_OF: [u64; 32] = {
+    let mut table = [0; 32];
+    let mut i = 0;
+    while i < 32 * 9 {
+        table[i / 9] |= (CLASS_OF[i / 9 + i % 9] as u64) << (4 * (i % 9));
+        i += 1;
+    }
+    table
+};
+
+/// The ones of each byte from the lowest, then the highest again and again: what goes there is put there last.
+static PLACES: [[u8; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut byte = 1;
+    while byte < 256 {
+        let (mut i, mut left) = (0, byte);
+        while i < 8 {
+            table[byte][i] = left.trailing_zeros() as u8;
+            left = if left.is_power_of_two() { left } else { left & (left - 1) };
+            i += 1;
+        }
+        byte += 1;
+    }
+    table
+};
+
 struct Streams<'a> {
     symbols: Vec<u8>,
     /// The next symbol of each stream; lengths are powers of two, that lookups need no check.
@@ -81,42 +108,32 @@ impl<'a> Streams<'a> {
         Ok(())
     }
 
-    /// The significance bytes of a row, and how many ones each has; 8 that are zero amid zeros at once.
+    /// The significance bytes of a row, and how many ones each has.
+    ///
+    /// Every cell waits for the one before it, so runs of zeros amid zeros are taken at once.
     fn mark(&mut self, around: &[u8], counts: &mut [u8], significant: &mut [u8]) {
-        let (mut before, mut x) = (0, 0);
+        counts.fill(0);
+        significant.fill(0);
+        let (symbols, mut next, mut before, mut x) = (&self.symbols[..], self.classes, 0, 0);
         while x < significant.len() {
-            let end = significant.len().min(x + 8);
-            if before == 0 && end == x + 8 && self.skip_zeros(&around[x..end]) {
-                counts[x..end].fill(0);
-                significant[x..end].fill(0);
-            } else {
-                let rows = around[x..end].iter().zip(&mut counts[x..end]).zip(&mut significant[x..end]);
-                for ((around, count), byte) in rows {
-                    *byte = self.next_byte(around.wrapping_add(before));
-                    before = ONES[usize::from(*byte)];
-                    *count = before;
+            if before == 0 {
+                let zeros = zeros_ahead(&around[x..], symbols, next[0]);
+                next[0] += zeros;
+                x += zeros;
+                if zeros == 8 || x >= significant.len() {
+                    continue;
                 }
             }
-            x = end;
+            let class = CLASSES_OF[usize::from(around[x]) % 32] >> (4 * before) & 7;
+            let place = &mut next[class as usize];
+            let byte = symbols.get(*place).map_or(0, |byte| *byte);
+            *place = place.wrapping_add(1);
+            before = ONES[usize::from(byte)];
+            significant[x] = byte;
+            counts[x] = before;
+            x += 1;
         }
-    }
-
-    /// Takes 8 zeros if those come next and there is no activity.
-    #[inline(always)]
-    fn skip_zeros(&mut self, around: &[u8]) -> bool {
-        let next = self.symbols.get(self.classes[0]..).and_then(|next| next.first_chunk::<8>());
-        let zeros = around == [0; 8] && next == Some(&[0; 8]);
-        self.classes[0] += if zeros { 8 } else { 0 };
-        zeros
-    }
-
-    /// The next significance byte under an activity; past the end zero, which the end finds out.
-    #[inline(always)]
-    fn next_byte(&mut self, activity: u8) -> u8 {
-        let next = &mut self.classes[usize::from(CLASS_OF[usize::from(activity) % ACTIVITIES] % 8)];
-        let byte = self.symbols.get(*next).map_or(0, |byte| *byte);
-        *next = next.wrapping_add(1);
-        byte
+        self.classes = next;
     }
 
     /// The values of a row of cells.
@@ -132,21 +149,34 @@ impl<'a> Streams<'a> {
         }
     }
 
+    /// The values of a cell: without a loop where none is long, for its end could not be foreseen.
     #[inline(always)]
     fn scatter_cell(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: u8, scale: usize) {
-        let (mut left, mut next) = (significant, self.scales[scale]);
-        while left != 0 {
-            let symbol = self.symbols.get(next).map_or(0, |symbol| *symbol);
-            let value = if u32::from(symbol) < LONG { u32::from(symbol) } else { self.long(symbol) };
-            codes[steps[left.trailing_zeros() as usize % 8]] = unzigzag(value.wrapping_add(1));
-            next = next.wrapping_add(1);
-            left &= left - 1;
+        let next = self.scales[scale];
+        let count = ONES[usize::from(significant)];
+        let ahead = self.symbols.get(next..).and_then(|ahead| ahead.first_chunk::<8>()).unwrap_or(&[0; 8]);
+        self.scales[scale] = next.wrapping_add(usize::from(count));
+        let places = &PLACES[usize::from(significant)];
+        let ahead = *ahead;
+        if u64::from_le_bytes(ahead) << (64 - 8 * u32::from(count)) & 0x8080_8080_8080_8080 != 0 {
+            return self.scatter_long(codes, steps, &places[..usize::from(count)], &ahead);
         }
-        self.scales[scale] = next;
+        let mut put = |i: usize| codes[steps[usize::from(places[i]) % 8]] = unzigzag(u32::from(ahead[i]) + 1);
+        if count > 4 {
+            (4..8).rev().for_each(&mut put);
+        }
+        (0..4).rev().for_each(put);
+    }
+
+    #[cold]
+    fn scatter_long(&mut self, codes: &mut [i32], steps: &[usize; 8], places: &[u8], symbols: &[u8]) {
+        for (&place, &symbol) in places.iter().zip(symbols) {
+            let value = if u32::from(symbol) < LONG { u32::from(symbol) } else { self.long(symbol) };
+            codes[steps[usize::from(place) % 8]] = unzigzag(value.wrapping_add(1));
+        }
     }
 
     /// The value of a symbol that has further bits.
-    #[cold]
     fn long(&mut self, symbol: u8) -> u32 {
         let symbol = u32::from(symbol);
         if symbol >= SYMBOLS {
@@ -158,6 +188,15 @@ impl<'a> Streams<'a> {
         self.wrong |= value == u32::MAX;
         value
     }
+}
+
+/// How many of the next 8 cells, none of whose neighbours before has a code, are zero.
+#[inline(always)]
+fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
+    let ahead = symbols.get(next..).and_then(|next| next.first_chunk::<8>()).unwrap_or(&[1; 8]);
+    let around = around.first_chunk::<8>().unwrap_or(&[1; 8]);
+    let any = u64::from_le_bytes(*ahead) | u64::from_le_bytes(*around);
+    any.trailing_zeros() as usize / 8
 }
 
 /// 1, 2, 3, ... as -1, 1, -2, ...
