@@ -1,4 +1,4 @@
-//! Bytes in about their entropy: a range of asymmetric numeral systems (rANS) with fixed frequencies.
+//! Bytes in about their entropy: the range variant of asymmetric numeral systems (rANS) with fixed frequencies.
 //!
 //! A state holds 16 to 32 bits; long strings take turns in several states, so that a processor works on them at once.
 

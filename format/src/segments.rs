@@ -5,7 +5,7 @@ use crate::bytes::{Check, ensure};
 use crate::rans::{decode, encode, normalise, put_frequencies, take_frequencies};
 
 /// Symbols after which a stream may change its frequencies.
-const PIECE: usize = 1 << 15;
+const PIECE: usize = 1 << 12;
 
 /// How a segment is packed: the lowest two bits of its head.
 const RAW: usize = 0;
@@ -141,11 +141,11 @@ impl Segment {
     }
 }
 
-/// Estimated size in 1/65536 bits: the entropy, 10 bits for each frequency, 64 for the head and the states.
+/// Estimated size in 1/65536 bits: the entropy, 8 bits for each frequency, 100 for the head and the states.
 fn cost(length: usize, counts: &[u32; 256]) -> u64 {
     let used = counts.iter().filter(|&&count| count > 0);
     let (kinds, saved) = used.fold((0, 0), |(kinds, saved), &c| (kinds + 1, saved + u64::from(c) * log2(c)));
-    let coded = length as u64 * log2(length as u32) - saved + ((64 + 10 * kinds) << 16);
+    let coded = length as u64 * log2(length as u32) - saved + ((100 + 8 * kinds) << 16);
     let raw = (24 + 8 * length as u64) << 16;
     if kinds == 1 { 32 << 16 } else { raw.min(coded) }
 }
