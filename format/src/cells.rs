@@ -1,17 +1,132 @@
-//! Stand-in until the lattice codes are packed in cells.
-use crate::payload::{pack_codes, unpack_codes};
+//! Quantised codes on lattices, packed by their neighbourhood: cells of 2 x 2 x 2 codes, each with a byte that says
+//! which are not zero, the bytes sorted by how busy the cells before them are, the values by both.
 
-/// Appends the packed codes of boxes.
-pub fn pack_cells(codes: &[i32], _boxes: &[[usize; 4]], out: &mut Vec<u8>) {
-    pack_codes(codes, out);
+mod pack;
+#[cfg(test)]
+mod reference;
+#[cfg(test)]
+mod tests;
+mod unpack;
+
+pub use pack::pack_cells;
+pub use unpack::unpack_cells;
+
+use crate::segments::max_segments;
+
+/// Streams of significance bytes, by the activity around a cell.
+const CLASSES: usize = 5;
+
+/// Streams of values, by the activity around and in a cell.
+const SCALES: usize = 4;
+
+/// Activities: up to 8 of 8 codes in each of 4 neighbours; rounded up to a power of two, that lookups need no check.
+const ACTIVITIES: usize = 64;
+
+/// Symbols below are values; the others say the length of a value in bits and its highest bits.
+const LONG: u32 = 128;
+
+/// Value symbols are below.
+const SYMBOLS: u32 = LONG + 4 * (32 - 8) + 4;
+
+/// Class by activity.
+static CLASS_OF: [u8; ACTIVITIES] = classes([1, 3, 8, 16]);
+
+/// Scale by twice the nonzero codes of a cell plus half the activity.
+static SCALE_OF: [u8; ACTIVITIES] = classes([4, 10, 20, ACTIVITIES]);
+
+/// How many thresholds each activity reaches.
+const fn classes(thresholds: [usize; 4]) -> [u8; ACTIVITIES] {
+    let mut table = [0; ACTIVITIES];
+    let mut i = 0;
+    while i < 4 * ACTIVITIES {
+        table[i / 4] += (i / 4 >= thresholds[i % 4]) as u8;
+        i += 1;
+    }
+    table
 }
 
-/// Fills `codes`.
-pub fn unpack_cells(raw: &[u8], _boxes: &[[usize; 4]], codes: &mut [i32]) -> Result<usize, String> {
-    unpack_codes(raw, codes)
-}
+/// Ones in each byte: a processor's own count is not there on all.
+static ONES: [u8; 256] = {
+    let mut table = [0; 256];
+    let mut i = 1;
+    while i < 256 {
+        table[i] = table[i / 2] + (i % 2) as u8;
+        i += 1;
+    }
+    table
+};
 
-/// An upper bound of the packed bytes.
+/// Upper bound of the packed bytes of boxes with these extents.
+///
+/// At most a symbol for each cell, a symbol and 29 bits for each code, and a few numbers.
 pub fn max_packed(boxes: &[[usize; 4]]) -> usize {
-    64 + 5 * boxes.iter().map(|b| b.iter().product::<usize>()).sum::<usize>()
+    let sum = |each: fn(&[usize; 4]) -> usize| boxes.iter().map(each).fold(0, usize::saturating_add);
+    let (codes, cells) = (sum(volume), sum(cells));
+    let symbols = codes.saturating_add(cells);
+    let raw = codes.saturating_mul(29).div_ceil(8);
+    let lengths = 5 * (CLASSES + SCALES);
+    max_segments(symbols, CLASSES + SCALES).saturating_add(raw).saturating_add(lengths)
+}
+
+/// Codes of a box.
+fn volume(extents: &[usize; 4]) -> usize {
+    extents.iter().fold(1, |product, &extent| product.saturating_mul(extent))
+}
+
+/// Cells of a box.
+fn cells(&[x, y, z, t]: &[usize; 4]) -> usize {
+    volume(&[x.div_ceil(2), y.div_ceil(2), z.div_ceil(2), t])
+}
+
+/// The cells of a box, row by row.
+struct Grid {
+    /// Codes along x, y, z, t.
+    extents: [usize; 4],
+    /// Cells along x, y, z.
+    cells: [usize; 3],
+    /// Nonzero codes of each cell of the latest frame, with a row of zeros before each plane and a plane before all.
+    counts: Vec<u8>,
+    /// Those of the neighbours at y-1, z-1, t-1 of each cell of a row, together; then 8 that are not zero.
+    around: Vec<u8>,
+}
+
+/// A row of cells: where it is.
+#[derive(Clone, Copy)]
+struct Row {
+    /// Its first code in the box, and its first count.
+    code: usize,
+    count: usize,
+    /// Whether its cells have a second half along y and along z.
+    whole: [bool; 2],
+}
+
+impl Grid {
+    fn new(extents: [usize; 4]) -> Self {
+        let [x, y, z, _] = extents.map(|extent| extent.div_ceil(2));
+        let counts = if volume(&extents) == 0 { 0 } else { x * (y + 1) * (z + 1) };
+        Self { extents, cells: [x, y, z], counts: vec![0; counts], around: vec![1; x + 8] }
+    }
+
+    /// All rows in their order.
+    fn rows(&self) -> impl Iterator<Item = Row> + use<> {
+        let ([sx, sy, sz, st], [cx, cy, cz]) = (self.extents, self.cells);
+        let st = if self.counts.is_empty() { 0 } else { st };
+        let row = move |t, z, y| Row {
+            code: sx * (2 * y + sy * (2 * z + sz * t)),
+            count: cx * (y + 1 + (cy + 1) * (z + 1)),
+            whole: [2 * y + 1 < sy, 2 * z + 1 < sz],
+        };
+        (0..st).flat_map(move |t| (0..cz).flat_map(move |z| (0..cy).map(move |y| row(t, z, y))))
+    }
+
+    /// Sums the neighbours of a row; returns them, and the counts to replace (those at t-1).
+    fn around(&mut self, row: Row) -> (&[u8], &mut [u8]) {
+        let [cx, cy, _] = self.cells;
+        let (before, here) = self.counts.split_at_mut(row.count);
+        let (up, back) = (&before[row.count - cx..], &before[row.count - cx * (cy + 1)..]);
+        for (((around, here), up), back) in self.around.iter_mut().zip(&*here).zip(up).zip(back) {
+            *around = here.wrapping_add(*up).wrapping_add(*back);
+        }
+        (&self.around, &mut here[..cx])
+    }
 }

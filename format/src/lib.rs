@@ -4,6 +4,7 @@
 //! and maps no memory; it reads through [`Storage`] and writes to any `std::io::Write` without a seek.
 #![forbid(unsafe_code)]
 
+mod bits;
 mod block;
 mod bytes;
 mod cells;
@@ -18,9 +19,11 @@ mod metadata;
 pub mod payload;
 mod planes;
 mod pyramid;
+mod rans;
 mod reader;
 mod sample;
 mod section;
+mod segments;
 mod structure;
 #[cfg(test)]
 mod testing;

@@ -1,0 +1,214 @@
+//! Streams to codes.
+
+use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, SYMBOLS, cells, volume};
+use crate::bits::{BitReader, take_varint};
+use crate::bytes::{Check, ensure};
+use crate::segments::unpack_segments;
+
+/// Fills `codes` with those of all boxes; returns how many are not zero.
+///
+/// `boxes[i]` are the extents of a box along x, y, z, t.
+pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Result<usize, String> {
+    codes.fill(0);
+    let total = boxes.iter().map(volume).fold(0, usize::saturating_add);
+    ensure(total == codes.len(), || format!("boxes of {total} codes for {}", codes.len()))?;
+    let mut streams = Streams::parse(raw, boxes.iter().map(cells).sum(), total)?;
+    let mut rest = codes;
+    for &extents in boxes {
+        let (codes, after) = rest.split_at_mut(volume(&extents));
+        streams.fill(codes, extents)?;
+        rest = after;
+    }
+    streams.finish()
+}
+
+/// Bytes behind the symbols, so that 8 can be looked at from each.
+const BEHIND: usize = 8;
+
+/// Classes by the activity without x-1 (up to 24), 4 bits for each count of x-1 from 0 to 8.
+static CLASSES_OF: [u64; 32] = {
+    let mut table = [0; 32];
+    let mut i = 0;
+    while i < 32 * 9 {
+        table[i / 9] |= (CLASS_OF[i / 9 + i % 9] as u64) << (4 * (i % 9));
+        i += 1;
+    }
+    table
+};
+
+/// The ones of each byte from the lowest, then the highest again and again: what goes there is put there last.
+static PLACES: [[u8; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut byte = 1;
+    while byte < 256 {
+        let (mut i, mut left) = (0, byte);
+        while i < 8 {
+            table[byte][i] = left.trailing_zeros() as u8;
+            left = if left.is_power_of_two() { left } else { left & (left - 1) };
+            i += 1;
+        }
+        byte += 1;
+    }
+    table
+};
+
+struct Streams<'a> {
+    symbols: Vec<u8>,
+    /// The next symbol of each stream; lengths are powers of two, that lookups need no check.
+    classes: [usize; 8],
+    scales: [usize; SCALES],
+    /// Where each stream ends.
+    ends: [usize; CLASSES + SCALES],
+    bits: BitReader<'a>,
+    /// Whether some symbol means nothing.
+    wrong: bool,
+}
+
+impl<'a> Streams<'a> {
+    fn parse(raw: &'a [u8], cells: usize, codes: usize) -> Check<Self> {
+        let mut rest = raw;
+        let (mut ends, mut sum) = ([0; CLASSES + SCALES], 0usize);
+        for end in &mut ends {
+            sum = sum.saturating_add(take_varint(&mut rest)?);
+            *end = sum;
+        }
+        let marks = ends[CLASSES - 1];
+        ensure(marks == cells, || format!("{marks} significance bytes for {cells} cells"))?;
+        ensure(sum - marks <= codes, || format!("{} values for {codes} codes", sum - marks))?;
+        let mut symbols = vec![0; sum + BEHIND];
+        unpack_segments(&mut rest, &mut symbols[..sum])?;
+        let begin = |i: usize| if i == 0 { 0 } else { ends[i - 1] };
+        let classes = std::array::from_fn(|class| begin(class.min(CLASSES)));
+        let scales = std::array::from_fn(|scale| begin(CLASSES + scale));
+        Ok(Self { symbols, classes, scales, ends, bits: BitReader::new(rest), wrong: false })
+    }
+
+    /// Every stream and the bits must have come to their end.
+    fn finish(self) -> Check<usize> {
+        let next = self.classes[..CLASSES].iter().chain(&self.scales);
+        ensure(next.eq(&self.ends), || "streams do not have the lengths that their cells call for".into())?;
+        ensure(!self.wrong, || "a code out of range".into())?;
+        let left = self.bits.end()?.len();
+        ensure(left == 0, || format!("{left} bytes too many"))?;
+        Ok(self.ends[CLASSES + SCALES - 1] - self.ends[CLASSES - 1])
+    }
+
+    /// A box, whose codes are zero so far.
+    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> Check {
+        let mut grid = Grid::new(extents);
+        let mut significant = vec![0; grid.cells[0]];
+        let ahead = |bit: usize| bit % 2 + extents[0] * (bit / 2 % 2 + extents[1] * (bit / 4));
+        let steps = std::array::from_fn(ahead);
+        for row in grid.rows() {
+            let (around, counts) = grid.around(row);
+            self.mark(around, counts, &mut significant);
+            ensure(inside(&significant, row, extents[0]), || "a code outside its box is not zero".into())?;
+            self.scatter(&mut codes[row.code..], &steps, &significant, around, counts);
+        }
+        Ok(())
+    }
+
+    /// The significance bytes of a row, and how many ones each has.
+    ///
+    /// Every cell waits for the one before it, so runs of zeros amid zeros are taken at once.
+    fn mark(&mut self, around: &[u8], counts: &mut [u8], significant: &mut [u8]) {
+        counts.fill(0);
+        significant.fill(0);
+        let (symbols, mut next, mut before, mut x) = (&self.symbols[..], self.classes, 0, 0);
+        while x < significant.len() {
+            if before == 0 {
+                let zeros = zeros_ahead(&around[x..], symbols, next[0]);
+                next[0] += zeros;
+                x += zeros;
+                if zeros == 8 || x >= significant.len() {
+                    continue;
+                }
+            }
+            let class = CLASSES_OF[usize::from(around[x]) % 32] >> (4 * before) & 7;
+            let place = &mut next[class as usize];
+            let byte = symbols.get(*place).map_or(0, |byte| *byte);
+            *place = place.wrapping_add(1);
+            before = ONES[usize::from(byte)];
+            significant[x] = byte;
+            counts[x] = before;
+            x += 1;
+        }
+        self.classes = next;
+    }
+
+    /// The values of a row of cells.
+    fn scatter(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: &[u8], around: &[u8], counts: &[u8]) {
+        let mut before = 0;
+        for (x, ((&byte, &around), &count)) in significant.iter().zip(around).zip(counts).enumerate() {
+            if byte != 0 {
+                let busy = usize::from(2 * count + around.wrapping_add(before) / 2);
+                let scale = usize::from(SCALE_OF[busy % ACTIVITIES]) % SCALES;
+                self.scatter_cell(&mut codes[2 * x..], steps, byte, scale);
+            }
+            before = count;
+        }
+    }
+
+    /// The values of a cell: without a loop where none is long, for its end could not be foreseen.
+    #[inline(always)]
+    fn scatter_cell(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: u8, scale: usize) {
+        let next = self.scales[scale];
+        let count = ONES[usize::from(significant)];
+        let ahead = self.symbols.get(next..).and_then(|ahead| ahead.first_chunk::<8>()).unwrap_or(&[0; 8]);
+        self.scales[scale] = next.wrapping_add(usize::from(count));
+        let places = &PLACES[usize::from(significant)];
+        let ahead = *ahead;
+        if u64::from_le_bytes(ahead) << (64 - 8 * u32::from(count)) & 0x8080_8080_8080_8080 != 0 {
+            return self.scatter_long(codes, steps, &places[..usize::from(count)], &ahead);
+        }
+        let mut put = |i: usize| codes[steps[usize::from(places[i]) % 8]] = unzigzag(u32::from(ahead[i]) + 1);
+        if count > 4 {
+            (4..8).rev().for_each(&mut put);
+        }
+        (0..4).rev().for_each(put);
+    }
+
+    #[cold]
+    fn scatter_long(&mut self, codes: &mut [i32], steps: &[usize; 8], places: &[u8], symbols: &[u8]) {
+        for (&place, &symbol) in places.iter().zip(symbols) {
+            let value = if u32::from(symbol) < LONG { u32::from(symbol) } else { self.long(symbol) };
+            codes[steps[usize::from(place) % 8]] = unzigzag(value.wrapping_add(1));
+        }
+    }
+
+    /// The value of a symbol that has further bits.
+    fn long(&mut self, symbol: u8) -> u32 {
+        let symbol = u32::from(symbol);
+        if symbol >= SYMBOLS {
+            self.wrong = true;
+            return 0;
+        }
+        let low = (symbol - LONG) / 4 + 5;
+        let value = (4 + symbol % 4) << low | self.bits.take(low);
+        self.wrong |= value == u32::MAX;
+        value
+    }
+}
+
+/// How many of the next 8 cells, none of whose neighbours before has a code, are zero.
+#[inline(always)]
+fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
+    let ahead = symbols.get(next..).and_then(|next| next.first_chunk::<8>()).unwrap_or(&[1; 8]);
+    let around = around.first_chunk::<8>().unwrap_or(&[1; 8]);
+    let any = u64::from_le_bytes(*ahead) | u64::from_le_bytes(*around);
+    any.trailing_zeros() as usize / 8
+}
+
+/// 1, 2, 3, ... as -1, 1, -2, ...
+fn unzigzag(value: u32) -> i32 {
+    (value >> 1) as i32 ^ ((value & 1) as i32).wrapping_neg()
+}
+
+/// Whether the significance bytes of a row are zero outside the box.
+fn inside(significant: &[u8], row: Row, width: usize) -> bool {
+    let [y, z] = row.whole;
+    let outside = if y { 0 } else { 0b1100_1100 } | if z { 0 } else { 0b1111_0000 };
+    let any = if outside == 0 { 0 } else { significant.iter().fold(0, |any, byte| any | byte) };
+    let last = if width.is_multiple_of(2) { 0 } else { significant.last().map_or(0, |byte| byte & 0b1010_1010) };
+    any & outside == 0 && last == 0
+}

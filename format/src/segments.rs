@@ -1,0 +1,253 @@
+//! A string of bytes cut in segments, each packed in the way that makes it shortest.
+
+use crate::bits::{put_varint, take_bytes, take_varint};
+use crate::bytes::{Check, ensure};
+use crate::rans::{decode, encode, normalise, put_frequencies, take_frequencies};
+
+/// Symbols after which a stream may change its frequencies.
+const PIECE: usize = 1 << 12;
+
+/// How a segment is packed: the lowest two bits of its head.
+const RAW: usize = 0;
+const CONSTANT: usize = 1;
+const COARSE: usize = 2;
+const FINE: usize = 3;
+
+/// Bits of the frequencies.
+const COARSE_BITS: u32 = 12;
+const FINE_BITS: u32 = 14;
+
+/// Most bytes that a piece takes beside its symbols.
+const HEAD: usize = 5;
+
+/// Upper bound of the packed bytes of so many symbols in so many streams.
+pub(crate) fn max_segments(symbols: usize, streams: usize) -> usize {
+    symbols.saturating_add(HEAD * (streams + symbols / PIECE))
+}
+
+/// Appends streams, given one after another with the length of each.
+pub(crate) fn pack_segments(symbols: &[u8], lengths: &[usize], out: &mut Vec<u8>) {
+    let mut rest = symbols;
+    for segment in Segment::of(symbols, lengths) {
+        let (symbols, after) = rest.split_at(segment.length);
+        segment.pack(symbols, out);
+        rest = after;
+    }
+}
+
+/// Fills `symbols` from the segments at the front of `bytes` and takes those off.
+pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
+    let mut rest = symbols;
+    while !rest.is_empty() {
+        let head = take_varint(bytes)?;
+        let fits = 0 < head >> 2 && head >> 2 <= rest.len();
+        ensure(fits, || format!("a segment of {} where {} symbols are left", head >> 2, rest.len()))?;
+        let (segment, after) = rest.split_at_mut(head >> 2);
+        unpack_segment(bytes, head & 3, segment)?;
+        rest = after;
+    }
+    Ok(())
+}
+
+fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> Check {
+    match kind {
+        RAW => symbols.copy_from_slice(take_bytes(bytes, symbols.len())?),
+        CONSTANT => symbols.fill(take_bytes(bytes, 1)?[0]),
+        _ => {
+            let bits = if kind == COARSE { COARSE_BITS } else { FINE_BITS };
+            let frequencies = take_frequencies(bytes, bits)?;
+            decode(bytes, &frequencies, bits, symbols)?;
+        }
+    }
+    Ok(())
+}
+
+/// A run of symbols that share their frequencies.
+struct Segment {
+    length: usize,
+    counts: [u32; 256],
+    /// Estimated size in 1/65536 bits.
+    cost: u64,
+}
+
+impl Segment {
+    fn new(symbols: &[u8]) -> Self {
+        Self::counted(symbols.len(), histogram(symbols))
+    }
+
+    fn counted(length: usize, counts: [u32; 256]) -> Self {
+        Self { length, counts, cost: cost(length, &counts) }
+    }
+
+    /// The segments of streams: pieces, joined with the one before where that is not longer.
+    fn of(symbols: &[u8], lengths: &[usize]) -> Vec<Self> {
+        let mut segments: Vec<Self> = Vec::new();
+        let mut rest = symbols;
+        for &length in lengths {
+            let (stream, after) = rest.split_at(length);
+            rest = after;
+            for piece in stream.chunks(PIECE).map(Self::new) {
+                let apart = if let Some(last) = segments.last_mut() { last.join(piece) } else { Some(piece) };
+                segments.extend(apart);
+            }
+        }
+        segments
+    }
+
+    /// Takes the next piece in, or gives it back where both are shorter apart.
+    fn join(&mut self, next: Self) -> Option<Self> {
+        let counts = std::array::from_fn(|symbol| self.counts[symbol] + next.counts[symbol]);
+        let both = Self::counted(self.length + next.length, counts);
+        if both.cost > self.cost + next.cost {
+            return Some(next);
+        }
+        *self = both;
+        None
+    }
+
+    fn pack(&self, symbols: &[u8], out: &mut Vec<u8>) {
+        let head = |kind, out: &mut Vec<u8>| put_varint(self.length << 2 | kind, out);
+        let start = out.len();
+        if self.counts.iter().filter(|&&count| count > 0).count() == 1 {
+            head(CONSTANT, out);
+            return out.push(symbols[0]);
+        }
+        let bits = self.bits();
+        head(if bits == COARSE_BITS { COARSE } else { FINE }, out);
+        let frequencies = normalise(&self.counts, bits);
+        put_frequencies(&frequencies, bits, out);
+        encode(symbols, &frequencies, bits, out);
+        if out.len() - start > symbols.len() {
+            out.truncate(start);
+            head(RAW, out);
+            out.extend_from_slice(symbols);
+        }
+    }
+
+    /// Bits of the frequencies; fine ones where they pay, for they unpack more slowly.
+    fn bits(&self) -> u32 {
+        let coarse = self.coded(COARSE_BITS);
+        if self.coded(FINE_BITS) < coarse - coarse / 256 { FINE_BITS } else { COARSE_BITS }
+    }
+
+    /// Size in 1/65536 bits with frequencies of so many bits.
+    fn coded(&self, bits: u32) -> u64 {
+        let frequencies = normalise(&self.counts, bits);
+        let mut table = Vec::new();
+        put_frequencies(&frequencies, bits, &mut table);
+        let used = self.counts.iter().zip(frequencies).filter(|(count, _)| **count > 0);
+        let symbols = used.map(|(&count, f)| u64::from(count) * ((u64::from(bits) << 16) - log2(f.into())));
+        symbols.sum::<u64>() + ((8 * table.len() as u64) << 16)
+    }
+}
+
+/// Estimated size in 1/65536 bits: the entropy, 8 bits for each frequency, 100 for the head and the states.
+fn cost(length: usize, counts: &[u32; 256]) -> u64 {
+    let used = counts.iter().filter(|&&count| count > 0);
+    let (kinds, saved) = used.fold((0, 0), |(kinds, saved), &c| (kinds + 1, saved + u64::from(c) * log2(c)));
+    let coded = length as u64 * log2(length as u32) - saved + ((100 + 8 * kinds) << 16);
+    let raw = (24 + 8 * length as u64) << 16;
+    if kinds == 1 { 32 << 16 } else { raw.min(coded) }
+}
+
+/// Base 2 logarithm in 1/65536, by integers so that it is the same everywhere.
+fn log2(value: u32) -> u64 {
+    let whole = value.max(1).ilog2();
+    let mantissa = (u64::from(value.max(1)) << 31) >> whole;
+    let (at, between) = ((mantissa >> 23) as usize & 0xFF, mantissa & 0x7F_FFFF);
+    let (low, high) = (u64::from(LOG2[at]), u64::from(LOG2[at + 1]));
+    (u64::from(whole) << 16) + low + (((high - low) * between) >> 23)
+}
+
+/// `log2(1 + i / 256)` in 1/65536.
+static LOG2: [u32; 257] = {
+    let mut table = [0; 257];
+    let mut i = 0;
+    while i < 257 {
+        table[i] = fraction(i as u64);
+        i += 1;
+    }
+    table
+};
+
+/// Bit by bit: the square of a number has twice its logarithm.
+const fn fraction(i: u64) -> u32 {
+    let (mut value, mut bits, mut step) = ((256 + i) << 23, 0, 0);
+    if i == 256 {
+        return 1 << 16;
+    }
+    while step < 16 {
+        value = (value * value) >> 31;
+        bits <<= 1;
+        if value >> 32 != 0 {
+            value >>= 1;
+            bits |= 1;
+        }
+        step += 1;
+    }
+    bits
+}
+
+/// How often each byte occurs; four counters of each, for equal neighbours would wait for one another.
+fn histogram(symbols: &[u8]) -> [u32; 256] {
+    let mut counts = [[0u32; 256]; 4];
+    let (fours, tail) = symbols.as_chunks::<4>();
+    for four in fours {
+        for (counts, &symbol) in counts.iter_mut().zip(four) {
+            counts[usize::from(symbol)] += 1;
+        }
+    }
+    tail.iter().for_each(|&symbol| counts[0][usize::from(symbol)] += 1);
+    std::array::from_fn(|symbol| counts.iter().map(|counts| counts[symbol]).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packed(streams: &[&[u8]]) -> Vec<u8> {
+        let lengths: Vec<usize> = streams.iter().map(|stream| stream.len()).collect();
+        let (symbols, mut out) = (streams.concat(), Vec::new());
+        pack_segments(&symbols, &lengths, &mut out);
+        assert!(out.len() <= max_segments(symbols.len(), streams.len()));
+        let (mut rest, mut back) = (&out[..], vec![0; symbols.len()]);
+        unpack_segments(&mut rest, &mut back).expect("packed");
+        assert!(rest.is_empty() && back == symbols);
+        out
+    }
+
+    /// Small numbers in no simple order, 255 now and then.
+    fn noise(count: u32, kinds: u32) -> Vec<u8> {
+        let scramble = |i: u32| (i.wrapping_mul(0x9E37_79B1) ^ i >> 3).wrapping_mul(0x85EB_CA6B) >> 13;
+        (0..count).map(|i| if scramble(i) % 1000 == 0 { 255 } else { (scramble(i) % kinds) as u8 }).collect()
+    }
+
+    #[test]
+    fn every_kind_is_used_where_it_is_shortest() {
+        let kind = |symbols: &[u8]| usize::from(packed(&[symbols])[0] & 3);
+        assert_eq!(kind(&[7; 9]), CONSTANT);
+        assert_eq!(kind(&[7, 8, 9]), RAW);
+        assert_eq!(kind(&noise(5000, 256)), RAW);
+        assert_eq!(kind(&noise(5000, 5)), COARSE);
+        let rare: Vec<u8> = (0..200_000u32).map(|i| if i % 2000 == 0 { (i / 2000) as u8 } else { 0 }).collect();
+        assert_eq!(kind(&rare), FINE);
+    }
+
+    #[test]
+    fn streams_are_joined_where_alike_and_cut_where_not() {
+        let (few, many) = (noise(2 * PIECE as u32, 3), noise(2 * PIECE as u32, 90));
+        let apart = packed(&[&few]).len() + packed(&[&many]).len();
+        assert_eq!(packed(&[&few, &many]).len(), apart);
+        assert_eq!(packed(&[&[few, many].concat()]).len(), apart);
+        let (a, b) = (noise(300, 9), noise(301, 9));
+        assert!(packed(&[&a, &b]).len() + 5 < packed(&[&a]).len() + packed(&[&b]).len());
+    }
+
+    #[test]
+    fn logarithms_are_close() {
+        for value in [1u32, 2, 3, 100, 4095, 4096, 1_000_003, u32::MAX] {
+            let exact = f64::from(value).log2() * 65536.0;
+            assert!((log2(value) as f64 - exact).abs() < 4.0, "{value}");
+        }
+    }
+}
