@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
+use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, plan::Sweep, sanity};
 use wavesplat_tools::demo;
 use wavesplat_tools::output::{Format, Shape, Target};
@@ -20,6 +21,8 @@ Examples:
   wavesplat-tools demo --frames-only -o eddy/
   wavesplat-tools bench -o bench-output
   wavesplat-tools bench --quick -o quick
+  wavesplat-tools bench size --peers python3 -o sizes
+  wavesplat-tools bench size mine.npy --tolerances 1e-2,1e-3
 
 wavesplat's own instruments: the demo, synthetic archives and the benchmark.";
 
@@ -37,7 +40,7 @@ enum Command {
     /// Write a synthetic archive
     Synth(SynthArgs),
     /// Measure run time against error, beside the conventional method; an interrupted run goes on where it was
-    Bench(BenchArgs),
+    Bench(Box<BenchArgs>),
     /// One measured stage of the benchmark
     #[command(hide = true)]
     BenchStep {
@@ -78,7 +81,10 @@ struct SynthArgs {
 }
 
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
 struct BenchArgs {
+    #[command(subcommand)]
+    other: Option<OtherBench>,
     /// The folder of results.json, results.md and the figures
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
@@ -106,6 +112,60 @@ struct BenchArgs {
     /// The day to write into the results [default: the clock's]
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<String>,
+}
+
+#[derive(Subcommand)]
+enum OtherBench {
+    /// Print file sizes under a hard bound, conversion and decoding times on one core, and the same of other coders
+    Size(SizeArgs),
+}
+
+#[derive(Args)]
+struct SizeArgs {
+    /// Archives (t, z, y, x), each one .npy; held in memory whole
+    #[arg(value_name = "INPUT.npy")]
+    inputs: Vec<PathBuf>,
+    /// Archives to make [default: the usual ones where there are no inputs]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Option<Vec<Subject>>,
+    /// Also measure other coders: the Python that has what tools/peers/requirements.txt names
+    #[arg(long, value_name = "PYTHON")]
+    peers: Option<PathBuf>,
+    /// What Python is to run [default: tools/peers/peers.py of the sources]
+    #[arg(long, value_name = "FILE", requires = "peers")]
+    script: Option<PathBuf>,
+    /// The folder of size.json and size.md
+    #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
+    output: PathBuf,
+    /// Shares of the value range, with commas between them
+    #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3,1e-4", value_parser = parse_tolerance)]
+    tolerances: Vec<f64>,
+    /// Rounds through all coders; the least time of all is taken
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    repeats: usize,
+    /// Small archives: whether everything works, in seconds
+    #[arg(long)]
+    small: bool,
+    /// The day to write into the results [default: the clock's]
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    date: Option<String>,
+}
+
+impl SizeArgs {
+    fn config(&self) -> Result<size::Config> {
+        let script = || self.script.clone().unwrap_or_else(Peers::usual_script);
+        Ok(size::Config {
+            inputs: self.inputs.clone(),
+            subjects: self.kinds.clone(),
+            small: self.small,
+            tolerances: self.tolerances.clone(),
+            repeats: self.repeats,
+            peers: self.peers.clone().map(|python| Peers { python, script: script() }),
+            output: self.output.clone(),
+            program: this_program()?,
+            date: self.date.clone(),
+        })
+    }
 }
 
 impl BenchArgs {
@@ -164,8 +224,22 @@ fn synth(args: &SynthArgs) -> Result<()> {
     Target::parse(&args.output, args.format)?.write(&shape, |frame, bytes| synth.fill(frame, bytes))
 }
 
+fn this_program() -> Result<PathBuf> {
+    std::env::current_exe().map_err(|e| Error::io("wavesplat-tools", "finding this program", e))
+}
+
+fn bench_size(args: &SizeArgs) -> Result<()> {
+    let (results, tables) = size::run(&args.config()?, &mut say)?;
+    wavesplat::cli::print(&tables)?;
+    let wrong = size::complaints(&results);
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    Err(Error::BoundMissed { path: args.output.clone(), what: format!("THE BOUND IS MISSED\n{}", wrong.join("\n")) })
+}
+
 fn bench(args: &BenchArgs) -> Result<()> {
-    let program = std::env::current_exe().map_err(|e| Error::io("wavesplat-tools", "finding this program", e))?;
+    let program = this_program()?;
     let (output, date) = (args.output.clone(), args.date.clone());
     let config = bench::Config { sweep: args.sweep(), output, program, force: args.force, date };
     let results = bench::run(&config, &mut say)?;
@@ -186,7 +260,10 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo(&args),
         Command::Synth(args) => synth(&args),
-        Command::Bench(args) => bench(&args),
+        Command::Bench(args) => match &args.other {
+            Some(OtherBench::Size(args)) => bench_size(args),
+            None => bench(&args),
+        },
         Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),
     };
     result.map_or_else(|e| report(&e), |()| ExitCode::SUCCESS)

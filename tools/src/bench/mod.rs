@@ -13,6 +13,7 @@
 //! sanity    what must hold of every point, on any machine
 //! machine   where it ran, and when
 //! report    results.json and results.md;  plot, chart: the figures
+//! size      another benchmark: sizes under a hard bound, and times, beside other coders
 //! ```
 //!
 //! Errors are shares of the archive's value range throughout.
@@ -27,6 +28,7 @@ mod plot;
 pub mod point;
 mod report;
 pub mod sanity;
+pub mod size;
 mod stages;
 mod step;
 mod textbook;

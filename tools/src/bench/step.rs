@@ -2,6 +2,7 @@
 //! is its own.
 
 use super::look::Look;
+use super::size::own;
 use super::stages;
 use super::truth::ImageError;
 use serde::de::DeserializeOwned;
@@ -15,6 +16,7 @@ use wavesplat::error::{Error, Result};
 pub(super) enum Step {
     Convert(Convert),
     Render(Render),
+    Size(own::Task),
 }
 
 /// Frames to a coefficient file.
@@ -105,6 +107,7 @@ pub fn run_step(text: &str) -> Result<String> {
     match serde_json::from_str(text).map_err(wrong)? {
         Step::Convert(step) => answer(stages::convert(&step)?),
         Step::Render(step) => answer(stages::render(&step)?),
+        Step::Size(task) => answer(own::measure(&task)?),
     }
     .map_err(wrong)
 }

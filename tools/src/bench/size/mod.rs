@@ -1,0 +1,162 @@
+//! The benchmark of sizes: how small a file is under a hard bound, and how fast it is made and read, beside other coders.
+//!
+//! ```text
+//! schemes   the ways of converting that are measured
+//! data      on what: given archives, the demo's, those of `synth`, those of the peers' script
+//! own       one conversion, decoded and compared, in a process of its own;  clock: its times
+//! peers     the same of other coders, by `tools/peers/peers.py`
+//! row       what is recorded;  targets: what of it is to be how good
+//! tables    size.md for people
+//! ```
+
+mod clock;
+mod data;
+pub(super) mod own;
+mod peers;
+mod row;
+mod schemes;
+mod tables;
+mod targets;
+
+pub use data::{Data, Subject};
+pub use peers::Peers;
+pub use row::{Own, Results, Row};
+pub use schemes::{BASELINE, SCHEMES, Scheme};
+pub use targets::Verdict;
+
+use super::machine::{self, Machine};
+use super::step::{Outcome, Step, in_process};
+use own::{Measured, Task};
+use peers::PeersTask;
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use wavesplat::error::{Error, Result};
+
+/// The number of the layout of `size.json`; a change of a key's meaning changes it.
+pub const SCHEMA: u32 = 1;
+/// How often every time is taken in a round, one after the other, after once that is not counted.
+pub const IN_A_ROW: usize = 2;
+
+/// What to measure, with what, and where results go.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Archives of the user.
+    pub inputs: Vec<PathBuf>,
+    /// Archives to make; by default the usual ones where there are no inputs.
+    pub subjects: Option<Vec<Subject>>,
+    /// Make them small: whether everything works, in seconds.
+    pub small: bool,
+    /// Shares of the value range.
+    pub tolerances: Vec<f64>,
+    /// Rounds through all coders.
+    pub repeats: usize,
+    /// Other coders.
+    pub peers: Option<Peers>,
+    /// The folder of results.
+    pub output: PathBuf,
+    /// `wavesplat-tools` itself, whose `bench-step` measures.
+    pub program: PathBuf,
+    /// The day to write into the results; by default that of the clock.
+    pub date: Option<String>,
+}
+
+/// Measures everything and writes `size.json` and `size.md`; returns the results and the tables. `say` hears what is
+/// going on.
+pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, String)> {
+    if config.repeats == 0 || config.tolerances.is_empty() {
+        return Err(Error::usage("--repeats, --tolerances: nothing is left to measure"));
+    }
+    let work = config.output.join("size-work");
+    fs::create_dir_all(&work).map_err(|e| Error::io(&work, "creating the folder", e))?;
+    let data = gather(config, &work, say)?;
+    let mut rows = Vec::new();
+    for one in &data {
+        rows.extend(measure(config, one, &work.join("file.wspl"), say)?);
+    }
+    fs::remove_dir_all(&work).map_err(|e| Error::io(&work, "removing", e))?;
+    let results = Results {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION").into(),
+        machine: Machine::this(),
+        date: config.date.clone().unwrap_or_else(machine::today),
+        rounds: config.repeats,
+        data,
+        verdicts: targets::judge(&rows),
+        rows,
+    };
+    let text = tables::markdown(&results);
+    write(&results, &text, &config.output)?;
+    Ok((results, text))
+}
+
+/// A sentence for every row whose bound is missed by a scheme of wavesplat.
+pub fn complaints(results: &Results) -> Vec<String> {
+    let missed = results.rows.iter().filter(|r| r.own.is_some() && !r.holds());
+    let words = |r: &Row| {
+        let Row { data, tolerance, coder, largest_error, bound, .. } = r;
+        format!("{data}, {tolerance:e}, {coder}: a sample is off by {largest_error:e}, allowed are {bound:e}")
+    };
+    missed.map(words).collect()
+}
+
+/// Opens the user's archives and makes the others.
+fn gather(config: &Config, work: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<Data>> {
+    let usual = || if config.inputs.is_empty() { Subject::usual(config.peers.is_some()) } else { Vec::new() };
+    let mut paths = config.inputs.clone();
+    for subject in config.subjects.clone().unwrap_or_else(usual) {
+        say(&format!("making {}", subject.name()));
+        paths.push(subject.make(work, config.small, config.peers.as_ref())?);
+    }
+    let data = paths.into_iter().map(Data::of).collect::<Result<Vec<_>>>()?;
+    let mut names = HashSet::new();
+    match data.iter().find(|d| !names.insert(&d.name)) {
+        Some(twice) => Err(Error::usage(format!("two archives are called {}: rename one", twice.name))),
+        None => Ok(data),
+    }
+}
+
+/// Every coder at every tolerance, round by round.
+fn measure(config: &Config, data: &Data, file: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for round in 0..config.repeats {
+        say(&format!("measuring {}, round {} of {}", data.name, round + 1, config.repeats));
+        for tolerance in &config.tolerances {
+            for scheme in &SCHEMES {
+                row::merge(&mut rows, vec![by_scheme(config, data, scheme, *tolerance, file)?]);
+            }
+        }
+        if let Some(peers) = &config.peers {
+            row::merge(&mut rows, peers.measure(&peers_task(config, data, round == 0))?);
+        }
+    }
+    rows.sort_by_key(|row| config.tolerances.iter().position(|t| *t == row.tolerance)); // stable: coders keep their order
+    Ok(rows)
+}
+
+fn by_scheme(config: &Config, data: &Data, scheme: &Scheme, tolerance: f64, file: &Path) -> Result<Row> {
+    let task = Task {
+        source: data.path.clone(),
+        scheme: scheme.name.into(),
+        tolerance,
+        range: data.range,
+        repeats: IN_A_ROW,
+        output: file.into(),
+    };
+    let outcome: Outcome<Measured> = in_process(&config.program, &Step::Size(task))?;
+    Ok(Row::of_own(data, tolerance, scheme.name, &outcome.did))
+}
+
+fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a> {
+    let (path, tolerances) = (data.path.as_path(), config.tolerances.as_slice());
+    PeersTask { data: &data.name, data_bytes: data.bytes, path, tolerances, repeats: IN_A_ROW, all }
+}
+
+fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {
+    let json = folder.join("size.json");
+    let text = serde_json::to_string_pretty(results).map_err(|e| super::bad_json(&json, &e))?;
+    for (path, text) in [(json, text.as_str()), (folder.join("size.md"), tables)] {
+        fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
+    }
+    Ok(())
+}

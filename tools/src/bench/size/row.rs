@@ -1,0 +1,167 @@
+//! What is recorded.
+
+use super::data::Data;
+use super::own::Measured;
+use super::targets::Verdict;
+use crate::bench::machine::Machine;
+use serde::{Deserialize, Serialize};
+
+/// All results of a run: `size.json`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Results {
+    /// [`super::SCHEMA`].
+    pub schema: u32,
+    /// The version of the tools.
+    pub version: String,
+    /// Where it ran.
+    pub machine: Machine,
+    /// The day it was written.
+    pub date: String,
+    /// How many rounds were run, in each of which every time is taken [`super::IN_A_ROW`] times.
+    pub rounds: usize,
+    /// What was measured.
+    pub data: Vec<Data>,
+    /// Every coder on everything at every tolerance.
+    pub rows: Vec<Row>,
+    /// Which targets are met.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// A coder on one archive at one tolerance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The name of the archive.
+    pub data: String,
+    /// As a share of the archive's value range.
+    pub tolerance: f64,
+    /// A scheme of wavesplat, or a peer.
+    pub coder: String,
+    /// Of the whole file.
+    pub bytes: u64,
+    /// Bytes of samples by bytes of the file.
+    pub ratio: f64,
+    /// What no sample may be off, in the units of the samples.
+    pub bound: f64,
+    /// What some sample is off, in the units of the samples; nothing (infinite) where a value is lost.
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub largest_error: f64,
+    /// Samples to bytes, seconds of one core.
+    pub encode_seconds: f64,
+    /// Bytes to samples in one array, seconds of one core.
+    pub decode_seconds: f64,
+    /// Of wavesplat alone.
+    pub own: Option<Own>,
+}
+
+/// What only wavesplat's rows have.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Own {
+    /// Bytes to codes, ready to be splatted, seconds of one core.
+    pub codes_seconds: f64,
+    /// Nonzero codes for each sample.
+    pub codes_per_sample: f64,
+    /// Samples stored exactly because codes missed the bound.
+    pub outliers: u64,
+    /// Samples of blocks that are stored exactly and so have no codes.
+    pub exact_samples: u64,
+}
+
+/// JSON has no infinity: serde writes nothing for it.
+fn infinite_if_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+}
+
+impl Row {
+    /// Of wavesplat.
+    pub(super) fn of_own(data: &Data, tolerance: f64, scheme: &str, measured: &Measured) -> Self {
+        Self {
+            data: data.name.clone(),
+            tolerance,
+            coder: scheme.into(),
+            bytes: measured.bytes,
+            ratio: data.bytes as f64 / measured.bytes as f64,
+            bound: measured.bound,
+            largest_error: measured.largest_error,
+            encode_seconds: measured.encode_seconds,
+            decode_seconds: measured.decode_seconds,
+            own: Some(Own {
+                codes_seconds: measured.codes_seconds,
+                codes_per_sample: measured.codes_per_sample,
+                outliers: measured.outliers,
+                exact_samples: measured.exact_samples,
+            }),
+        }
+    }
+
+    /// Whether no sample is further off than the bound allows.
+    pub fn holds(&self) -> bool {
+        self.largest_error <= self.bound
+    }
+
+    /// Whether two rows are of the same coder on the same data at the same tolerance.
+    fn same(&self, other: &Self) -> bool {
+        (&self.data, &self.coder) == (&other.data, &other.coder) && self.tolerance == other.tolerance
+    }
+
+    /// Takes the lesser of each time, and the larger of the errors.
+    fn join(&mut self, other: &Self) {
+        self.encode_seconds = self.encode_seconds.min(other.encode_seconds);
+        self.decode_seconds = self.decode_seconds.min(other.decode_seconds);
+        self.largest_error = self.largest_error.max(other.largest_error);
+        if let (Some(own), Some(other)) = (&mut self.own, &other.own) {
+            own.codes_seconds = own.codes_seconds.min(other.codes_seconds);
+        }
+    }
+}
+
+/// Adds rows to those of earlier rounds.
+pub(super) fn merge(rows: &mut Vec<Row>, more: Vec<Row>) {
+    for row in more {
+        match rows.iter_mut().find(|r| r.same(&row)) {
+            Some(known) => known.join(&row),
+            None => rows.push(row),
+        }
+    }
+}
+
+#[cfg(test)]
+impl Row {
+    /// A row of a scheme, or of a peer.
+    pub(super) fn example(coder: &str, bytes: u64, own: bool) -> Self {
+        let own = own.then_some(Own { codes_seconds: 0.5, codes_per_sample: 0.25, outliers: 0, exact_samples: 0 });
+        Self {
+            data: "demo".into(),
+            tolerance: 0.01,
+            coder: coder.into(),
+            bytes,
+            ratio: 1000.0 / bytes as f64,
+            bound: 1.0,
+            largest_error: 0.5,
+            encode_seconds: 2.0,
+            decode_seconds: 1.0,
+            own,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_are_joined_by_the_least_times() {
+        let mut rows = vec![Row::example("haar", 10, true)];
+        let again = Row { encode_seconds: 1.0, decode_seconds: 3.0, largest_error: 0.75, ..rows[0].clone() };
+        merge(&mut rows, vec![again, Row { tolerance: 0.1, ..Row::example("haar", 5, true) }]);
+        assert_eq!(rows.len(), 2);
+        assert_eq!((rows[0].encode_seconds, rows[0].decode_seconds, rows[0].largest_error), (1.0, 1.0, 0.75));
+    }
+
+    #[test]
+    fn a_lost_value_breaks_every_bound_and_outlives_json() {
+        let row = Row { largest_error: f64::INFINITY, ..Row::example("sz3-4d", 10, false) };
+        assert!(!row.holds());
+        let text = serde_json::to_string(&row).expect("it is written");
+        assert_eq!(serde_json::from_str::<Row>(&text).expect("it is read"), row);
+    }
+}
