@@ -58,7 +58,7 @@ impl<'a> Passes<'a> {
                 nodes.update(predicted, row, |v, p, code| {
                     let q = (v - p) * inverse;
                     let small = q < R::MOST_CODE && q > R::of(0.0) - R::MOST_CODE;
-                    all &= small | (v != v);
+                    all &= small | v.is_nan();
                     let q = if small { (q + R::BIG) - R::BIG } else { R::of(0.0) };
                     *code = q.to_code();
                     p + q * step

@@ -24,6 +24,9 @@ pub(crate) trait Real:
     /// Exactly.
     fn to_f64(self) -> f64;
 
+    /// Whether it is not a number.
+    fn is_nan(self) -> bool;
+
     /// A whole number in the range of `i32`; 0 of what is not a number.
     fn to_code(self) -> i32;
 }
@@ -39,6 +42,10 @@ impl Real for f32 {
 
     fn of_code(code: i32) -> Self {
         code as Self
+    }
+
+    fn is_nan(self) -> bool {
+        self.is_nan()
     }
 
     fn to_f64(self) -> f64 {
@@ -61,6 +68,10 @@ impl Real for f64 {
 
     fn of_code(code: i32) -> Self {
         code.into()
+    }
+
+    fn is_nan(self) -> bool {
+        self.is_nan()
     }
 
     fn to_f64(self) -> f64 {

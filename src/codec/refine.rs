@@ -50,9 +50,9 @@ impl Source<'_> {
         let plain = codec.scheme.basis == Basis::Samples && codec.promise.measure() == Measure::Largest;
         clear(field).resize(nodes, R::default());
         if plain {
-            self.load_samples(field)
+            self.load_samples(field);
         } else {
-            self.load_series(&weighing, field)
+            self.load_series(&weighing, field);
         }
         clear(codes).resize(nodes, 0);
         if !Passes::new(pyramid, codec.shape(self.size)).encode(step, field, codes) {

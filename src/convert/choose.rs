@@ -74,51 +74,61 @@ impl Chooser<'_> {
             return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
         }
         let boxes = self.boxes()?;
-        let mut best = self.least(self.families(&boxes), &boxes, None)?;
+        let families = self.tried(self.families()?, &boxes)?;
+        let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        let promising = families.into_par_iter().filter(|f| f.0 <= least * PROMISING);
+        let tuned: Result<Vec<_>> = promising.map(|f| self.coarsest(f, &boxes)).collect();
+        let mut best =
+            tuned?.into_iter().reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
         for variants in [Self::stencils, Self::growths] {
-            let others = variants(self, &best.1);
-            best = self.least(others, &boxes, Some(best))?;
-        }
-        self.coarsest(&boxes, best)
-    }
-
-    /// The scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
-    fn coarsest(&self, boxes: &[Sampled], mut best: (f64, Scheme)) -> Result<Scheme> {
-        let free = best.1.pyramid.is_some() && best.1.coarseness != 1.0;
-        for step in FACTORS.into_iter().filter(|_| free) {
-            let before = best.0;
-            let coarser = Scheme { coarseness: best.1.coarseness * step, ..best.1.clone() };
-            best = self.least(vec![coarser], boxes, Some(best))?;
-            if best.0 == before && step > 1.0 {
-                break;
-            }
+            best = self.tried(variants(self, &best.1), &boxes)?.into_iter().fold(best, fewer);
         }
         Ok(best.1)
     }
 
-    /// Boxes spread over the volume: about one voxel in fifty, at least one box.
+    /// Schemes, and about how many bytes the window takes with each.
+    fn tried(&self, schemes: Vec<Scheme>, boxes: &[Sampled]) -> Result<Vec<(f64, Scheme)>> {
+        schemes.into_par_iter().map(|scheme| Ok((self.bytes(&scheme, boxes)?, scheme))).collect()
+    }
+
+    /// A scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
+    fn coarsest(&self, mut best: (f64, Scheme), boxes: &[Sampled]) -> Result<(f64, Scheme)> {
+        let fixed = best.1.pyramid.is_none() || best.1.coarseness == 1.0;
+        for factor in FACTORS.into_iter().filter(|_| !fixed) {
+            let coarser = Scheme { coarseness: best.1.coarseness * factor, ..best.1.clone() };
+            let bytes = self.bytes(&coarser, boxes)?;
+            if bytes >= best.0 && factor > 1.0 {
+                break;
+            }
+            best = fewer(best, (bytes, coarser));
+        }
+        Ok(best)
+    }
+
+    /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
-        let size = dims.map(|n| n.min(EDGE));
         let whole: usize = dims.iter().product();
-        let count = (whole / SHARE / size.iter().product::<usize>()).clamp(1, MOST_BOXES);
-        let at = |i: usize, axis: usize| {
-            // A low-discrepancy sequence: the same places for every window.
-            let place = (0.5 + GOLDEN[axis] * i as f64).fract();
+        let edge = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
+        let size = dims.map(|n| n.min(edge));
+        let count = (whole / SHARE / size.iter().product::<usize>()).clamp(LEAST_BOXES, MOST_BOXES);
+        (0..count).map(|i| self.sampled(i, size)).collect()
+    }
+
+    /// The box of a number, at one of places that spread evenly: the same for every window.
+    fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
+        let dims = self.archive.grid.dims;
+        let start: [usize; 3] = std::array::from_fn(|axis| {
+            let place = (0.5 + GOLDEN[axis] * number as f64).fract();
             (place * (dims[axis] - size[axis] + 1) as f64) as usize
-        };
-        (0..count)
-            .map(|i| {
-                let start = std::array::from_fn(|axis| at(i, axis));
-                let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
-                let samples = read_frames(self.window, 0..self.window.frames(), &region, self.archive.sample)?;
-                Ok(Sampled { size, samples })
-            })
-            .collect()
+        });
+        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
+        let samples = read_frames(self.window, 0..self.window.frames(), &region, self.archive.sample)?;
+        Ok(Sampled { size, samples })
     }
 
     /// One scheme of each kind that is allowed.
-    fn families(&self, boxes: &[Sampled]) -> Vec<Scheme> {
+    fn families(&self) -> Result<Vec<Scheme>> {
         let Coding { basis, space } = self.config.coding;
         let frames = self.window.frames();
         let stencil = if let Space::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
@@ -130,27 +140,32 @@ impl Chooser<'_> {
                 continue; // never the smallest of all
             }
             let functions = match kind {
-                Basis::Learned => self.functions(boxes),
+                Basis::Learned => self.functions()?,
                 _ => Vec::new(),
             };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme { basis: kind, functions, pyramid, coarseness: self.coarseness(1.5) });
+            found.push(Scheme { basis: kind, functions, pyramid, coarseness: self.coarseness(2.0) });
         }
         if wanted(Basis::Samples) && space != Space::Alone {
             for order in ORDERS {
                 let pyramid = Some(self.pyramid(&order, stencil));
-                let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(1.5) };
+                let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
                 found.push(Scheme { basis: Basis::Samples, functions: Vec::new(), pyramid, coarseness });
             }
         }
         let many = frames > 1;
         found.retain(|s| many || s.basis == Basis::Samples || basis.is_some());
-        found
+        Ok(found)
     }
 
-    fn functions(&self, boxes: &[Sampled]) -> Vec<i16> {
-        let samples = boxes.iter().map(|b| &b.samples[..]);
-        learned_functions(samples, self.archive.sample, self.window.frames(), self.config.missing_value, &self.promise)
+    /// Learned from rows all over the volume, not from the boxes that they are then tried on.
+    fn functions(&self) -> Result<Vec<i16>> {
+        let size = [self.archive.grid.dims[0], 1, 1];
+        let rows: Result<Vec<Sampled>> = (0..ROWS).map(|i| self.sampled(LEARNING + i, size)).collect();
+        let (ty, frames) = (self.archive.sample, self.window.frames());
+        let samples = rows?;
+        let samples = samples.iter().map(|row| &row.samples[..]);
+        Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
     }
 
     fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
@@ -163,7 +178,7 @@ impl Chooser<'_> {
     fn coarseness(&self, coarseness: f64) -> f64 {
         match self.promise.measure() {
             Measure::Largest => coarseness,
-            Measure::RootMeanSquare => 1.6 * coarseness,
+            Measure::RootMeanSquare => 1.4 * coarseness,
         }
     }
 
@@ -177,14 +192,6 @@ impl Chooser<'_> {
     fn growths(&self, best: &Scheme) -> Vec<Scheme> {
         let others = &GROWTHS[1..];
         variants(best, |p| others.iter().map(|&(growth, most)| Pyramid { growth, most, ..p.clone() }).collect())
-    }
-
-    /// The scheme that codes the boxes in the fewest bytes, the first of equal ones; `best` is one that was tried before.
-    fn least(&self, schemes: Vec<Scheme>, boxes: &[Sampled], best: Option<(f64, Scheme)>) -> Result<(f64, Scheme)> {
-        let sizes: Result<Vec<f64>> = schemes.par_iter().map(|scheme| self.bytes(scheme, boxes)).collect();
-        let tried = best.into_iter().chain(sizes?.into_iter().zip(schemes));
-        let least = tried.reduce(|a, b| if b.0 < a.0 { b } else { a });
-        least.ok_or_else(|| Error::usage("--basis: nothing to choose from"))
     }
 
     /// About how many bytes the window takes.
@@ -205,19 +212,35 @@ impl Chooser<'_> {
     }
 }
 
+/// The one of fewer bytes, the first of equal ones.
+fn fewer(a: (f64, Scheme), b: (f64, Scheme)) -> (f64, Scheme) {
+    if b.0 < a.0 { b } else { a }
+}
+
 fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme> {
     let pyramids = best.pyramid.as_ref().map(of).unwrap_or_default();
     pyramids.into_iter().map(|pyramid| Scheme { pyramid: Some(pyramid), ..best.clone() }).collect()
 }
 
 /// Voxels along the edge of a box that schemes are tried on.
-const EDGE: usize = 24;
+const EDGE: usize = 30;
 
 /// One voxel in so many is tried.
 const SHARE: usize = 50;
 
-/// Boxes that are tried at most.
+/// Boxes that are tried.
+const LEAST_BOXES: usize = 3;
 const MOST_BOXES: usize = 12;
+
+/// Voxels of a volume that is not small: a few boxes are then a small part of it.
+const LARGE: usize = 1 << 19;
+
+/// Rows of voxels that functions are learned from, and the number of the first place.
+const ROWS: usize = 64;
+const LEARNING: usize = 1000;
+
+/// A scheme is worth tuning that is at most so many times as large as the smallest before.
+const PROMISING: f64 = 1.3;
 
 /// Fractions whose multiples spread evenly: powers of the inverse of the root of x^4 = x + 1.
 const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];
@@ -229,8 +252,8 @@ const ORDERS: [[Axis; 4]; 3] =
 /// How steps of coarser levels shrink, and by how much at most; the first is taken to begin with.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
 
-/// Factors of the step that are tried one after another, until one does not pay.
-const FACTORS: [f64; 5] = [0.8, 1.3, 1.3, 1.3, 1.3];
+/// Factors of the step that are tried one after another, until a coarser one does not pay.
+const FACTORS: [f64; 5] = [0.7, 1.4, 1.4, 1.4, 1.4];
 
 /// The least bound, in units of the largest sample, for 32-bit floats: their rounding takes next to nothing of it.
 const SINGLE: f64 = 1.0 / (1 << 15) as f64;

@@ -81,7 +81,7 @@ impl Products {
 }
 
 /// Series of each box that are looked at.
-const SERIES: usize = 2048;
+const SERIES: usize = 128;
 
 /// Eigenvalues and eigenvectors of a symmetric matrix, largest first, by Jacobi's rotations: plain arithmetic in a fixed
 /// order, so that every machine finds the same.
@@ -120,9 +120,9 @@ fn rotate(a: &mut [f64], v: &mut [Vec<f64>], n: usize, p: usize, q: usize) {
         let (x, y) = (a[p * n + k], a[q * n + k]);
         (a[p * n + k], a[q * n + k]) = (c * x - s * y, s * x + c * y);
     }
-    for k in 0..n {
-        let (x, y) = (v[p][k], v[q][k]);
-        (v[p][k], v[q][k]) = (c * x - s * y, s * x + c * y);
+    let (before, after) = v.split_at_mut(q);
+    for (x, y) in before[p].iter_mut().zip(&mut after[0]) {
+        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
     }
 }
 

@@ -129,7 +129,7 @@ fn options_of_the_view_change_the_picture() {
 
 #[test]
 fn an_error_image_bounds_every_pixel() {
-    let work = Work::with_file("--tolerance 0.004");
+    let work = Work::with_file("--basis haar --tolerance 0.004");
     small().write_frames(&work, "frames");
     let options = format!("{SIZE} --frames 0,9,35 --force");
     work.render(&format!("frames --method direct --splat-error 0 {options} -o truth.npy")).ok();

@@ -1,6 +1,6 @@
 //! The ways of converting that are measured: all that this benchmark knows of them is a name and a configuration.
 
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Coding, ConvertConfig};
 use wavesplat::error::{Error, Result};
 use wavesplat::wavelet::Basis;
 
@@ -20,7 +20,7 @@ pub const BASELINE: &str = "haar";
 pub const SCHEMES: [Scheme; 2] = [
     Scheme { name: BASELINE, config: |tolerance, memory| ConvertConfig::new(Basis::Haar, 32, tolerance, memory) },
     // What `wavesplat convert` does unless told otherwise.
-    Scheme { name: "default", config: |tolerance, memory| ConvertConfig::new(Basis::Haar, 32, tolerance, memory) },
+    Scheme { name: "default", config: |tolerance, memory| ConvertConfig::new(Coding::AUTO, 32, tolerance, memory) },
 ];
 
 /// The configuration of a scheme whose tolerance refers to `range`.
