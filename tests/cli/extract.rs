@@ -6,7 +6,7 @@ use super::{Archive, Work, floats, npy, read_npy, small};
 fn info_says_what_the_file_holds() {
     let work = Work::with_file("--tolerance 0.02 --frames 4: --region :,2:,:");
     let text = work.wavesplat("info a.wspl").ok();
-    for word in ["20 x 12 x 10", "f32", "36 frames", "2e-2", "window", "pyramid (cubic "] {
+    for word in ["20 x 12 x 10", "f32", "36 frames", "2e-2", "window", "pyramid ("] {
         assert!(text.text().contains(word), "'{word}' in\n{}", text.text());
     }
     let info = work.wavesplat("info a.wspl --json").ok().json();
