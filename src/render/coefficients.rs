@@ -2,7 +2,7 @@
 
 use super::RenderConfig;
 use super::reading::{Allowance, Kept};
-use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
+use super::scene::{Contents, FrameBounds, Group, SampleErrorReport, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
@@ -140,24 +140,28 @@ impl<'a> CoefficientGroup<'a> {
             order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
         // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        let allowance = Allowance::new(&codec, config.allowed.filter(|_| !samples));
+        let allowed = config.allowed.filter(|_| !samples).map(|allowed| (allowed, config.limited));
+        let allowance = Allowance::new(&codec, allowed);
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
         let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, allowance, errors, leaf };
         if config.certify {
-            group.errors = group.sample_errors(config.allowed)?;
+            group.errors = group.sample_errors()?;
         }
         Ok(group)
     }
 
-    fn sample_errors(&self, allowed: Option<f64>) -> Result<SampleErrors> {
+    fn sample_errors(&self) -> Result<SampleErrors> {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
-        let mut sum = 0.0_f64;
+        let (mut sum, mut samples) = (0.0_f64, SampleErrorReport::default());
         for leaf in self.file.leaves(self.window) {
-            sum = self.file.leaf(leaf)?.iter().map(|entry| self.allowance.absolute_sum(entry)).fold(sum, f64::max);
+            for entry in self.file.leaf(leaf)? {
+                sum = sum.max(self.allowance.absolute_sum(&entry));
+                samples.join(&self.keep(&entry).samples);
+            }
         }
         let frame = FrameBounds {
-            error: record.reached.max(allowed.unwrap_or(0.0)),
+            error: record.reached.max(samples.certified_sample_error),
             range,
             // What overrides a sample is the sample less what the coefficients give.
             absolute_sum: 2.0 * sum + magnitude(range),
@@ -168,6 +172,11 @@ impl<'a> CoefficientGroup<'a> {
             factors: factors.take(self.layout.error_planes).collect(),
             frames: vec![frame; self.frames.len()],
         })
+    }
+
+    /// What is read of a block.
+    fn keep(&self, entry: &BlockEntry) -> Kept {
+        self.allowance.keep(entry, self.file.blocks.region(entry.id.block as usize).voxels())
     }
 
     /// Whether a block adds nothing to any plane.
@@ -249,8 +258,9 @@ impl Group for CoefficientGroup<'_> {
         let mut found = Contents { empty: self.file.blocks.len() as u64, ..Contents::default() };
         for entries in self.file.entries(self.window, region) {
             for entry in entries? {
-                let kept = self.allowance.keep(&entry);
+                let kept = self.keep(&entry);
                 found.left_out += kept.left_out;
+                found.samples.join(&kept.samples);
                 found.empty -= u64::from(!entry.parts.is_empty());
                 if !self.adds_nothing(&kept) {
                     found.blocks.push(entry.id.block as usize);
@@ -262,7 +272,7 @@ impl Group for CoefficientGroup<'_> {
 
     fn terms(&self, block: usize) -> Result<Terms> {
         let leaf = self.leaf_of(block as u32)?;
-        let Kept { entry, errors, .. } = self.allowance.keep(&leaf[block - leaf[0].id.block as usize]);
+        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
         let block = self.file.block(&self.codec, &entry, &self.wanted)?;
         Ok(match (&block.exact, self.what) {
             (Some(exact), _) => self.terms_of_samples(&block, exact, &errors),

@@ -24,7 +24,7 @@ mod weights;
 
 pub use coefficients::{CoefficientScene, What};
 pub use frames::FrameScene;
-pub use scene::{LeftOut, Scene};
+pub use scene::{LeftOut, SampleErrorReport, Scene};
 
 use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
@@ -72,10 +72,23 @@ pub struct RenderConfig {
     /// How far a sample may be from the source's, in its unit, so that less is read and splatted; none: as near as the
     /// file is.
     pub allowed: Option<f64>,
+    /// Which error of samples that limits.
+    pub limited: SampleError,
     /// Whether each picture comes with a bound on the error of every pixel.
     pub certify: bool,
     /// Bytes that may be allocated.
     pub memory: usize,
+}
+
+/// A measure of how far the samples that are splatted are from the source's.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum SampleError {
+    /// The largest one.
+    #[default]
+    Certified,
+    /// At most the root mean square over a block. No mean along a ray, whose weights are positive, is expected to be
+    /// further off than the worst of its blocks.
+    Expected,
 }
 
 /// What a rendering did.
@@ -99,6 +112,9 @@ pub struct RenderReport {
     pub blocks_outside: u64,
     /// What a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
+    /// What is known of the errors of the samples that were splatted.
+    #[serde(flatten)]
+    pub samples: SampleErrorReport,
     /// The largest error that a pixel may have, if pictures are certified.
     pub certified_error: Option<f64>,
     /// Stored bytes that were read of blocks.
@@ -330,12 +346,13 @@ fn render_group(
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
 fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Vec<usize>> {
-    let Contents { mut blocks, empty, left_out } = group.blocks(&eye.clip)?;
+    let Contents { mut blocks, empty, left_out, samples } = group.blocks(&eye.clip)?;
     let held = blocks.len();
     blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
     report.blocks += eye.blocks.len() as u64;
     report.blocks_empty += empty;
     report.blocks_outside += (held - blocks.len()) as u64;
     report.left_out += left_out;
+    report.samples.join(&samples);
     Ok(blocks)
 }

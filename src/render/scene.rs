@@ -64,6 +64,25 @@ pub struct Contents {
     pub empty: u64,
     /// What a looser tolerance leaves out of all.
     pub left_out: LeftOut,
+    /// The errors of their samples.
+    pub samples: SampleErrorReport,
+}
+
+/// What is known of the errors of samples, in their unit: those of the file, and what is left out of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct SampleErrorReport {
+    /// No sample is further off.
+    pub certified_sample_error: f64,
+    /// In no block is the root mean square of the errors larger.
+    pub expected_sample_error: f64,
+}
+
+impl SampleErrorReport {
+    /// Of these samples and others.
+    pub fn join(&mut self, other: &Self) {
+        self.certified_sample_error = self.certified_sample_error.max(other.certified_sample_error);
+        self.expected_sample_error = self.expected_sample_error.max(other.expected_sample_error);
+    }
 }
 
 /// What a looser tolerance leaves out.

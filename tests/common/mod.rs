@@ -119,6 +119,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         region: None,
         splat_error: 0.0,
         allowed: None,
+        limited: Default::default(),
         certify: false,
         memory: MEMORY,
     }

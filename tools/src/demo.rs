@@ -121,6 +121,7 @@ fn pictures(scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
         region: None,
         splat_error: SPLAT_ERROR,
         allowed: None,
+        limited: Default::default(),
         certify: false,
         memory: MEMORY,
     };

@@ -140,6 +140,7 @@ fn by_library(
         region: None,
         splat_error: step.splat_error,
         allowed: None,
+        limited: Default::default(),
         certify,
         memory: MEMORY,
     };
