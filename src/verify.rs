@@ -182,7 +182,7 @@ fn check_block(
 fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
     for part in &entry.parts {
         let PartKind::Level(level) = part.kind else { continue };
-        let largest = block.largest(codec, level.into());
+        let largest = block.largest(codec, level);
         if largest > part.stats.largest {
             let what =
                 format!("{} holds {largest:e}, larger than the directory says: {:e}", entry.id, part.stats.largest);

@@ -123,14 +123,6 @@ impl BlockGrid {
         self.dims.map(|n| n.div_ceil(self.edge))
     }
 
-    /// The lengths that blocks have along an axis: the edge, and what remains at the far face.
-    pub fn lengths(&self, axis: usize) -> Vec<usize> {
-        let (n, edge) = (self.dims[axis], self.edge);
-        let mut lengths = vec![n.min(edge), (n - 1) % edge + 1];
-        lengths.dedup();
-        lengths
-    }
-
     /// Number of blocks.
     pub fn len(&self) -> usize {
         self.counts().iter().product()

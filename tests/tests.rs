@@ -14,6 +14,7 @@ mod determinism;
 mod every_float;
 mod images;
 mod layering;
+mod left_out;
 mod real;
 mod reference;
 mod sampled;

@@ -87,9 +87,10 @@ impl fmt::Display for PartKind {
 pub struct PartStats {
     /// Nonzero coefficients, outliers, missing samples, or samples; at least 1.
     pub count: u64,
-    /// Sum of squares of the coefficients in the part; 0 without coefficients; may overflow to infinity.
+    /// Sum of squares of the coefficients in the part; with a pyramid of the changes of all coefficients where this part
+    /// and all finer ones are left out; 0 without coefficients; may overflow to infinity.
     pub energy: f64,
-    /// Largest |coefficient| in the part, finite; 0 without coefficients.
+    /// Largest |coefficient| in the part; with a pyramid the largest such change; finite; 0 without coefficients.
     pub largest: f64,
 }
 

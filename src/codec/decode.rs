@@ -1,6 +1,7 @@
 //! A coded block back to samples: the one decoder of the project.
 
 use super::field::Field;
+use super::pyramid::Passes;
 use super::{WindowCodec, lane_groups};
 use crate::sample;
 use crate::wavelet::{LANES, Lane};
@@ -65,12 +66,18 @@ impl Block {
         Field::decode(codec, self.size, self.step, &self.codes)
     }
 
-    /// The largest coefficient of a level part.
-    pub fn largest(&self, codec: &WindowCodec, level: usize) -> f64 {
-        let codes = &self.codes[codec.part_ranges(self.size)[level].clone()];
-        let of_run =
-            |(step, codes): &(f64, &[i32])| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * step).abs()));
-        codec.runs(self.size, self.step, level, codes).iter().map(of_run).fold(0.0, f64::max)
+    /// What the directory should say of a level part: its largest coefficient, or with a pyramid the largest change
+    /// where it and all finer ones are left out.
+    pub fn largest(&self, codec: &WindowCodec, level: u8) -> f64 {
+        let change = |pyramid| Passes::new(pyramid, codec.shape(self.size));
+        match (&codec.scheme.pyramid, self.field(codec)) {
+            (Some(pyramid), Field::Single(mut field)) => change(pyramid).leave_out(level, &mut field).largest(),
+            (Some(pyramid), Field::Double(mut field)) => change(pyramid).leave_out(level, &mut field).largest(),
+            _ => {
+                let codes = &self.codes[codec.part_ranges(self.size)[usize::from(level)].clone()];
+                codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()))
+            }
+        }
     }
 
     /// Whether a sample is missing.

@@ -4,6 +4,7 @@ use super::check::Tally;
 use super::load::{Missing, load_group};
 use super::pyramid::Passes;
 use super::refine::{Coded, Source};
+use super::rows::Change;
 use super::truncate::Group;
 use super::weigh::Weighing;
 use super::{WindowCodec, lane_groups};
@@ -16,9 +17,11 @@ use wavesplat_format::{pack_cells, pack_codes, pack_exact, pack_missing, pack_ou
 pub struct Encoder {
     compressor: Compressor,
     codes: Vec<i32>,
-    /// The coefficients that a pyramid refines, in either precision.
-    single: Vec<f32>,
-    double: Vec<f64>,
+    /// The coefficients that a pyramid refines, in either precision, and room for as many.
+    single: [Vec<f32>; 2],
+    double: [Vec<f64>; 2],
+    /// Only the bytes matter: what the directory says of parts is left open.
+    trial: bool,
     raw: Vec<u8>,
 }
 
@@ -38,15 +41,15 @@ pub struct Encoded {
 }
 
 impl Encoder {
+    /// One whose blocks are measured and thrown away: it spares what takes no bytes.
+    pub(crate) fn for_trials(level: i32) -> wavesplat_format::Result<Self> {
+        Ok(Self { trial: true, ..Self::new(level)? })
+    }
+
     /// With a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
-        Ok(Self {
-            compressor: Compressor::new(level)?,
-            codes: Vec::new(),
-            single: Vec::new(),
-            double: Vec::new(),
-            raw: Vec::new(),
-        })
+        let (codes, raw, single, double) = Default::default();
+        Ok(Self { compressor: Compressor::new(level)?, codes, single, double, trial: false, raw })
     }
 
     /// Codes a block of `size` voxels from its little-endian samples, frame by frame: `frames * voxels * sample size` bytes.
@@ -61,8 +64,8 @@ impl Encoder {
         let block = Source { codec, size, samples, missing: &missing };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
-            Some(pyramid) if pyramid.single => block.refine(pyramid, &mut self.single, &mut self.codes),
-            Some(pyramid) => block.refine(pyramid, &mut self.double, &mut self.codes),
+            Some(pyramid) if pyramid.single => block.refine(pyramid, self.trial, &mut self.single, &mut self.codes),
+            Some(pyramid) => block.refine(pyramid, self.trial, &mut self.double, &mut self.codes),
         };
         let coded = match coded {
             Some(coded) => self.coded_parts(&block, &coded)?,
@@ -96,7 +99,7 @@ impl Encoder {
             dropped += self.keep_codes(&group, step, voxels, first, count);
             block.check(&group, (first, count), &mut tally)?;
         }
-        Some(Coded { step, dropped, outliers: tally.take_outliers(codec, samples), tally })
+        Some(Coded { step, changes: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
     }
 
     /// Writes a group's kept codes, k-major, and returns the energy that dropping and rounding cost.
@@ -120,8 +123,10 @@ impl Encoder {
         let mut parts = Vec::new();
         for (level, range) in (0..).zip(codec.part_ranges(block.size)) {
             let codes = &self.codes[range];
-            let runs = codec.runs(block.size, coded.step, level.into(), codes);
-            let stats = runs.iter().fold(NO_CODES, |stats, (step, codes)| add_codes(stats, codes, *step));
+            let stats = match &coded.changes {
+                Some(changes) => change_stats(&changes[usize::from(level)], codes),
+                None => code_stats(codes, coded.step),
+            };
             if stats.count > 0 {
                 match &passes {
                     Some(passes) => pack_cells(codes, &passes.boxes(level), clear(&mut self.raw)),
@@ -204,10 +209,9 @@ pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
     buffer
 }
 
-const NO_CODES: PartStats = PartStats { count: 0, energy: 0.0, largest: 0.0 };
-
-/// Adds some codes of one step.
-fn add_codes(mut stats: PartStats, codes: &[i32], step: f64) -> PartStats {
+/// The count, energy and largest of coefficients.
+fn code_stats(codes: &[i32], step: f64) -> PartStats {
+    let mut stats = PartStats { count: 0, energy: 0.0, largest: 0.0 };
     for code in codes.iter().filter(|c| **c != 0) {
         let c = f64::from(*code) * step;
         stats.count += 1;
@@ -215,4 +219,10 @@ fn add_codes(mut stats: PartStats, codes: &[i32], step: f64) -> PartStats {
         stats.largest = stats.largest.max(c.abs());
     }
     stats
+}
+
+/// The count of codes, and the energy and largest of the changes where they and all finer ones are left out.
+fn change_stats(change: &Change, codes: &[i32]) -> PartStats {
+    let count = codes.iter().filter(|c| **c != 0).count() as u64;
+    PartStats { count, energy: change.energy(), largest: change.largest() }
 }

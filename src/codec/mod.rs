@@ -13,6 +13,7 @@ mod load;
 mod pyramid;
 mod real;
 mod refine;
+mod rows;
 pub mod scheme;
 mod truncate;
 mod weigh;
@@ -95,25 +96,6 @@ impl WindowCodec {
             Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
             Some(_) => true,
         }
-    }
-
-    /// The codes of a level part of a block of `size` voxels, in runs of one step, and those steps.
-    pub(crate) fn runs<'c>(
-        &self,
-        size: [usize; 3],
-        step: f64,
-        part: usize,
-        mut codes: &'c [i32],
-    ) -> Vec<(f64, &'c [i32])> {
-        let Some(pyramid) = &self.scheme.pyramid else { return vec![(step, codes)] };
-        let shape = self.shape(size);
-        let passes = pyramid.passes(shape).into_iter().filter(|pass| usize::from(pass.part) == part);
-        let run = |pass: wavesplat_format::Pass| {
-            let (of_pass, rest) = codes.split_at(pass.codes(shape));
-            codes = rest;
-            (pyramid.step(step, pass.level), of_pass)
-        };
-        passes.map(run).collect()
     }
 
     /// Nodes of a block of `size` voxels along x, y, z and k.

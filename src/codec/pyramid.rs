@@ -5,6 +5,7 @@
 //! step of its own level.
 
 use super::real::Real;
+use super::rows::{self, Change};
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
@@ -36,10 +37,10 @@ impl<'a> Passes<'a> {
         let mut codes = codes;
         for pass in &self.passes {
             let step = R::of(self.pyramid.step(step, pass.level));
-            self.for_each_row(pass, field, |mut nodes, predicted| {
-                let (row, rest) = codes.split_at(predicted.len());
+            self.for_each_row(pass, field, |nodes, predicted| {
+                let (row, rest) = codes.split_at(nodes.len());
                 codes = rest;
-                nodes.update(predicted, row, |_, p, code| p + R::of_code(*code) * step);
+                rows::decode(nodes, predicted, row, step);
             });
         }
     }
@@ -51,96 +52,109 @@ impl<'a> Passes<'a> {
         for pass in &self.passes {
             let exact = self.pyramid.step(step, pass.level);
             let (step, inverse) = (R::of(exact), R::of(1.0 / exact));
-            self.for_each_row(pass, field, |mut nodes, predicted| {
-                let (row, rest) = std::mem::take(&mut codes).split_at_mut(predicted.len());
+            self.for_each_row(pass, field, |nodes, predicted| {
+                let (row, rest) = std::mem::take(&mut codes).split_at_mut(nodes.len());
                 codes = rest;
-                let mut all = true;
-                nodes.update(predicted, row, |v, p, code| {
-                    let q = (v - p) * inverse;
-                    let small = q < R::MOST_CODE && q > R::of(0.0) - R::MOST_CODE;
-                    all &= small | v.is_nan();
-                    let q = if small { (q + R::BIG) - R::BIG } else { R::of(0.0) };
-                    *code = q.to_code();
-                    p + q * step
-                });
-                fits &= all;
+                fits &= rows::encode(nodes, predicted, row, step, inverse);
             });
         }
         fits
     }
 
+    /// What leaving out each level part and all finer ones changes in a decoded field; `rest` is scratch.
+    pub(crate) fn changes<R: Real>(&self, field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
+        let mut of_part = |part| {
+            rest.clear();
+            rest.extend_from_slice(field);
+            self.leave_out(part, rest)
+        };
+        (0..Pyramid::PARTS).map(&mut of_part).collect()
+    }
+
+    /// What leaving out a level part and all finer ones changes in a decoded field. Overwrites `field` by what is left.
+    pub(crate) fn leave_out<R: Real>(&self, part: u8, field: &mut [R]) -> Change {
+        let mut change = Change::default();
+        for pass in self.passes.iter().filter(|pass| pass.part >= part) {
+            self.for_each_row(pass, field, |nodes, predicted| {
+                rows::add_changes(&mut change, nodes, predicted);
+                nodes.copy_from_slice(predicted);
+            });
+        }
+        change
+    }
+
     /// Calls `visit` with every row of nodes along x that a pass adds, and what they are predicted to be.
-    fn for_each_row<R: Real>(&self, pass: &Pass, field: &mut [R], mut visit: impl FnMut(Row<'_, R>, &[R])) {
-        let extent = pass.extent(self.shape);
+    fn for_each_row<R: Real>(&self, pass: &Pass, field: &mut [R], mut visit: impl FnMut(&mut [R], &[R])) {
+        let count = pass.extent(self.shape)[0];
         let (first, distance) = pass.nodes(0);
-        let mut predicted = vec![R::default(); extent[0]];
+        let mut predicted = vec![R::default(); count];
+        let mut apart = Vec::new();
+        let mut gathered = [const { Vec::new() }; 4];
         for at in rows(pass, self.shape) {
             match pass.axis {
                 None => predicted.fill(R::default()),
-                Some(Axis::X) => self.predict_along(pass, &field[at.start..][..self.shape[0]], &mut predicted),
-                Some(axis) => self.predict_across(pass, axis.index(), &at, field, &mut predicted),
+                Some(Axis::X) => self.predict_along(pass, &field[at.start..], &mut gathered[0], &mut predicted),
+                Some(axis) => self.predict_across(pass, axis.index(), &at, field, &mut gathered, &mut predicted),
             }
-            visit(Row { nodes: &mut field[at.start + first..at.start + self.shape[0]], distance }, &predicted);
+            let nodes = &mut field[at.start + first..at.start + self.shape[0]];
+            if distance == 1 {
+                visit(nodes, &predicted);
+            } else {
+                gather(nodes, distance, count, &mut apart);
+                visit(&mut apart, &predicted);
+                nodes.iter_mut().step_by(distance).zip(&apart).for_each(|(node, v)| *node = *v);
+            }
         }
     }
 
     /// Predicts a row of nodes from rows before and behind it along another axis.
-    fn predict_across<R: Real>(&self, pass: &Pass, axis: usize, at: &RowAt, field: &[R], predicted: &mut [R]) {
+    fn predict_across<R: Real>(
+        &self,
+        pass: &Pass,
+        axis: usize,
+        at: &RowAt,
+        field: &[R],
+        gathered: &mut [Vec<R>; 4],
+        predicted: &mut [R],
+    ) {
         let (_, distance) = pass.nodes(axis);
         let stride: usize = self.shape[..axis].iter().product();
         let start = at.start - at.index[axis] * stride;
         let taps = taps(self.pyramid.stencil, at.index[axis] / distance, self.shape[axis].div_ceil(distance));
-        let row = |even: usize| &field[start + even * distance * stride..][..self.shape[0]];
-        let step = pass.nodes(0).1;
-        match taps {
-            Taps { first, weights: [w, x, y, z], count: 4 } => {
-                let rows = [row(first), row(first + 1), row(first + 2), row(first + 3)];
-                sum4(rows, [w, x, y, z].map(R::of), step, predicted);
-            }
-            Taps { first, weights: [w, x, y, _], count: 3 } => {
-                sum3([row(first), row(first + 1), row(first + 2)], [w, x, y].map(R::of), step, predicted);
-            }
-            Taps { first, weights: [w, x, ..], count: 2 } => {
-                sum2([row(first), row(first + 1)], [w, x].map(R::of), step, predicted);
-            }
-            Taps { first, .. } => {
-                predicted.iter_mut().zip(row(first).iter().step_by(step)).for_each(|(p, v)| *p = *v);
-            }
+        let row = |tap: usize| &field[start + (taps.first + tap) * distance * stride..][..self.shape[0]];
+        let apart = pass.nodes(0).1;
+        if apart == 1 {
+            taps.sum(std::array::from_fn(|t| if t < taps.count { row(t) } else { &[] }), predicted);
+        } else {
+            (0..taps.count).for_each(|t| gather(row(t), apart, predicted.len(), &mut gathered[t]));
+            taps.sum(gathered.each_ref().map(|row| &row[..]), predicted);
         }
     }
 
     /// Predicts the odd nodes of a row from its even ones.
-    fn predict_along<R: Real>(&self, pass: &Pass, row: &[R], predicted: &mut [R]) {
+    fn predict_along<R: Real>(&self, pass: &Pass, row: &[R], evens: &mut Vec<R>, predicted: &mut [R]) {
         let (_, distance) = pass.nodes(0);
-        let evens = row.len().div_ceil(distance);
-        for (i, p) in predicted.iter_mut().enumerate() {
-            let taps = taps(self.pyramid.stencil, i, evens);
-            let term = |t: usize| R::of(taps.weights[t]) * row[(taps.first + t) * distance];
-            *p = (1..taps.count).fold(term(0), |sum, t| sum + term(t));
+        let count = self.shape[0].div_ceil(distance);
+        gather(&row[..self.shape[0]], distance, count, evens);
+        let mut i = 0;
+        while i < predicted.len() {
+            let taps = taps(self.pyramid.stencil, i, count);
+            // All nodes between the faces have the same taps, one further each.
+            let run = if taps.count == INNER { (count - 2 - i).min(predicted.len() - i) } else { 1 };
+            let from = |t: usize| if t < taps.count { &evens[taps.first + t..] } else { &[] };
+            taps.sum(std::array::from_fn(from), &mut predicted[i..i + run]);
+            i += run;
         }
     }
 }
 
-/// A row of nodes, every `distance`-th of a slice.
-struct Row<'a, R> {
-    nodes: &'a mut [R],
-    distance: usize,
-}
+/// Taps of a cubic stencil between the faces.
+const INNER: usize = 4;
 
-impl<R: Real> Row<'_, R> {
-    /// Sets every node to what `set` makes of it, of what was predicted, and of its code.
-    fn update<C>(&mut self, predicted: &[R], codes: C, mut set: impl FnMut(R, R, C::Item) -> R)
-    where
-        C: IntoIterator,
-    {
-        let each = predicted.iter().zip(codes);
-        if self.distance == 1 {
-            self.nodes.iter_mut().zip(each).for_each(|(v, (p, code))| *v = set(*v, *p, code));
-        } else {
-            let nodes = self.nodes.iter_mut().step_by(self.distance);
-            nodes.zip(each).for_each(|(v, (p, code))| *v = set(*v, *p, code));
-        }
-    }
+/// Every `distance`-th of some nodes, `count` of them.
+fn gather<R: Real>(nodes: &[R], distance: usize, count: usize, out: &mut Vec<R>) {
+    out.clear();
+    out.extend(nodes.iter().step_by(distance).take(count));
 }
 
 /// Where a row is: the offset of its node at x = 0, and its `[x, y, z, k]`.
@@ -172,6 +186,19 @@ struct Taps {
     count: usize,
 }
 
+impl Taps {
+    /// The weighted sum of rows, one for each tap, from the first tap to the last.
+    fn sum<R: Real>(&self, [a, b, c, d]: [&[R]; 4], out: &mut [R]) {
+        let [w, x, y, z] = self.weights.map(R::of);
+        match self.count {
+            4 => rows::sum4([a, b, c, d], [w, x, y, z], out),
+            3 => rows::sum3([a, b, c], [w, x, y], out),
+            2 => rows::sum2([a, b], [w, x], out),
+            _ => out.copy_from_slice(&a[..out.len()]),
+        }
+    }
+}
+
 /// What predicts odd node `i`, between the even nodes i and i + 1 of `evens`; all sums go from the first tap to the last.
 ///
 /// Cubic polynomials through four nodes, quadratic ones through three next to a face, and straight lines beyond the last.
@@ -186,49 +213,4 @@ fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
         () => (i, [0.5, 0.5, 0.0, 0.0], 2),
     };
     Taps { first, weights, count }
-}
-
-fn sum2<R: Real>(rows: [&[R]; 2], w: [R; 2], step: usize, out: &mut [R]) {
-    let [a, b] = rows;
-    if step == 1 {
-        let each = a.iter().zip(b);
-        out.iter_mut().zip(each).for_each(|(p, (a, b))| *p = w[0] * *a + w[1] * *b);
-    } else {
-        let each = a.iter().step_by(step).zip(b.iter().step_by(step));
-        out.iter_mut().zip(each).for_each(|(p, (a, b))| *p = w[0] * *a + w[1] * *b);
-    }
-}
-
-fn sum3<R: Real>(rows: [&[R]; 3], w: [R; 3], step: usize, out: &mut [R]) {
-    sum2([rows[0], rows[1]], [w[0], w[1]], step, out);
-    add(rows[2], w[2], step, out);
-}
-
-fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], step: usize, out: &mut [R]) {
-    let [a, b, c, d] = rows;
-    if step == 1 {
-        let each = a.iter().zip(b).zip(c.iter().zip(d));
-        let sum = |((a, b), (c, d)): ((&R, &R), (&R, &R))| ((w[0] * *a + w[1] * *b) + w[2] * *c) + w[3] * *d;
-        out.iter_mut().zip(each).for_each(|(p, each)| *p = sum(each));
-    } else {
-        sum3([a, b, c], [w[0], w[1], w[2]], step, out);
-        add(d, w[3], step, out);
-    }
-}
-
-fn add<R: Real>(row: &[R], w: R, step: usize, out: &mut [R]) {
-    out.iter_mut().zip(row.iter().step_by(step)).for_each(|(p, v)| *p = *p + w * *v);
-}
-
-/// Fills a line, of which every `stride`-th node is given, by passes without codes.
-pub(super) fn refine_line(stencil: Stencil, stride: usize, line: &mut [f64]) {
-    let mut distance = stride;
-    while distance > 1 {
-        let evens = line.len().div_ceil(distance);
-        for (i, node) in (distance / 2..line.len()).step_by(distance).enumerate() {
-            let taps = taps(stencil, i, evens);
-            line[node] = (0..taps.count).map(|t| taps.weights[t] * line[(taps.first + t) * distance]).sum();
-        }
-        distance /= 2;
-    }
 }

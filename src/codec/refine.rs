@@ -5,6 +5,7 @@ use super::encode::clear;
 use super::load::{Missing, load_group};
 use super::pyramid::Passes;
 use super::real::Real;
+use super::rows::Change;
 use super::truncate::Group;
 use super::weigh::Weighing;
 use super::{WindowCodec, lane_groups};
@@ -16,6 +17,8 @@ use wavesplat_format::{Basis, Outliers, Pyramid};
 /// What is known about a block after its series have been coded.
 pub(super) struct Coded {
     pub(super) step: f64,
+    /// With a pyramid: what leaving out each level part and all finer ones changes.
+    pub(super) changes: Option<Vec<Change>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
     pub(super) tally: Tally,
@@ -37,8 +40,14 @@ impl Source<'_> {
         self.size.iter().product()
     }
 
-    /// Codes the block by a pyramid; `field` and `codes` are scratch and result. None if it must be stored exactly.
-    pub(super) fn refine<R: Real>(&self, pyramid: &Pyramid, field: &mut Vec<R>, codes: &mut Vec<i32>) -> Option<Coded> {
+    /// Codes the block by a pyramid; the fields and `codes` are scratch and result. None if it must be stored exactly.
+    pub(super) fn refine<R: Real>(
+        &self,
+        pyramid: &Pyramid,
+        trial: bool,
+        [field, rest]: &mut [Vec<R>; 2],
+        codes: &mut Vec<i32>,
+    ) -> Option<Coded> {
         let codec = self.codec;
         let weighing = Weighing::of(codec, self.samples, self.missing.magnitude)?;
         let rounding = if pyramid.single { self.missing.magnitude * SINGLE_ROUNDING } else { 0.0 };
@@ -55,12 +64,14 @@ impl Source<'_> {
             self.load_series(&weighing, field);
         }
         clear(codes).resize(nodes, 0);
-        if !Passes::new(pyramid, codec.shape(self.size)).encode(step, field, codes) {
+        let passes = Passes::new(pyramid, codec.shape(self.size));
+        if !passes.encode(step, field, codes) {
             return None;
         }
         let mut tally = if plain { self.check_samples(field)? } else { self.check_series(&weighing, field)? };
         let outliers = tally.take_outliers(codec, self.samples);
-        Some(Coded { step, dropped: tally.squared_error, outliers, tally })
+        let changes = (!trial).then(|| passes.changes(field, rest));
+        Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
     }
 
     /// The samples themselves; those that are missing as "not a number".

@@ -199,7 +199,7 @@ impl Chooser<'_> {
         let frames = self.window.frames();
         let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGE);
         codec.missing_value = self.config.missing_value;
-        let mut encoder = Encoder::new(self.config.level).map_err(super::bug)?;
+        let mut encoder = Encoder::for_trials(self.config.level).map_err(super::bug)?;
         let (mut bytes, mut voxels) = (0, 0);
         for Sampled { size, samples } in boxes {
             let id = BlockId { window: 0, block: 0, channel: 0 };

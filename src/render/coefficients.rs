@@ -140,7 +140,7 @@ impl<'a> CoefficientGroup<'a> {
             order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
         // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        let allowance = Allowance::new(&codec, &file.blocks, config.allowed.filter(|_| !samples));
+        let allowance = Allowance::new(&codec, config.allowed.filter(|_| !samples));
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
         let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, allowance, errors, leaf };
         if config.certify {

@@ -3,7 +3,6 @@
 use super::scene::LeftOut;
 use crate::codec::WindowCodec;
 use crate::sample::magnitude;
-use crate::volume::BlockGrid;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
 /// What is read of a block.
@@ -24,15 +23,17 @@ pub(super) struct Allowance {
     pub(super) gains: Vec<Vec<f64>>,
     /// The largest of each part's gains.
     largest_gain: Vec<f64>,
+    /// Whether a part's largest counts all finer ones, too.
+    cumulative: bool,
     /// How far a sample may be from the source's; none: leave nothing out.
     allowed: Option<f64>,
 }
 
 impl Allowance {
-    pub(super) fn new(codec: &WindowCodec, blocks: &BlockGrid, allowed: Option<f64>) -> Self {
-        let gains = codec.part_gains(blocks);
+    pub(super) fn new(codec: &WindowCodec, allowed: Option<f64>) -> Self {
+        let gains = codec.part_gains();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
-        Self { gains, largest_gain, allowed }
+        Self { gains, largest_gain, cumulative: codec.scheme.pyramid.is_some(), allowed }
     }
 
     /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts, from
@@ -58,11 +59,17 @@ impl Allowance {
         let mut total = errors[0];
         let levels: Vec<(usize, PartEntry)> = kept.parts.iter().rev().filter_map(level_of).collect();
         for (level, part) in levels {
-            let with = (total + part.stats.largest * self.largest_gain[level]).next_up();
+            let before = if self.cumulative { errors[0] } else { total };
+            let with = (before + part.stats.largest * self.largest_gain[level]).next_up();
             if with <= allowed {
                 total = with;
+                if self.cumulative {
+                    errors[1..].fill(0.0);
+                }
                 errors[1 + level] = part.stats.largest;
                 kept.parts.retain(|p| p.kind != part.kind);
+            } else if self.cumulative {
+                break;
             }
         }
     }
@@ -70,7 +77,8 @@ impl Allowance {
     /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
     pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
         let levels = entry.parts.iter().filter_map(level_of);
-        levels.map(|(level, part)| part.stats.largest * self.largest_gain[level]).sum()
+        let each = levels.map(|(level, part)| part.stats.largest * self.largest_gain[level]);
+        if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() }
     }
 }
 

@@ -1,0 +1,95 @@
+//! Rows of nodes, side by side: what every pass of a pyramid does to them, as vector code.
+
+use super::real::Real;
+use crate::wavelet::{LANES, Lane};
+use multiversion::multiversion;
+
+/// p = w0 a + w1 b
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn sum2<R: Real>(rows: [&[R]; 2], w: [R; 2], out: &mut [R]) {
+    let [a, b] = rows.map(|row| &row[..out.len()]);
+    for (i, p) in out.iter_mut().enumerate() {
+        *p = w[0] * a[i] + w[1] * b[i];
+    }
+}
+
+/// p = (w0 a + w1 b) + w2 c
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn sum3<R: Real>(rows: [&[R]; 3], w: [R; 3], out: &mut [R]) {
+    let [a, b, c] = rows.map(|row| &row[..out.len()]);
+    for (i, p) in out.iter_mut().enumerate() {
+        *p = (w[0] * a[i] + w[1] * b[i]) + w[2] * c[i];
+    }
+}
+
+/// p = ((w0 a + w1 b) + w2 c) + w3 d
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], out: &mut [R]) {
+    let [a, b, c, d] = rows.map(|row| &row[..out.len()]);
+    for (i, p) in out.iter_mut().enumerate() {
+        *p = ((w[0] * a[i] + w[1] * b[i]) + w[2] * c[i]) + w[3] * d[i];
+    }
+}
+
+/// v = p + code * step
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], step: R) {
+    for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
+        *v = *p + R::of_code(*code) * step;
+    }
+}
+
+/// The codes of v - p, 0 for what is not a number, and v as the decoder has it. False if a code does not fit.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32], step: R, inverse: R) -> bool {
+    let (zero, least) = (R::default(), R::default() - R::MOST_CODE);
+    let mut fits = true;
+    for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
+        let q = (*v - *p) * inverse;
+        let small = (q < R::MOST_CODE) & (q > least);
+        fits &= small | v.is_nan();
+        let q = if small { (q + R::BIG) - R::BIG } else { zero };
+        *code = q.to_code();
+        *v = *p + q * step;
+    }
+    fits
+}
+
+/// How far values change, and by how much in all.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Change {
+    largest: Lane,
+    squares: Lane,
+}
+
+impl Change {
+    /// The largest change, rounded up.
+    pub(crate) fn largest(&self) -> f64 {
+        let largest = self.largest.into_iter().fold(0.0, f64::max);
+        if largest > 0.0 { largest.next_up() } else { 0.0 }
+    }
+
+    /// The sum of squares.
+    pub(crate) fn energy(&self) -> f64 {
+        self.squares.iter().sum()
+    }
+}
+
+/// Adds the changes from `nodes` to `others`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
+    let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
+    let (others, last_others) = others.as_chunks::<LANES>();
+    for (a, b) in nodes.iter().zip(others) {
+        for l in 0..LANES {
+            let d = (a[l].to_f64() - b[l].to_f64()).abs();
+            change.largest[l] = if d > change.largest[l] { d } else { change.largest[l] };
+            change.squares[l] += d * d;
+        }
+    }
+    for (l, (a, b)) in last_nodes.iter().zip(last_others).enumerate() {
+        let d = (a.to_f64() - b.to_f64()).abs();
+        change.largest[l] = if d > change.largest[l] { d } else { change.largest[l] };
+        change.squares[l] += d * d;
+    }
+}
