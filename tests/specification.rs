@@ -198,24 +198,27 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(u32, &BlockEntry
     }
 }
 
-/// The level parts of a block say what the specified steps and passes make of its codes.
+/// The level parts of a block say how many codes they have, and what leaving them and all finer ones out changes.
 fn check_parts(window: &Window, entry: &BlockEntry, block: &Block) {
     let Some(pyramid) = window.pyramid.as_ref().map(spelled_out) else { return };
-    let extents = [block.size[0], block.size[1], block.size[2], window.coefficients as usize];
-    let mut codes = block.codes.iter();
-    let mut parts = [(0, 0.0_f64); 4];
-    for pass in pyramid.passes(extents) {
-        let (count, largest) = &mut parts[pyramid.part(pass)];
-        for _ in nodes(extents).filter(|node| pyramid.adds(pass, *node)) {
-            let Some(code) = codes.next().filter(|code| **code != 0) else { continue };
-            *count += 1;
-            *largest = largest.max((f64::from(*code) * pyramid.step(block.step, pass.level)).abs());
-        }
+    if block.codes.is_empty() {
+        return;
     }
-    for (level, (count, largest)) in parts.into_iter().enumerate() {
-        let part = entry.part(PartKind::Level(level as u8));
-        let said = part.map_or((0, 0.0), |part| (part.stats.count, part.stats.largest));
-        assert_eq!(said, (count, largest), "part {level} of {}", entry.id);
+    let extents = [block.size[0], block.size[1], block.size[2], window.coefficients as usize];
+    let parts: Vec<usize> = pyramid
+        .passes(extents)
+        .into_iter()
+        .flat_map(|pass| vec![pyramid.part(pass); nodes(extents).filter(|node| pyramid.adds(pass, *node)).count()])
+        .collect();
+    let whole = pyramid.decode(extents, block.step, &block.codes);
+    for level in 0..4 {
+        let count = block.codes.iter().zip(&parts).filter(|(code, part)| **code != 0 && **part == level).count();
+        let coarser = block.codes.iter().zip(&parts).map(|(code, part)| if *part < level { *code } else { 0 });
+        let rest = pyramid.decode(extents, block.step, &coarser.collect::<Vec<_>>());
+        let largest = whole.iter().zip(rest).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let said = entry.part(PartKind::Level(level as u8)).map(|part| (part.stats.count, part.stats.largest));
+        let expected = (count > 0).then(|| (count as u64, largest.next_up()));
+        assert_eq!(said, expected, "part {level} of {}", entry.id);
     }
 }
 

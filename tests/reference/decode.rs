@@ -180,6 +180,7 @@ pub(crate) fn multi(coefficients: &[f64]) -> Vec<f64> {
 }
 
 /// The scaling coefficients of the next finer level.
+#[allow(clippy::approx_constant, reason = "the digits of the specification")]
 fn multi_level(scaling: &[f64], wavelets: &[f64]) -> Vec<f64> {
     const END_NODE: [f64; 4] = [0.7071067811865475, 0.6363961030678927, -0.3, -0.07071067811865475];
     const END_WAVELET: [f64; 4] = [-0.7071067811865475, 0.6363961030678927, -0.3, -0.07071067811865475];
