@@ -85,18 +85,21 @@ impl<'a> Passes<'a> {
 
     /// Calls `visit` with every row of nodes along x that a pass adds, and what they are predicted to be.
     fn for_each_row<R: Real>(&self, pass: &Pass, field: &mut [R], mut visit: impl FnMut(&mut [R], &[R])) {
-        let count = pass.extent(self.shape)[0];
+        let shape = side_by_side(pass, self.shape);
+        let count = pass.extent(shape)[0];
         let (first, distance) = pass.nodes(0);
         let mut predicted = vec![R::default(); count];
         let mut apart = Vec::new();
         let mut gathered = [const { Vec::new() }; 4];
-        for at in rows(pass, self.shape) {
+        for at in rows(pass, shape) {
             match pass.axis {
                 None => predicted.fill(R::default()),
                 Some(Axis::X) => self.predict_along(pass, &field[at.start..], &mut gathered[0], &mut predicted),
-                Some(axis) => self.predict_across(pass, axis.index(), &at, field, &mut gathered, &mut predicted),
+                Some(axis) => {
+                    self.predict_across(pass, (axis.index(), shape), &at, field, &mut gathered, &mut predicted);
+                }
             }
-            let nodes = &mut field[at.start + first..at.start + self.shape[0]];
+            let nodes = &mut field[at.start + first..at.start + shape[0]];
             if distance == 1 {
                 visit(nodes, &predicted);
             } else {
@@ -111,17 +114,17 @@ impl<'a> Passes<'a> {
     fn predict_across<R: Real>(
         &self,
         pass: &Pass,
-        axis: usize,
+        (axis, shape): (usize, [usize; 4]),
         at: &RowAt,
         field: &[R],
         gathered: &mut [Vec<R>; 4],
         predicted: &mut [R],
     ) {
         let (_, distance) = pass.nodes(axis);
-        let stride: usize = self.shape[..axis].iter().product();
+        let stride: usize = shape[..axis].iter().product();
         let start = at.start - at.index[axis] * stride;
-        let taps = taps(self.pyramid.stencil, at.index[axis] / distance, self.shape[axis].div_ceil(distance));
-        let row = |tap: usize| &field[start + (taps.first + tap) * distance * stride..][..self.shape[0]];
+        let taps = taps(self.pyramid.stencil, at.index[axis] / distance, shape[axis].div_ceil(distance));
+        let row = |tap: usize| &field[start + (taps.first + tap) * distance * stride..][..shape[0]];
         let apart = pass.nodes(0).1;
         if apart == 1 {
             taps.sum(std::array::from_fn(|t| if t < taps.count { row(t) } else { &[] }), predicted);
@@ -146,6 +149,13 @@ impl<'a> Passes<'a> {
             i += run;
         }
     }
+}
+
+/// The shape in which the rows of a pass are longest: all nodes of a plane, where it adds or keeps all of them.
+fn side_by_side(pass: &Pass, shape: [usize; 4]) -> [usize; 4] {
+    let [x, y, z, k] = shape;
+    let across = matches!(pass.axis, Some(Axis::Z | Axis::T));
+    if across && [0, 1].map(|axis| pass.nodes(axis)) == [(0, 1); 2] { [x * y, 1, z, k] } else { shape }
 }
 
 /// Taps of a cubic stencil between the faces.

@@ -2,14 +2,18 @@
 //! frames).
 
 use super::{Haar, LANES, Lane, TimeBasis, synthesis};
+use multiversion::multiversion;
 
 /// What a value of a stored function counts.
 const UNIT: f64 = 1.0 / 32768.0;
 
-/// Orthonormal functions, `rows[k][t]`.
+/// Orthonormal functions.
 #[derive(Debug)]
 pub struct Learned {
+    /// `rows[k][t]`
     rows: Vec<Vec<f64>>,
+    /// `columns[t][k]`
+    columns: Vec<Vec<f64>>,
     frames: usize,
 }
 
@@ -26,7 +30,8 @@ impl Learned {
                 rows.extend(orthonormal(candidate, &rows));
             }
         }
-        Self { rows, frames }
+        let columns = (0..frames).map(|t| rows.iter().map(|row| row[t]).collect()).collect();
+        Self { rows, columns, frames }
     }
 
     /// Functions as a file stores them.
@@ -73,20 +78,37 @@ impl TimeBasis for Learned {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        for (c, row) in coefficients.iter_mut().zip(&self.rows) {
-            *c = Lane::default();
-            for (v, u) in series.iter().zip(row) {
-                (0..LANES).for_each(|l| c[l] += u * v[l]);
-            }
-        }
+        sums_of_products(&self.rows, series, coefficients);
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        series.fill(Lane::default());
-        for (c, row) in coefficients.iter().zip(&self.rows).filter(|(c, _)| **c != Lane::default()) {
-            for (v, u) in series.iter_mut().zip(row) {
-                (0..LANES).for_each(|l| v[l] += c[l] * u);
+        let end = coefficients.iter().rposition(|c| *c != Lane::default()).map_or(0, |last| last + 1);
+        sums_of_products(&self.columns, &coefficients[..end], series);
+    }
+}
+
+/// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
+    let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();
+    let (some_out, last_out) = out.as_chunks_mut::<SIDE_BY_SIDE>();
+    some_out.iter_mut().zip(some).for_each(|(out, factors)| *out = products(factors, lanes));
+    last_out.iter_mut().zip(last).for_each(|(out, factors)| [*out] = products(std::array::from_ref(factors), lanes));
+}
+
+#[inline(always)]
+fn products<const N: usize>(factors: &[Vec<f64>; N], lanes: &[Lane]) -> [Lane; N] {
+    let factors = factors.each_ref().map(|f| &f[..lanes.len()]);
+    let mut sums = [Lane::default(); N];
+    for (j, lane) in lanes.iter().enumerate() {
+        for i in 0..N {
+            for l in 0..LANES {
+                sums[i][l] += lane[l] * factors[i][j];
             }
         }
     }
+    sums
 }
+
+/// Sums that are made together: each waits for its last addition.
+const SIDE_BY_SIDE: usize = 4;
