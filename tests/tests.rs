@@ -19,5 +19,6 @@ mod real;
 mod reference;
 mod sampled;
 mod scenes;
+mod specification;
 mod truncation;
 mod wavelets;

@@ -1,8 +1,10 @@
 //! The slow, obvious truth against which the library is tested.
 //!
-//! Written from `shared/method.md` alone: nothing here calls the library, and only `std` arithmetic is used.
+//! Written from `shared/method.md` alone, and `decode` from `format/FORMAT.md`: nothing here calls the library, and only
+//! `std` arithmetic is used.
 
 pub(crate) mod camera;
+pub(crate) mod decode;
 pub(crate) mod sampled;
 pub(crate) mod splat;
 pub(crate) mod transform;

@@ -9,9 +9,10 @@ use crate::*;
 type Times = (u64, Vec<f64>, Option<String>);
 type Grid = ([u64; 3], [f64; 3], [f64; 3], u32, u32, u16);
 type Tolerance<B> = (B, f64, (f64, f64), Option<f64>);
-type Frames = (u64, u32, u32, u32, Vec<u32>);
+type Refined = Option<(Vec<u32>, u32, f64, f64, bool)>;
+type Coded = (u32, u32, Vec<u32>, Vec<i16>, Refined);
 type Reached = (f64, f64, f64, f64, f64, f64, u64, u64, u64);
-type Record<B> = (Grid, Times, Tolerance<B>, Vec<(Frames, Reached)>, Vec<(String, String)>, String);
+type Record<B> = (Grid, Times, Tolerance<B>, Vec<(u64, u32, Coded, Reached)>, Vec<(String, String)>, String);
 
 /// A variant is its number and its fields.
 fn record<B>(m: &Metadata, bound: B) -> Record<B> {
@@ -19,15 +20,32 @@ fn record<B>(m: &Metadata, bound: B) -> Record<B> {
     let times = (m.frames, m.times.clone(), m.variable.clone());
     let tolerance = (bound, m.tolerance, m.range, m.missing_value);
     let window = |w: &Window| {
-        let frames = (w.first_frame, w.frames, w.basis as u32, w.coefficients, w.levels.clone());
-        (frames, (w.delta, w.reached, w.share, w.squared_error, w.min, w.max, w.missing, w.coded, w.outliers))
+        let coded =
+            (w.basis as u32, w.coefficients, w.levels.clone(), w.functions.clone(), w.pyramid.as_ref().map(refined));
+        let reached = (w.delta, w.reached, w.share, w.squared_error, w.min, w.max, w.missing, w.coded, w.outliers);
+        (w.first_frame, w.frames, coded, reached)
     };
     (grid, times, tolerance, m.windows.iter().map(window).collect(), m.settings.clone(), m.program.clone())
 }
 
+fn refined(p: &Pyramid) -> (Vec<u32>, u32, f64, f64, bool) {
+    (p.order.iter().map(|axis| *axis as u32).collect(), p.stencil as u32, p.growth, p.most, p.single)
+}
+
+/// The first window without a pyramid, the second learned and refined.
+fn every_field() -> Metadata {
+    let mut metadata = Metadata { times: (0..7).map(f64::from).collect(), ..metadata() };
+    let order = vec![Axis::Z, Axis::X];
+    let pyramid = Pyramid { order, stencil: Stencil::Cubic, growth: 1.5, most: 3.0, single: true };
+    let coded = Window { basis: Basis::Learned, coefficients: 3, ..metadata.windows[1].clone() };
+    let functions = vec![1, -2, 3, -32768, 5, 32767];
+    metadata.windows[1] = Window { levels: Vec::new(), functions, pyramid: Some(pyramid), ..coded };
+    metadata
+}
+
 #[test]
 fn wincode_reads_and_writes_the_same_record() {
-    let metadata = Metadata { times: (0..7).map(f64::from).collect(), ..metadata() };
+    let metadata = every_field();
     let with = |bound| Metadata { bound, ..metadata.clone() };
     let bytes = with(Bound::Rms).encode().expect("valid");
     let expected = record(&metadata, 1u32);
@@ -41,6 +59,6 @@ fn wincode_reads_and_writes_the_same_record() {
 
 #[test]
 fn the_record_keeps_its_golden_bytes() {
-    let hex: String = testing::tiny().encode().expect("valid").iter().map(|byte| format!("{byte:02x}")).collect();
+    let hex: String = every_field().encode().expect("valid").iter().map(|byte| format!("{byte:02x}")).collect();
     assert_eq!(hex, include_str!("record.hex").trim());
 }

@@ -75,7 +75,7 @@ pub(crate) struct ConvertArgs {
     /// Only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
-    /// Voxels a side of a block [default: 32, less for long windows]
+    /// Voxels a side of a block [default: up to 48, up to 32 without a pyramid; less for long windows]
     #[arg(long, value_name = "N")]
     block: Option<usize>,
     /// zstd level
