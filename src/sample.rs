@@ -49,10 +49,21 @@ pub fn round_to(ty: SampleType, value: f64) -> f64 {
         SampleType::I16 => as_int!(i16),
         SampleType::U32 => as_int!(u32),
         SampleType::I32 => as_int!(i32),
-        SampleType::F16 => f64::from(f16::from_f64(value)),
+        SampleType::F16 => f64::from(nearest_f16(value)),
         SampleType::F32 => f64::from(value as f32),
         SampleType::F64 => value,
     }
+}
+
+/// The nearest half-precision number, ties to even. Through `f32`, rounded to odd: that keeps on which side of a tie the
+/// value was, and a second rounding then does no harm; a conversion straight from `f64` differs between machines.
+fn nearest_f16(value: f64) -> f16 {
+    let near = value as f32;
+    if f64::from(near) == value || value.is_nan() {
+        return f16::from_f32(near);
+    }
+    let beyond = f64::from(near).abs() > value.abs();
+    f16::from_f32(f32::from_bits((near.to_bits() - u32::from(beyond)) | 1))
 }
 
 /// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
@@ -67,7 +78,7 @@ pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     }
     macro_rules! cast {
         (f16, $v:expr) => {
-            f16::from_f64($v)
+            nearest_f16($v)
         };
         ($t:ident, $v:expr) => {
             $v as $t
@@ -154,6 +165,22 @@ mod tests {
             load(ty, &bytes, &mut back);
             assert_eq!(back, [lo, hi], "{ty}");
         }
+    }
+
+    #[test]
+    fn halves_round_to_nearest_from_all_digits() {
+        let ulp = 2f64.powi(-10);
+        for (share, expected) in
+            [(0.5, 1.0), (0.5 + 2f64.powi(-30), 1.0 + ulp), (0.5 - 2f64.powi(-30), 1.0), (1.5, 1.0 + 2.0 * ulp)]
+        {
+            assert_eq!(round_to(SampleType::F16, 1.0 + share * ulp), expected, "{share}");
+            assert_eq!(round_to(SampleType::F16, -1.0 - share * ulp), -expected, "{share}");
+        }
+        assert_eq!(round_to(SampleType::F16, 65519.999), 65504.0);
+        assert_eq!(round_to(SampleType::F16, 65520.0), f64::INFINITY);
+        assert_eq!(round_to(SampleType::F16, 1e-300), 0.0);
+        assert_eq!(round_to(SampleType::F16, f64::MAX), f64::INFINITY);
+        assert!(round_to(SampleType::F16, f64::NAN).is_nan());
     }
 
     #[test]
