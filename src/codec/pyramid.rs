@@ -166,16 +166,17 @@ fn rows(pass: &Pass, shape: [usize; 4]) -> impl Iterator<Item = RowAt> + use<> {
 }
 
 /// Weights of some even nodes, the first being number `first`.
-struct Taps {
-    first: usize,
-    weights: [f64; 4],
-    count: usize,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taps {
+    pub(crate) first: usize,
+    pub(crate) weights: [f64; 4],
+    pub(crate) count: usize,
 }
 
 /// What predicts odd node `i`, between the even nodes i and i + 1 of `evens`; all sums go from the first tap to the last.
 ///
 /// Cubic polynomials through four nodes, quadratic ones through three next to a face, and straight lines beyond the last.
-fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
+pub(crate) fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {
         () if last && evens == 1 => (i, [1.0, 0.0, 0.0, 0.0], 1),
@@ -221,7 +222,7 @@ fn add<R: Real>(row: &[R], w: R, step: usize, out: &mut [R]) {
 }
 
 /// Fills a line, of which every `stride`-th node is given, by passes without codes.
-pub(super) fn refine_line(stencil: Stencil, stride: usize, line: &mut [f64]) {
+pub(crate) fn refine_line(stencil: Stencil, stride: usize, line: &mut [f64]) {
     let mut distance = stride;
     while distance > 1 {
         let evens = line.len().div_ceil(distance);

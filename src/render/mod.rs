@@ -14,6 +14,8 @@ mod coefficients;
 pub mod colour;
 mod finish;
 mod frames;
+#[cfg_attr(not(test), allow(dead_code, reason = "what splats by it follows"))]
+mod lattice;
 mod plan;
 mod reading;
 mod scene;
