@@ -14,6 +14,7 @@
 //! and weighted by its depth: equal but for rounding, faces included ([`layer`]).
 
 mod cells;
+mod kernel;
 mod layer;
 mod shear;
 mod spline;

@@ -56,6 +56,13 @@ impl Shear {
         (0..3).fold(self.origin[2], |z, i| z + self.depths[i] * voxel[self.axes[i]] as f64)
     }
 
+    /// The cells that an offset in pixels is.
+    pub(super) fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [b, c] = self.pixels;
+        let det = b[0] * c[1] - b[1] * c[0];
+        [(x * c[1] - y * c[0]) / det, (b[0] * y - b[1] * x) / det].map(|voxels| voxels * self.fineness as f64)
+    }
+
     /// The pixel of a place in cells.
     pub(super) fn pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [b, c] = [u, v].map(|cells| cells / self.fineness as f64);
