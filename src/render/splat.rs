@@ -65,6 +65,17 @@ impl Tile {
         self.sums.chunks_exact(self.pixels())
     }
 
+    /// Number of planes.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Its sums, of a tile whose planes lie pixel by pixel.
+    pub(super) fn sums_mut(&mut self) -> &mut [f64] {
+        debug_assert!(self.order == Order::Pixels);
+        &mut self.sums
+    }
+
     /// Puts other planes, one after another, in place of its own.
     pub(super) fn replace(&mut self, planes: Vec<f64>) {
         (self.count, self.order, self.sums) = (planes.len() / self.pixels(), Order::Planes, planes);

@@ -1,12 +1,12 @@
 //! Planes of sums over cells: amounts are spread into them, and passes of a pyramid widen them.
 
-use super::spline::{MOST_DEGREE, Spread};
+use super::spline::Spread;
 use multiversion::multiversion;
 use std::ops::Range;
 
 /// A rectangle of cells with some planes, one after another, each row by row.
 #[derive(Debug)]
-pub(super) struct Cells {
+pub(in crate::render) struct Cells {
     /// The first cell along u and v.
     pub(super) first: [isize; 2],
     /// Cells along u and v.
@@ -33,6 +33,17 @@ impl Cells {
     fn plane_mut(&mut self, plane: usize) -> &mut [f64] {
         let area = self.area();
         &mut self.sums[plane * area..][..area]
+    }
+
+    /// Adds one amount, spread along both axes.
+    pub(super) fn add(&mut self, plane: usize, amount: f64, places: [(isize, Spread); 2], degree: usize) {
+        let [(u, along), (v, across)] = places;
+        let (u, v, width) = ((u - self.first[0]) as usize, (v - self.first[1]) as usize, self.size[0]);
+        let plane = self.plane_mut(plane);
+        for (line, weight) in (v..).zip(&across[..=degree]) {
+            let cells = &mut plane[line * width + u..][..=degree];
+            cells.iter_mut().zip(&along).for_each(|(sum, w)| *sum += amount * weight * w);
+        }
     }
 
     /// Adds a row of amounts along u, every `distance`-th cell one, spread along both axes.
@@ -102,8 +113,6 @@ pub(super) struct Row<'a> {
     /// Weights along v.
     pub(super) across: &'a Spread,
 }
-
-const _: () = assert!(MOST_DEGREE + 1 <= size_of::<Spread>() / size_of::<f64>());
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn add_scaled(sums: &mut [f64], factor: f64, amounts: &[f64]) {

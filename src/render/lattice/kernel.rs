@@ -10,7 +10,8 @@
 //! What is left is how B repeats itself beyond half a cell's frequency, where F is small; [`Kernel::error`] measures it.
 
 use super::shear::Shear;
-use super::spline::{MOST_DEGREE, spread};
+use super::spline::spread;
+use multiversion::multiversion;
 use std::ops::Range;
 
 /// The kernel of a view.
@@ -21,6 +22,8 @@ pub(super) struct Kernel {
     inverse: [f64; 3],
     /// Of its Gaussian.
     peak: f64,
+    /// exp(-uu): the second quotient of Gaussians at neighbouring cells.
+    bend: f64,
     /// From its centre to its cut, squared and in units of that covariance.
     cut: f64,
     /// Half the cells along u and v that it reaches.
@@ -42,7 +45,7 @@ impl Kernel {
         let usable = suu > 0.0 && svv > 0.0 && left > LEAST_LEFT / det;
         let half = [radius * suu.sqrt(), radius * svv.sqrt()];
         let (peak, inverse) = ((1.0 / (det * left)).sqrt(), [svv / left, -suv / left, suu / left]);
-        usable.then_some(Self { degree, inverse, peak, cut: radius * radius, half })
+        usable.then(|| Self { degree, inverse, peak, bend: libm::exp(-inverse[0]), cut: radius * radius, half })
     }
 
     /// The rows of cells that a pixel at `v` reaches.
@@ -64,12 +67,33 @@ impl Kernel {
         let reach = room.sqrt();
         let (first, last) = (place[0] - middle - reach, place[0] - middle + reach);
         let first = first.ceil() as isize;
-        weights.extend((first..=last.floor() as isize).map(|cell| self.at(place[0] - cell as f64, dv)));
+        self.gaussians(place[0] - first as f64, dv, first..last.floor() as isize + 1, weights);
+        correct(self, weights, place[0] - first as f64, dv);
         first
+    }
+
+    /// The Gaussian at places one cell apart: each is the one before times a quotient that changes by a constant factor.
+    fn gaussians(&self, du: f64, dv: f64, cells: Range<isize>, out: &mut Vec<f64>) {
+        let [uu, uv, vv] = self.inverse;
+        let mut weight = self.peak * libm::exp(-0.5 * ((uu * du + 2.0 * uv * dv) * du + vv * dv * dv));
+        let mut quotient = libm::exp(uu * (du - 0.5) + uv * dv);
+        for _ in cells {
+            out.push(weight);
+            weight *= quotient;
+            quotient *= self.bend;
+        }
     }
 
     /// The kernel at a place.
     fn at(&self, du: f64, dv: f64) -> f64 {
+        let [uu, uv, vv] = self.inverse;
+        let gaussian = self.peak * libm::exp(-0.5 * ((uu * du + 2.0 * uv * dv) * du + vv * dv * dv));
+        gaussian * self.correction(du, dv)
+    }
+
+    /// What the kernel is in units of its Gaussian.
+    #[inline(always)]
+    fn correction(&self, du: f64, dv: f64) -> f64 {
         let [uu, uv, vv] = self.inverse;
         let (su, sv) = (uu * du + uv * dv, uv * du + vv * dv);
         let splines = (self.degree + 1) as f64;
@@ -79,8 +103,7 @@ impl Kernel {
             let sixth = ((x - 15.0 * i) * x + 45.0 * i2) * x - 15.0 * i2 * i;
             splines * (fourth / 2880.0 - sixth / 181_440.0)
         };
-        let gaussian = self.peak * libm::exp(-0.5 * (su * du + sv * dv));
-        gaussian * (1.0 + correction(su, uu) + correction(sv, vv))
+        1.0 + correction(su, uu) + correction(sv, vv)
     }
 
     /// The weight at `to` of an amount at `from`, both in cells.
@@ -128,9 +151,18 @@ impl Kernel {
         phases.map(|[u, v]| (self.weight([u, v], [u + du, v + dv]) - exact).abs()).fold(0.0, f64::max)
     }
 
-    /// Cells along u and v from a pixel to the furthest amount that it sees.
-    pub(super) fn reach(&self) -> [f64; 2] {
-        self.half.map(|half| half + (MOST_DEGREE + 1) as f64 / 2.0 + 1.0)
+    /// Cells that a pixel reaches, about.
+    pub(super) fn cells(&self) -> f64 {
+        let [uu, uv, vv] = self.inverse;
+        std::f64::consts::PI * self.cut / (uu * vv - uv * uv).sqrt()
+    }
+}
+
+/// Turns Gaussians at places one cell apart into the kernel.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn correct(kernel: &Kernel, weights: &mut [f64], du: f64, dv: f64) {
+    for (w, n) in weights.iter_mut().zip(0_i32..) {
+        *w *= kernel.correction(du - f64::from(n), dv);
     }
 }
 

@@ -16,6 +16,7 @@
 mod cells;
 mod kernel;
 mod layer;
+mod picture;
 mod shear;
 mod spline;
 #[cfg(test)]
@@ -23,25 +24,27 @@ mod tests;
 
 use crate::codec::field::Field;
 use crate::codec::pyramid::taps;
-use cells::{Cells, Row};
+pub(super) use cells::Cells;
+use cells::Row;
 use layer::{Codes, Layer, Nodes, interior, slices};
+pub(super) use picture::{Lattice, Sums};
 use shear::Shear;
 use spline::{Spread, spread};
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
 /// A decoded block and its codes.
 #[derive(Debug, Clone, Copy)]
-struct Coded<'a> {
+pub(super) struct Coded<'a> {
     /// The voxel that its first one is.
-    start: [usize; 3],
+    pub(super) start: [usize; 3],
     /// Nodes along x, y, z, k.
-    shape: [usize; 4],
-    pyramid: Option<&'a Pyramid>,
+    pub(super) shape: [usize; 4],
+    pub(super) pyramid: Option<&'a Pyramid>,
     /// What codes of level 0 count.
-    step: f64,
+    pub(super) step: f64,
     /// Pass after pass; used with a pyramid only.
-    codes: &'a [i32],
-    field: &'a Field<'a>,
+    pub(super) codes: &'a [i32],
+    pub(super) field: &'a Field<'a>,
 }
 
 /// How amounts are spread over the cells of a view.

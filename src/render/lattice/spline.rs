@@ -1,7 +1,7 @@
 //! The B-splines that spread an amount over the cells around it.
 
 /// The highest degree.
-pub(super) const MOST_DEGREE: usize = 5;
+pub(super) const MOST_DEGREE: usize = 7;
 
 /// Weights of the cells around a place.
 pub(super) type Spread = [f64; MOST_DEGREE + 1];
