@@ -8,6 +8,9 @@
 //!     every tile inverts its pixels            finish: planes -> frames, then / weights; certificate
 //!   give the finished frames to the sink
 //! ```
+//!
+//! Where that is less work, the codes of a file go to cells of the view's sheared lattice instead, and from there to pixels
+//! ([`lattice`]); all planes then do, weights and what is missing included, so that means stay means.
 
 mod certificate;
 mod coefficients;

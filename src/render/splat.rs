@@ -61,7 +61,7 @@ impl Tile {
 
     /// Its planes one after another, row by row; of a tile in that order.
     pub(super) fn planes(&self) -> impl Iterator<Item = &[f64]> {
-        debug_assert!(self.order == Order::Planes);
+        debug_assert!(self.order == Order::Planes || self.count == 1);
         self.sums.chunks_exact(self.pixels())
     }
 

@@ -53,7 +53,7 @@ impl Lattice {
         camera: &Camera,
         footprint: &Footprint,
     ) -> Option<(Self, Method)> {
-        let sigma = gaussian.sigma * camera.scale;
+        let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
         let radius = (2.0 * libm::log(20.0 / error)).sqrt(); // half of the error is left for the lattice
         for (fineness, degree) in CHOICES.into_iter().filter(|_| error > SMALLEST) {
             let shear = Shear::new(camera, grid, fineness);
@@ -73,6 +73,9 @@ impl Lattice {
     }
 
     fn suits(&self, blocks: &BlockGrid) -> bool {
+        if !self.is_tame() {
+            return false;
+        }
         let depths = self.spreading.shear.depths.map(|z| (self.spreading.tau * z).abs());
         let tile = self.seen_by(&(0..TILE), &(0..TILE)).1;
         let steep = depths.into_iter().fold(0.0, f64::max) > STEEPEST;
@@ -80,6 +83,15 @@ impl Lattice {
         !steep
             && area(tile) <= MOST_CELLS * TILE * TILE
             && self.block_cells(&region) <= MOST_CELLS * region.voxels().max(TILE * TILE)
+    }
+
+    /// Whether whole numbers of cells are small enough for arithmetic.
+    fn is_tame(&self) -> bool {
+        let shear = &self.spreading.shear;
+        let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
+        let places = [self.place([0.0; 2]), self.kernel.half];
+        let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
+        per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64)) && places.iter().all(|n| within(n, 1e9))
     }
 
     /// Products for a plane, about.
@@ -290,6 +302,8 @@ fn sum_planes<const N: usize>(pixel: &mut [f64], plane: &mut usize, peak: f64, s
 /// What a product takes from cells to pixels in units of one of a footprint, as measured, weights included.
 const GATHERING: f64 = 3.0;
 
+/// Nothing cheaper has larger errors.
+const LARGEST: f64 = 0.05;
 /// Errors that no lattice reaches.
 const SMALLEST: f64 = 1e-6;
 

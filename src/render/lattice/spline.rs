@@ -19,9 +19,9 @@ fn weights(degree: usize, t: f64) -> Spread {
     n[0] = 1.0;
     for d in 1..=degree {
         let mut saved = 0.0;
-        for r in 0..d {
-            let part = n[r] / d as f64;
-            n[r] = saved + ((r + 1) as f64 - t) * part;
+        for (r, weight) in n.iter_mut().enumerate().take(d) {
+            let part = *weight / d as f64;
+            *weight = saved + ((r + 1) as f64 - t) * part;
             saved = (t + (d - r - 1) as f64) * part;
         }
         n[d] = saved;
