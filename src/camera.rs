@@ -65,6 +65,12 @@ impl Camera {
         ]
     }
 
+    /// What a step of `length` along a world axis adds to the projection.
+    pub fn step(&self, axis: usize, length: f64) -> [f64; 3] {
+        let along = |screen: [f64; 3]| screen[axis] * length;
+        [self.scale * along(self.right), -self.scale * along(self.up), along(self.forward)]
+    }
+
     /// The depth of the farthest corner of `grid`, in world units.
     pub fn depth(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)

@@ -19,7 +19,8 @@
 //!    |                                                  leave out; scene: what is splatted
 //!    |  terms: (plane, amount) per voxel    codec/      the same decoder
 //!    v
-//!  planes of tiles                          camera.rs, footprint.rs, render/splat.rs (eq 4 and 9)
+//!  planes of tiles                          camera.rs, footprint.rs, render/splat.rs (eq 4 and 9); or pass by pass on
+//!    |                                      the sheared lattice of the view: render/lattice/
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
 //!  pictures, and bounds on their errors     render/finish.rs, weights.rs (eq 12), certificate.rs, colour.rs, sink.rs;
@@ -46,7 +47,7 @@
 //!
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
-//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`) are pure functions over slices: no
+//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions over slices: no
 //!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`,
 //!    `extract.rs` and `verify.rs`.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.

@@ -13,6 +13,7 @@ mod common;
 mod determinism;
 mod every_float;
 mod images;
+mod lattice;
 mod layering;
 mod left_out;
 mod real;

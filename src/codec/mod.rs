@@ -10,7 +10,7 @@ pub mod encode;
 pub mod field;
 mod gain;
 mod load;
-mod pyramid;
+pub(crate) mod pyramid;
 mod real;
 mod refine;
 mod rows;
@@ -99,7 +99,7 @@ impl WindowCodec {
     }
 
     /// Nodes of a block of `size` voxels along x, y, z and k.
-    fn shape(&self, [x, y, z]: [usize; 3]) -> [usize; 4] {
+    pub(crate) fn shape(&self, [x, y, z]: [usize; 3]) -> [usize; 4] {
         [x, y, z, self.basis.coefficients()]
     }
 

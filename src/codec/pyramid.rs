@@ -190,10 +190,11 @@ fn rows(pass: &Pass, shape: [usize; 4]) -> impl Iterator<Item = RowAt> + use<> {
 }
 
 /// Weights of some even nodes, the first being number `first`.
-struct Taps {
-    first: usize,
-    weights: [f64; 4],
-    count: usize,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taps {
+    pub(crate) first: usize,
+    pub(crate) weights: [f64; 4],
+    pub(crate) count: usize,
 }
 
 impl Taps {
@@ -212,7 +213,7 @@ impl Taps {
 /// What predicts odd node `i`, between the even nodes i and i + 1 of `evens`; all sums go from the first tap to the last.
 ///
 /// Cubic polynomials through four nodes, quadratic ones through three next to a face, and straight lines beyond the last.
-fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
+pub(crate) fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {
         () if last && evens == 1 => (i, [1.0, 0.0, 0.0, 0.0], 1),
@@ -223,4 +224,17 @@ fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
         () => (i, [0.5, 0.5, 0.0, 0.0], 2),
     };
     Taps { first, weights, count }
+}
+
+/// Fills a line, of which every `stride`-th node is given, by passes without codes.
+pub(crate) fn refine_line(stencil: Stencil, stride: usize, line: &mut [f64]) {
+    let mut distance = stride;
+    while distance > 1 {
+        let evens = line.len().div_ceil(distance);
+        for (i, node) in (distance / 2..line.len()).step_by(distance).enumerate() {
+            let taps = taps(stencil, i, evens);
+            line[node] = (0..taps.count).map(|t| taps.weights[t] * line[(taps.first + t) * distance]).sum();
+        }
+        distance /= 2;
+    }
 }

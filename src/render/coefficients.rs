@@ -1,6 +1,7 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
 use super::RenderConfig;
+use super::lattice::{Coded, Lattice, Sums};
 use super::reading::{Allowance, Kept};
 use super::scene::{Contents, FrameBounds, Group, SampleErrorReport, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
@@ -69,6 +70,12 @@ impl Scene for CoefficientScene {
         let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
         self.file.largest_block() * (4 + 5 + 8 + 10 + refined + missing)
             + self.blocks().region(0).voxels() * errors * 10
+    }
+
+    fn on_lattice(&self) -> bool {
+        // Measured: few coefficients of series by themselves are splatted faster one by one.
+        let refined = self.file.metadata().windows.iter().any(|w| w.pyramid.is_some());
+        self.what == What::Coefficients && refined
     }
 
     fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
@@ -212,15 +219,15 @@ impl<'a> CoefficientGroup<'a> {
         terms
     }
 
-    fn terms_of_codes(&self, block: &Block, errors: &[f64]) -> Terms {
+    /// Terms of the coefficients, and of what overrides them; without the former, of the latter alone.
+    fn terms_of_codes(&self, block: &Block, field: &Field<'_>, errors: &[f64], coefficients: bool) -> Terms {
         let mut terms = Terms::new(block.bytes_read);
-        let field = block.field(&self.codec);
         terms.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
-        let overrides = Overrides::of(block, &self.codec, &field, &self.frames);
+        let overrides = Overrides::of(block, &self.codec, field, &self.frames);
         let mut next = overrides.values.iter().peekable();
         for voxel in 0..block.voxels {
-            if !field.is_zero() {
-                self.add_coefficients(&field, block.voxels, voxel, &mut terms);
+            if coefficients && !field.is_zero() {
+                self.add_coefficients(field, block.voxels, voxel, &mut terms);
             }
             while let Some((_, frame, amount)) = next.next_if(|(v, _, _)| *v == voxel) {
                 terms.add(self.layout.value(*frame), *amount);
@@ -277,8 +284,24 @@ impl Group for CoefficientGroup<'_> {
         Ok(match (&block.exact, self.what) {
             (Some(exact), _) => self.terms_of_samples(&block, exact, &errors),
             (None, What::Samples) => self.terms_of_samples(&block, &block.samples(&self.codec), &errors),
-            (None, What::Coefficients) => self.terms_of_codes(&block, &errors),
+            (None, What::Coefficients) => self.terms_of_codes(&block, &block.field(&self.codec), &errors, true),
         })
+    }
+
+    fn sums(&self, block: usize, region: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        let leaf = self.leaf_of(block as u32)?;
+        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
+        let block = self.file.block(&self.codec, &entry, &self.wanted)?;
+        let field = block.field(&self.codec);
+        if block.exact.is_some() || field.is_zero() {
+            return Ok(None);
+        }
+        let (shape, pyramid) = (self.codec.shape(block.size), self.codec.scheme.pyramid.as_ref());
+        let Block { step, codes, .. } = &block;
+        let coded = Coded { start: region.start, shape, pyramid, step: *step, codes, field: &field };
+        let mut sums = lattice.of_codes(&coded, &self.kept, self.layout.planes());
+        lattice.add_terms(&self.terms_of_codes(&block, &field, &errors, false), region, region, &mut sums);
+        Ok(Some(sums))
     }
 
     fn errors(&self) -> &SampleErrors {

@@ -8,12 +8,16 @@
 //!     every tile inverts its pixels            finish: planes -> frames, then / weights; certificate
 //!   give the finished frames to the sink
 //! ```
+//!
+//! Where that is less work, the codes of a file go to cells of the view's sheared lattice instead, and from there to pixels
+//! ([`lattice`]); all planes then do, weights and what is missing included, so that means stay means.
 
 mod certificate;
 mod coefficients;
 pub mod colour;
 mod finish;
 mod frames;
+mod lattice;
 mod plan;
 mod reading;
 mod scene;
@@ -33,11 +37,12 @@ use crate::progress::Progress;
 use crate::volume::{BlockGrid, Grid, Region};
 use certificate::Certificate;
 use finish::Finish;
+use lattice::{Cells, Lattice, Sums};
 use plan::Budget;
 use rayon::prelude::*;
 use scene::{Contents, Group};
 use serde::Serialize;
-use splat::{Splats, Tile, overlap, rows_reached};
+use splat::{Order, Splats, Tile, overlap, rows_reached};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 use terms::{Layout, Terms};
@@ -158,7 +163,7 @@ pub fn render(
     let started = Instant::now();
     let mut sink_time = Duration::ZERO;
     let (eye, method) = Eye::new(scene, config)?;
-    let budget = Budget::new(config, scene)?;
+    let budget = Budget::new(config, scene, eye.lattice.as_ref())?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
     report.stated_splat_error = stated_splat_error(config.quantity, method);
@@ -188,10 +193,15 @@ pub fn render(
 
 /// The cheapest splat method within an error.
 pub fn splat_method(quantity: Quantity, error: f64) -> Method {
+    Method::within(footprint_error(quantity, error))
+}
+
+/// What footprints may be off by.
+fn footprint_error(quantity: Quantity, error: f64) -> f64 {
     match quantity {
-        Quantity::Emission => Method::within(error),
+        Quantity::Emission => error,
         // A pixel that is not background must keep some of its weights.
-        Quantity::Mean => Method::within((error * weights::BACKGROUND).min(0.9 * weights::BACKGROUND)),
+        Quantity::Mean => (error * weights::BACKGROUND).min(0.9 * weights::BACKGROUND),
     }
 }
 
@@ -221,6 +231,8 @@ struct Eye {
     blocks: BlockGrid,
     /// The voxels that are splatted.
     clip: Region,
+    /// What splats instead of footprints.
+    lattice: Option<Lattice>,
 }
 
 impl Eye {
@@ -239,7 +251,14 @@ impl Eye {
             let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
             return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
         }
-        Ok((Self { camera, footprint, grid, blocks, clip }, method))
+        let lattice = (scene.on_lattice() && !config.certify)
+            .then(|| {
+                let error = footprint_error(config.quantity, config.splat_error);
+                Lattice::within(error, config.kernel, (&grid, &blocks, &clip), &camera, &footprint)
+            })
+            .flatten();
+        let method = lattice.as_ref().map_or(method, |(_, method)| *method);
+        Ok((Self { camera, footprint, grid, blocks, clip, lattice: lattice.map(|l| l.0) }, method))
     }
 
     fn pixels(&self) -> usize {
@@ -247,7 +266,8 @@ impl Eye {
     }
 
     fn tiles(&self, rows: Range<usize>, layout: &Layout) -> Vec<Tile> {
-        Tile::cover(self.camera.size[0], rows, layout.planes(), layout.order)
+        let order = if self.lattice.is_some() { Order::Pixels } else { layout.order };
+        Tile::cover(self.camera.size[0], rows, layout.planes(), order)
     }
 
     /// Copies the first planes of a tile to their places in as many whole pictures.
@@ -263,6 +283,9 @@ impl Eye {
 
     /// Whether any voxel of a block can reach these rows of the picture.
     fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
+        if let Some(lattice) = &self.lattice {
+            return overlap(&lattice.rows_reached(&self.blocks.region(block), self.camera.size), rows);
+        }
         let region = self.blocks.region(block).intersect(&self.clip);
         overlap(&rows_reached(&region, &self.grid, &self.camera, &self.footprint), rows)
     }
@@ -273,14 +296,18 @@ impl Eye {
         tiles: &mut [Tile],
         blocks: &[usize],
         batch: usize,
-        terms: impl Fn(usize) -> Result<Terms> + Sync,
+        source: &dyn Blocks,
         report: &mut RenderReport,
     ) -> Result<()> {
+        if let Some(lattice) = &self.lattice {
+            return self.splat_on(lattice, tiles, blocks, batch, source, report);
+        }
         let mut clock = Instant::now();
         for blocks in blocks.chunks(batch) {
             let project = |block: &usize| {
                 let region = self.blocks.region(*block);
-                Ok(Splats::new(terms(*block)?, &region, &self.clip, &self.grid, &self.camera, &self.footprint))
+                let terms = source.terms(*block)?;
+                Ok(Splats::new(terms, &region, &self.clip, &self.grid, &self.camera, &self.footprint))
             };
             let splats = blocks.par_iter().map(project).collect::<Result<Vec<Splats>>>()?;
             lap(&mut clock, &mut report.decode_seconds);
@@ -290,6 +317,59 @@ impl Eye {
             lap(&mut clock, &mut report.splat_seconds);
         }
         Ok(())
+    }
+
+    /// The same by way of a lattice.
+    fn splat_on(
+        &self,
+        lattice: &Lattice,
+        tiles: &mut [Tile],
+        blocks: &[usize],
+        batch: usize,
+        source: &dyn Blocks,
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let mut clock = Instant::now();
+        let planes = tiles.first().map_or(0, Tile::count);
+        let mut cells: Vec<Cells> = tiles.iter().map(|tile| lattice.cells_of(tile)).collect();
+        let sums_of = |block: &usize| {
+            let region = self.blocks.region(*block);
+            let coded = if self.clip.contains(&region) { source.sums(*block, &region, lattice)? } else { None };
+            Ok(match coded {
+                Some(sums) => sums,
+                None => lattice.of_terms(&source.terms(*block)?, &region, &self.clip, planes),
+            })
+        };
+        for blocks in blocks.chunks(batch) {
+            let sums = blocks.par_iter().map(sums_of).collect::<Result<Vec<Sums>>>()?;
+            lap(&mut clock, &mut report.decode_seconds);
+            cells.par_iter_mut().for_each(|cells| sums.iter().for_each(|s| s.add_to(cells, planes)));
+            report.coefficients += sums.iter().map(|s| s.coefficients).sum::<u64>();
+            report.bytes_read += sums.iter().map(|s| s.bytes_read).sum::<u64>();
+            lap(&mut clock, &mut report.splat_seconds);
+        }
+        tiles.par_iter_mut().zip(&cells).for_each(|(tile, cells)| lattice.gather(cells, tile));
+        lap(&mut clock, &mut report.splat_seconds);
+        Ok(())
+    }
+}
+
+/// Where the terms of blocks come from, and for a lattice their sums, if there is a shorter way to these.
+trait Blocks: Sync {
+    fn terms(&self, block: usize) -> Result<Terms>;
+
+    fn sums(&self, _block: usize, _region: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
+        Ok(None)
+    }
+}
+
+impl Blocks for &dyn Group {
+    fn terms(&self, block: usize) -> Result<Terms> {
+        Group::terms(*self, block)
+    }
+
+    fn sums(&self, block: usize, region: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        Group::sums(*self, block, region, lattice)
     }
 }
 
@@ -330,7 +410,7 @@ fn render_group(
         let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
         report.blocks_read += seen.len() as u64;
         let mut tiles = eye.tiles(rows.clone(), &layout);
-        eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), |b| group.terms(b), report)?;
+        eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), &group, report)?;
         let mut clock = Instant::now();
         tiles.par_iter_mut().for_each(|tile| finish.tile(tile));
         tiles.iter().for_each(|tile| eye.paste(tile, finish.planes(), &mut pictures, |pixel| pixel as f32));

@@ -3,6 +3,7 @@
 //! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
 
 use super::RenderConfig;
+use super::lattice::Lattice;
 use super::scene::Scene;
 use super::splat::TILE;
 use super::terms::Layout;
@@ -19,6 +20,8 @@ pub(super) struct Budget {
     /// Finished numbers of a pixel and frame: its value, and its error.
     numbers: usize,
     block_bytes: usize,
+    /// Cells that a tile has besides its pixels, with as many planes.
+    tile_cells: usize,
 }
 
 /// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
@@ -26,12 +29,16 @@ const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl Budget {
     /// For pictures of a scene.
-    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene) -> Result<Self> {
+    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, lattice: Option<&Lattice>) -> Result<Self> {
         let size = config.view.size;
         let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
         let numbers = 1 + usize::from(config.certify);
         let available = config.memory.saturating_sub(fixed);
-        let budget = Self { available, size, numbers, block_bytes: scene.block_bytes(config) };
+        // All planes at once, and those that are kept.
+        let group = scene.most_planes(1, config) + scene.most_planes(scene.group_end(0), config);
+        let cells = |l: &Lattice| l.block_cells(&scene.blocks().region(0)) * group * size_of::<f64>();
+        let block_bytes = scene.block_bytes(config) + lattice.map_or(0, cells);
+        let budget = Self { available, size, numbers, block_bytes, tile_cells: lattice.map_or(0, Lattice::tile_cells) };
         let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1, config)) + budget.block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
@@ -49,7 +56,8 @@ impl Budget {
 
     /// One row of tiles with all planes.
     fn row_bytes(&self, planes: usize) -> usize {
-        planes * self.size[0] * TILE * size_of::<f64>()
+        let cells = self.size[0].div_ceil(TILE) * self.tile_cells;
+        planes * (self.size[0] * TILE + cells) * size_of::<f64>()
     }
 
     /// How many of `most` frames to render together.

@@ -4,6 +4,7 @@
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
 use super::RenderConfig;
+use super::lattice::{Lattice, Sums};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
 use crate::volume::{BlockGrid, Grid, Region};
@@ -30,6 +31,11 @@ pub trait Scene {
     /// An upper bound of the bytes that one block takes while its terms are made.
     fn block_bytes(&self, config: &RenderConfig) -> usize;
 
+    /// Whether its blocks may be splatted on the lattice of the view.
+    fn on_lattice(&self) -> bool {
+        false
+    }
+
     /// Opens some frames of one group, ascending.
     fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>>;
 }
@@ -44,6 +50,11 @@ pub trait Group: Sync {
 
     /// The terms of a block.
     fn terms(&self, block: usize) -> Result<Terms>;
+
+    /// The sums of a block on a lattice, all of its voxels and planes; none: its terms are splatted.
+    fn sums(&self, _block: usize, _region: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
+        Ok(None)
+    }
 
     /// The frames at some pixels from their planes: the inverse transform (eq 8). Overwrites `planes`.
     fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]);

@@ -61,8 +61,19 @@ impl Tile {
 
     /// Its planes one after another, row by row; of a tile in that order.
     pub(super) fn planes(&self) -> impl Iterator<Item = &[f64]> {
-        debug_assert!(self.order == Order::Planes);
+        debug_assert!(self.order == Order::Planes || self.count == 1);
         self.sums.chunks_exact(self.pixels())
+    }
+
+    /// Number of planes.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Its sums, of a tile whose planes lie pixel by pixel.
+    pub(super) fn sums_mut(&mut self) -> &mut [f64] {
+        debug_assert!(self.order == Order::Pixels);
+        &mut self.sums
     }
 
     /// Puts other planes, one after another, in place of its own.

@@ -4,9 +4,10 @@ use super::certificate;
 use super::plan::Budget;
 use super::splat::{Order, Tile};
 use super::terms::{Layout, Terms};
-use super::{Eye, Quantity, RenderConfig, RenderReport};
+use super::{Blocks, Eye, Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
 use crate::footprint::{Footprint, Method};
+use crate::volume::BlockGrid;
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
 pub(super) const BACKGROUND: f64 = 0.01;
@@ -55,11 +56,14 @@ impl Weights {
             return Ok(None);
         }
         let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
-        let seen_by = |footprint: Footprint| Eye { footprint, ..eye.clone() };
+        let seen_by = |footprint: Footprint| Eye { footprint, lattice: None, ..eye.clone() };
         let sums = sums(eye, budget)?;
         let exact = by(Method::EXACT)?;
-        let uncut =
-            if mean && eye.footprint.reach < exact.reach { self::sums(&seen_by(exact), budget)? } else { Vec::new() };
+        let uncut = if mean && (eye.lattice.is_some() || eye.footprint.reach < exact.reach) {
+            self::sums(&seen_by(exact), budget)?
+        } else {
+            Vec::new()
+        };
         let mut beyond = Vec::new();
         if config.certify {
             let whole = seen_by(by(certificate::WHOLE)?);
@@ -87,9 +91,18 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();
         let mut tiles = eye.tiles(rows.clone(), &layout);
-        let ones = |b: usize| Ok(Terms::ones(eye.blocks.region(b).voxels()));
-        eye.splat(&mut tiles, &blocks, budget.batch(&layout, rows.len()), ones, &mut RenderReport::default())?;
+        let (batch, report) = (budget.batch(&layout, rows.len()), &mut RenderReport::default());
+        eye.splat(&mut tiles, &blocks, batch, &Ones(&eye.blocks), report)?;
         tiles.iter().for_each(|tile| eye.paste(tile, 1, &mut out, |sum| sum));
     }
     Ok(out)
+}
+
+/// A 1 for every voxel of a block.
+struct Ones<'a>(&'a BlockGrid);
+
+impl Blocks for Ones<'_> {
+    fn terms(&self, block: usize) -> Result<Terms> {
+        Ok(Terms::ones(self.0.region(block).voxels()))
+    }
 }

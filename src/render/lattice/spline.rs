@@ -1,0 +1,56 @@
+//! The B-splines that spread an amount over the cells around it.
+
+/// The highest degree.
+pub(super) const MOST_DEGREE: usize = 7;
+
+/// Weights of the cells around a place.
+pub(super) type Spread = [f64; MOST_DEGREE + 1];
+
+/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1, odd
+/// degrees only. They sum to 1, and the centre of the amount stays where it is.
+pub(super) fn spread(degree: usize, place: f64) -> (isize, Spread) {
+    let below = place.floor();
+    (below as isize - (degree / 2) as isize, weights(degree, place - below))
+}
+
+/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first (de Boor's recurrence).
+fn weights(degree: usize, t: f64) -> Spread {
+    let mut n = Spread::default();
+    n[0] = 1.0;
+    for d in 1..=degree {
+        let mut saved = 0.0;
+        for (r, weight) in n.iter_mut().enumerate().take(d) {
+            let part = *weight / d as f64;
+            *weight = saved + ((r + 1) as f64 - t) * part;
+            saved = (t + (d - r - 1) as f64) * part;
+        }
+        n[d] = saved;
+    }
+    n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_sum_to_one_around_the_place() {
+        for degree in [1, 3, 5] {
+            for place in [-3.75, -1.0, 0.0, 0.3, 17.999] {
+                let (first, weights) = spread(degree, place);
+                let cells = || (first..).zip(&weights[..=degree]);
+                let sum: f64 = weights.iter().sum();
+                let centre: f64 = cells().map(|(cell, w)| cell as f64 * w).sum();
+                assert!((sum - 1.0).abs() < 1e-15 && (centre - place).abs() < 1e-14, "{degree} {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_cubic_spline_by_hand() {
+        let (first, weights) = spread(3, 2.0);
+        assert_eq!(first, 1);
+        let expected = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 0.0];
+        assert!(weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-16));
+    }
+}
