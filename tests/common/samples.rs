@@ -24,7 +24,7 @@ pub(crate) fn append(ty: SampleType, value: f64, out: &mut Vec<u8>) {
         SampleType::I16 => out.extend((value.round() as i16).to_le_bytes()),
         SampleType::U32 => out.extend((value.round() as u32).to_le_bytes()),
         SampleType::I32 => out.extend((value.round() as i32).to_le_bytes()),
-        SampleType::F16 => out.extend(f16::from_f64(value.clamp(-65504.0, 65504.0)).to_le_bytes()),
+        SampleType::F16 => out.extend(nearest_half(value.clamp(-65504.0, 65504.0)).to_le_bytes()),
         SampleType::F32 => out.extend((value.clamp(f32::MIN.into(), f32::MAX.into()) as f32).to_le_bytes()),
         SampleType::F64 => out.extend(value.to_le_bytes()),
     }
@@ -67,4 +67,21 @@ pub(crate) fn special(ty: SampleType, which: usize) -> Vec<u8> {
         }
         _ => unreachable!("{ty} has no such value"),
     }
+}
+
+/// The nearest half-precision number, of two the one whose last bit is 0: a search among all.
+fn nearest_half(value: f64) -> f16 {
+    let (mut low, mut high) = (0_u16, f16::MAX.to_bits()); // magnitudes grow with bits
+    while low < high {
+        let middle = low + (high - low).div_ceil(2);
+        if f64::from(f16::from_bits(middle)) <= value.abs() { low = middle } else { high = middle - 1 }
+    }
+    let next = (low + 1).min(f16::MAX.to_bits());
+    let off = |bits: u16| (f64::from(f16::from_bits(bits)) - value.abs()).abs();
+    let nearest = match off(low).total_cmp(&off(next)) {
+        std::cmp::Ordering::Equal => low + (low & 1),
+        std::cmp::Ordering::Less => low,
+        std::cmp::Ordering::Greater => next,
+    };
+    f16::from_bits(nearest | if value.is_sign_negative() { 0x8000 } else { 0 })
 }
