@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Where that is less work, the codes of a file go to cells of the view's sheared lattice instead, and from there to pixels
-//! ([`lattice`]); all planes then do, weights and what is missing included, so that means stay means.
+//! (`lattice`); all planes then do, weights and what is missing included, so that means stay means.
 
 mod certificate;
 mod coefficients;
