@@ -180,9 +180,10 @@ fn check_block(
 
 /// An error if a coefficient is larger than the directory says, on which skipping relies.
 fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
+    let largest_of_parts = block.largest(codec);
     for part in &entry.parts {
         let PartKind::Level(level) = part.kind else { continue };
-        let largest = block.largest(codec, level);
+        let largest = largest_of_parts[usize::from(level)];
         if largest > part.stats.largest {
             let what =
                 format!("{} holds {largest:e}, larger than the directory says: {:e}", entry.id, part.stats.largest);

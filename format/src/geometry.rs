@@ -30,14 +30,6 @@ impl BlockGeometry<'_> {
         (self.window.frames as usize).saturating_mul(self.voxels())
     }
 
-    /// Level parts that a block can have.
-    pub fn levels(&self) -> u8 {
-        match &self.window.pyramid {
-            Some(_) => Pyramid::PARTS,
-            None => self.window.levels.len() as u8,
-        }
-    }
-
     /// Codes in the part of a level; none for a level that the window lacks.
     pub fn codes(&self, level: u8) -> Option<usize> {
         match &self.window.pyramid {
@@ -87,7 +79,7 @@ impl BlockGeometry<'_> {
     pub(crate) fn check(&self, part: &PartEntry) -> Check {
         let (kind, count, raw_len) = (part.kind, part.stats.count, u64::from(part.raw_len));
         if let PartKind::Level(level) = kind {
-            ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.levels()))?;
+            ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.window.parts()))?;
         }
         let most = self.max_count(kind);
         let least = if kind == PartKind::Exact { most } else { 1 };

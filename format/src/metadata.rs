@@ -278,6 +278,11 @@ impl Metadata {
 }
 
 impl Window {
+    /// Level parts that a block can have.
+    pub fn parts(&self) -> usize {
+        if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }
+    }
+
     /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
     fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
         let Self { frames, coefficients, .. } = *self;

@@ -84,7 +84,7 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
     let scale = if exact { 1 } else { [1, 5, 9_000, 100_000_000][random.below(4) as usize] };
     let mut code = || (random.below(scale) as i32).wrapping_sub(scale as i32 / 2);
     let codes = |level: u8| (0..geometry.codes(level).unwrap_or(0)).map(|_| code()).collect();
-    found.levels = (0..geometry.levels()).map(codes).collect();
+    found.levels = (0..geometry.window.parts() as u8).map(codes).collect();
     if exact {
         found.exact = Some(bytes(total));
     } else if random.below(2) == 0 {
@@ -191,7 +191,7 @@ fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Co
         let mut codes = vec![0; reader.geometry(block.id)?.codes(level).unwrap_or(0)];
         reader.codes(block, level, &mut codes).map(|()| codes)
     };
-    let levels = (0..reader.geometry(block.id)?.levels()).map(level).collect::<Result<_>>()?;
+    let levels = (0..reader.geometry(block.id)?.window.parts() as u8).map(level).collect::<Result<_>>()?;
     let (outliers, missing, exact) = (reader.outliers(block)?, reader.missing(block)?, reader.exact(block)?);
     Ok(Content { levels, outliers, missing, exact })
 }

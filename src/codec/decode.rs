@@ -2,6 +2,7 @@
 
 use super::field::Field;
 use super::pyramid::Passes;
+use super::rows::Change;
 use super::{WindowCodec, lane_groups};
 use crate::sample;
 use crate::wavelet::{LANES, Lane};
@@ -66,17 +67,17 @@ impl Block {
         Field::decode(codec, self.size, self.step, &self.codes)
     }
 
-    /// What the directory should say of a level part: its largest coefficient, or with a pyramid the largest change
+    /// What the directory should say of each level part: its largest coefficient, or with a pyramid the largest change
     /// where it and all finer ones are left out.
-    pub fn largest(&self, codec: &WindowCodec, level: u8) -> f64 {
-        let change = |pyramid| Passes::new(pyramid, codec.shape(self.size));
+    pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
+        let changes = |changes: Vec<Change>| changes.iter().map(Change::largest).collect();
+        let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
+        let passes = |pyramid| Passes::new(pyramid, codec.shape(self.size));
         match (&codec.scheme.pyramid, self.field(codec)) {
-            (Some(pyramid), Field::Single(mut field)) => change(pyramid).leave_out(level, &mut field).largest(),
-            (Some(pyramid), Field::Double(mut field)) => change(pyramid).leave_out(level, &mut field).largest(),
-            _ => {
-                let codes = &self.codes[codec.part_ranges(self.size)[usize::from(level)].clone()];
-                codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()))
-            }
+            (_, Field::Zero) => vec![0.0; codec.parts()],
+            (Some(pyramid), Field::Single(field)) => changes(passes(pyramid).changes(&field, &mut Vec::new())),
+            (Some(pyramid), Field::Double(field)) => changes(passes(pyramid).changes(&field, &mut Vec::new())),
+            _ => codec.part_ranges(self.size).into_iter().map(|part| of_codes(&self.codes[part])).collect(),
         }
     }
 

@@ -72,7 +72,7 @@ impl<'a> Passes<'a> {
     }
 
     /// What leaving out a level part and all finer ones changes in a decoded field. Overwrites `field` by what is left.
-    pub(crate) fn leave_out<R: Real>(&self, part: u8, field: &mut [R]) -> Change {
+    fn leave_out<R: Real>(&self, part: u8, field: &mut [R]) -> Change {
         let mut change = Change::default();
         for pass in self.passes.iter().filter(|pass| pass.part >= part) {
             self.for_each_row(pass, field, |nodes, predicted| {

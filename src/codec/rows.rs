@@ -69,6 +69,13 @@ impl Change {
         if largest > 0.0 { largest.next_up() } else { 0.0 }
     }
 
+    #[inline(always)]
+    fn add<R: Real>(&mut self, lane: usize, node: R, other: R) {
+        let d = (node.to_f64() - other.to_f64()).abs();
+        self.largest[lane] = if d > self.largest[lane] { d } else { self.largest[lane] };
+        self.squares[lane] += d * d;
+    }
+
     /// The sum of squares.
     pub(crate) fn energy(&self) -> f64 {
         self.squares.iter().sum()
@@ -81,15 +88,7 @@ pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R
     let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();
     for (a, b) in nodes.iter().zip(others) {
-        for l in 0..LANES {
-            let d = (a[l].to_f64() - b[l].to_f64()).abs();
-            change.largest[l] = if d > change.largest[l] { d } else { change.largest[l] };
-            change.squares[l] += d * d;
-        }
+        (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
     }
-    for (l, (a, b)) in last_nodes.iter().zip(last_others).enumerate() {
-        let d = (a.to_f64() - b.to_f64()).abs();
-        change.largest[l] = if d > change.largest[l] { d } else { change.largest[l] };
-        change.squares[l] += d * d;
-    }
+    last_nodes.iter().zip(last_others).enumerate().for_each(|(l, (a, b))| change.add(l, *a, *b));
 }

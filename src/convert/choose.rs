@@ -130,31 +130,26 @@ impl Chooser<'_> {
     /// One scheme of each kind that is allowed.
     fn families(&self) -> Result<Vec<Scheme>> {
         let Coding { basis, space } = self.config.coding;
-        let frames = self.window.frames();
         let stencil = if let Space::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
-        let wanted = |kind| basis.is_none_or(|b| b == kind);
+        let along_time = match basis {
+            None => (self.window.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
+            Some(Basis::Samples) => None,
+            forced => forced,
+        };
         let mut found = Vec::new();
-        for kind in [Basis::Haar, Basis::Multi, Basis::Learned].into_iter().filter(|k| wanted(*k)) {
-            let forced = basis.is_some();
-            if !forced && kind != Basis::Learned {
-                continue; // never the smallest of all
-            }
-            let functions = match kind {
-                Basis::Learned => self.functions()?,
-                _ => Vec::new(),
-            };
+        if let Some(basis) = along_time {
+            let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme { basis: kind, functions, pyramid, coarseness: self.coarseness(2.0) });
+            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(2.0) });
         }
-        if wanted(Basis::Samples) && space != Space::Alone {
-            for order in ORDERS {
+        if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
+            let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
+            let of_order = |order: [Axis; 4]| {
                 let pyramid = Some(self.pyramid(&order, stencil));
-                let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
-                found.push(Scheme { basis: Basis::Samples, functions: Vec::new(), pyramid, coarseness });
-            }
+                Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) }
+            };
+            found.extend(ORDERS.map(of_order));
         }
-        let many = frames > 1;
-        found.retain(|s| many || s.basis == Basis::Samples || basis.is_some());
         Ok(found)
     }
 

@@ -14,7 +14,7 @@ use crate::sample::{SampleType, magnitude};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, Pyramid, Window};
+use wavesplat_format::{BlockEntry, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,13 +57,13 @@ impl Scene for CoefficientScene {
 
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize {
         let windows = &self.file.metadata().windows;
-        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, parts(w))).max();
+        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, w.parts())).max();
         most.unwrap_or(0) + 2 * frames + 1
     }
 
     fn block_bytes(&self, config: &RenderConfig) -> usize {
         let windows = &self.file.metadata().windows;
-        let errors = windows.iter().map(|w| error_planes(config, parts(w))).max().unwrap_or(0);
+        let errors = windows.iter().map(|w| error_planes(config, w.parts())).max().unwrap_or(0);
         // Codes, payload and samples, and a term of ten bytes for each; what a pyramid gives; where samples are missing, a
         // mask and overrides.
         let refined = if windows.iter().any(|w| w.pyramid.is_some()) { 8 } else { 0 };
@@ -93,11 +93,6 @@ fn error_planes(config: &RenderConfig, levels: usize) -> usize {
         (true, None) => 1,
         (true, Some(_)) => 1 + levels,
     }
-}
-
-/// Level parts of a window's blocks.
-fn parts(window: &Window) -> usize {
-    if window.pyramid.is_some() { Pyramid::PARTS.into() } else { window.levels.len() }
 }
 
 /// Whether most coefficients are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
