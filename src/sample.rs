@@ -5,6 +5,7 @@
 pub use wavesplat_format::SampleType;
 
 use half::f16;
+use multiversion::multiversion;
 
 macro_rules! for_type {
     ($ty:expr, $run:ident, $($arg:expr),*) => {
@@ -67,21 +68,28 @@ fn nearest_f16(value: f64) -> f16 {
 }
 
 /// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     assert_eq!(out.len(), values.len() * ty.size(), "bytes of {} samples", values.len());
     macro_rules! run {
         ($t:ident, $values:expr, $out:expr) => {
             for (b, v) in $out.as_chunks_mut::<{ size_of::<$t>() }>().0.iter_mut().zip($values) {
-                *b = cast!($t, round_to(ty, *v)).to_le_bytes();
+                *b = cast!($t, *v).to_le_bytes();
             }
         };
     }
     macro_rules! cast {
+        (f64, $v:expr) => {
+            $v
+        };
+        (f32, $v:expr) => {
+            $v as f32
+        };
         (f16, $v:expr) => {
             nearest_f16($v)
         };
         ($t:ident, $v:expr) => {
-            $v as $t
+            $v.round() as $t // which clamps, too
         };
     }
     for_type!(ty, run, values, out);
@@ -164,6 +172,20 @@ mod tests {
             let mut back = [0.0; 2];
             load(ty, &bytes, &mut back);
             assert_eq!(back, [lo, hi], "{ty}");
+        }
+    }
+
+    #[test]
+    fn storing_rounds_as_it_should() {
+        let values =
+            [0.0, -0.0, 0.4, -0.5, 2.5, 254.7, 1e4 + 0.5, -1e9, 1e-9, 1.0 + 1e-9, 1e39, f64::MAX, f64::INFINITY];
+        let types =
+            [SampleType::U8, SampleType::I8, SampleType::U16, SampleType::I16, SampleType::U32, SampleType::I32];
+        for ty in types.into_iter().chain([SampleType::F16, SampleType::F32, SampleType::F64]) {
+            let (mut bytes, mut back) = (vec![0; values.len() * ty.size()], [0.0; 13]);
+            store(ty, &values, &mut bytes);
+            load(ty, &bytes, &mut back);
+            assert_eq!(back, values.map(|v| round_to(ty, v)), "{ty}");
         }
     }
 

@@ -164,12 +164,8 @@ impl Trial {
                     assert!(places.iter().all(|i| self.missing[*i] || self.found[*i] == self.source[*i]));
                     continue;
                 }
-                let field = block.field(&codec);
-                block.for_each_group(&codec, &field, |first, count, series| {
-                    for (t, lanes) in series.iter().enumerate() {
-                        let at = t * block.voxels + first;
-                        places[at..at + count].iter().zip(lanes).for_each(|(i, v)| found[*i] = *v);
-                    }
+                block.for_each_run(&codec, |at, values| {
+                    places[at..].iter().zip(values).for_each(|(i, v)| found[*i] = *v);
                 });
                 let outliers = numbers(codec.sample, &block.outliers.samples);
                 for (place, value) in block.outliers.positions.iter().zip(outliers) {

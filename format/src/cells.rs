@@ -93,6 +93,8 @@ struct Grid {
 /// A row of cells: where it is.
 #[derive(Clone, Copy)]
 struct Row {
+    /// Its place along y.
+    y: usize,
     /// Its first code in the box, and its first count.
     code: usize,
     count: usize,
@@ -112,6 +114,7 @@ impl Grid {
         let ([sx, sy, sz, st], [cx, cy, cz]) = (self.extents, self.cells);
         let st = if self.counts.is_empty() { 0 } else { st };
         let row = move |t, z, y| Row {
+            y,
             code: sx * (2 * y + sy * (2 * z + sz * t)),
             count: cx * (y + 1 + (cy + 1) * (z + 1)),
             whole: [2 * y + 1 < sy, 2 * z + 1 < sz],

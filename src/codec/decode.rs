@@ -1,12 +1,12 @@
 //! A coded block back to samples: the one decoder of the project.
 
+use super::WindowCodec;
+use super::buffer::Buffer;
 use super::field::Field;
 use super::pyramid::Passes;
 use super::rows::Change;
-use super::{WindowCodec, lane_groups};
 use crate::sample;
-use crate::wavelet::{LANES, Lane};
-use wavesplat_format::{Basis, BlockEntry, Outliers, PartKind, Reader, Result, Storage};
+use wavesplat_format::{Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub struct Block {
     /// What codes count.
     pub step: f64,
     /// Codes, `k * voxels + voxel`, or with a pyramid pass after pass; empty if no level part was read.
-    pub codes: Vec<i32>,
+    pub codes: Buffer<i32>,
     /// Samples stored exactly because the coefficients miss them.
     pub outliers: Outliers,
     /// Which samples are missing (`frame * voxels + voxel`), and their bytes one after another; empty if none is.
@@ -42,24 +42,41 @@ impl Block {
             size,
             voxels: size.iter().product(),
             step: entry.stats.step,
-            codes: Vec::new(),
+            codes: Buffer::default(),
             outliers: reader.outliers(entry)?,
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
             bytes_read: 0,
         };
-        let ranges = codec.part_ranges(size);
-        for part in &entry.parts {
-            if let PartKind::Level(level) = part.kind {
-                if !codec.needs_part(level.into(), wanted) {
-                    continue;
-                }
-                block.codes.resize(codec.basis.coefficients() * block.voxels, 0);
-                reader.codes(entry, level, &mut block.codes[ranges[usize::from(level)].clone()])?;
-            }
-            block.bytes_read += u64::from(part.stored_len);
-        }
+        block.read_codes(reader, codec, entry, wanted)?;
+        block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
         Ok(block)
+    }
+
+    /// Reads the level parts that there are and that `wanted` needs; the codes of others are zero.
+    fn read_codes<S: Storage>(
+        &mut self,
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+    ) -> Result<()> {
+        let part = |level: u8| entry.part(PartKind::Level(level)).filter(|_| codec.needs_part(level.into(), wanted));
+        let ranges = codec.part_ranges(self.size);
+        if (0..).zip(&ranges).all(|(level, _)| part(level).is_none()) {
+            return Ok(());
+        }
+        self.codes = Buffer::of(codec.basis.coefficients() * self.voxels);
+        for (level, range) in (0..).zip(ranges) {
+            match part(level) {
+                Some(part) => {
+                    reader.codes(entry, level, &mut self.codes[range])?;
+                    self.bytes_read += u64::from(part.stored_len);
+                }
+                None => self.codes[range].fill(0),
+            }
+        }
+        Ok(())
     }
 
     /// What the codes give.
@@ -86,37 +103,30 @@ impl Block {
         self.missing.0.get(index).copied().unwrap_or(false)
     }
 
-    /// Calls `visit(first voxel, count, series)` for every group of voxels, with what the coefficients give:
+    /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients give:
     /// outliers and missing samples not yet in place.
-    pub fn for_each_group(&self, codec: &WindowCodec, field: &Field<'_>, mut visit: impl FnMut(usize, usize, &[Lane])) {
-        let mut work = vec![Lane::default(); codec.basis.coefficients()];
-        let mut series = vec![Lane::default(); codec.frames()];
-        for part in lane_groups(self.voxels) {
-            if !field.is_zero() {
-                field.series(codec.basis.as_ref(), self.voxels, part, &mut work, &mut series);
-            }
-            visit(part.0, part.1, &series);
+    pub fn for_each_run(&self, codec: &WindowCodec, visit: impl FnMut(usize, &[f64])) {
+        let field = self.field(codec);
+        if codec.scheme.basis == Basis::Samples {
+            field.for_each_run_of_samples(codec.frames() * self.voxels, visit);
+        } else {
+            field.for_each_run(codec.basis.as_ref(), self.voxels, visit);
         }
     }
 
     /// The series of one voxel as the coefficients give it.
     pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
-        let mut work = vec![Lane::default(); codec.basis.coefficients()];
-        let mut series = vec![Lane::default(); codec.frames()];
-        if !field.is_zero() {
-            field.series(codec.basis.as_ref(), self.voxels, (voxel, 1), &mut work, &mut series);
-        }
-        series.iter().map(|lane| lane[0]).collect()
+        field.series(codec.basis.as_ref(), self.voxels, voxel)
     }
 
     /// All samples of the block in their own type, little-endian, `frame * voxels + voxel`.
-    pub fn samples(&self, codec: &WindowCodec) -> Vec<u8> {
+    pub fn samples(&self, codec: &WindowCodec) -> Buffer<u8> {
         self.decode(codec, |_, _| {})
     }
 
     /// What [`Self::samples`] gives, and the numbers that are splatted, not rounded to the samples' type.
-    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Vec<u8>, Vec<f64>) {
-        let mut values = vec![0.0; codec.frames() * self.voxels];
+    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
+        let mut values = Buffer::of(codec.frames() * self.voxels);
         let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
         if self.exact.is_some() {
             sample::load(codec.sample, &samples, &mut values);
@@ -129,26 +139,15 @@ impl Block {
     }
 
     /// All samples; `visit(index of the first, values)` sees what coefficients give before it is rounded.
-    fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Vec<u8> {
+    fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
         let size = codec.sample.size();
-        let mut out = match &self.exact {
-            Some(exact) => exact.clone(),
-            None => vec![0; codec.frames() * self.voxels * size],
-        };
-        let field = self.field(codec);
-        if self.exact.is_none() && codec.scheme.basis == Basis::Samples {
-            field.for_each_run(out.len() / size, |at, values| {
+        let mut out = Buffer::of(codec.frames() * self.voxels * size);
+        match &self.exact {
+            Some(exact) => out.copy_from_slice(exact),
+            None => self.for_each_run(codec, |at, values| {
                 visit(at, values);
                 sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
-            });
-        } else if self.exact.is_none() {
-            self.for_each_group(codec, &field, |first, count, series| {
-                for (frame, lane) in series.iter().enumerate() {
-                    let (at, values) = (frame * self.voxels + first, &lane[..count.min(LANES)]);
-                    visit(at, values);
-                    sample::store(codec.sample, values, &mut out[at * size..(at + count) * size]);
-                }
-            });
+            }),
         }
         self.put_overrides(size, &mut out);
         out
@@ -163,4 +162,8 @@ impl Block {
             out[index * size..(index + 1) * size].copy_from_slice(bytes);
         }
     }
+}
+
+fn is_level(part: &PartEntry) -> bool {
+    matches!(part.kind, PartKind::Level(_))
 }

@@ -1,9 +1,11 @@
 //! The coefficients of a block, whatever scheme they were coded with.
 
 use super::WindowCodec;
+use super::buffer::{Buffer, Pooled};
 use super::pyramid::Passes;
 use super::real::Real;
 use crate::wavelet::{LANES, Lane, TimeBasis};
+use multiversion::multiversion;
 use wavesplat_format::Pyramid;
 
 /// Decoded coefficients, `k * voxels + voxel`.
@@ -19,9 +21,9 @@ pub enum Field<'a> {
         codes: &'a [i32],
     },
     /// What a pyramid in 32-bit floats gives.
-    Single(Vec<f32>),
+    Single(Buffer<f32>),
     /// What a pyramid in 64-bit floats gives.
-    Double(Vec<f64>),
+    Double(Buffer<f64>),
 }
 
 impl<'a> Field<'a> {
@@ -50,59 +52,108 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// `count` coefficients from `first` on, and zeros.
-    fn lane(&self, first: usize, count: usize) -> Lane {
+    /// Some coefficients from `first` on.
+    fn load(&self, first: usize, out: &mut [f64]) {
         match self {
-            Self::Zero => Lane::default(),
-            Self::Codes { step, codes } => lane(&codes[first..][..count], |code| f64::from(code) * step),
-            Self::Single(values) => lane(&values[first..][..count], f64::from),
-            Self::Double(values) => lane(&values[first..][..count], |v| v),
+            Self::Zero => out.fill(0.0),
+            Self::Codes { step, codes } => scale(*step, &codes[first..], out),
+            Self::Single(values) => widen(&values[first..], out),
+            Self::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
         }
     }
 
-    /// Calls `visit(index of the first, coefficients)` for all `count`, a run at a time.
-    pub(super) fn for_each_run(&self, count: usize, mut visit: impl FnMut(usize, &[f64])) {
-        const RUN: usize = 512;
-        let mut run = [0.0; RUN];
-        for first in (0..count).step_by(RUN) {
-            let run = &mut run[..RUN.min(count - first)];
-            match self {
-                Self::Zero => {}
-                Self::Codes { step, codes } => {
-                    run.iter_mut().zip(&codes[first..]).for_each(|(v, code)| *v = f64::from(*code) * step);
-                }
-                Self::Single(values) => run.iter_mut().zip(&values[first..]).for_each(|(v, c)| *v = f64::from(*c)),
-                Self::Double(values) => run.copy_from_slice(&values[first..first + run.len()]),
-            }
+    /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients
+    /// give.
+    pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
+        let mut run = Run::new(basis);
+        for first in (0..voxels).step_by(RUN) {
+            let count = RUN.min(voxels - first);
+            let nonzero = run.load(self, voxels, (first, count));
+            run.invert(basis, nonzero, count.div_ceil(LANES));
+            (0..basis.frames()).for_each(|frame| visit(frame * voxels + first, &run.frame(frame)[..count]));
+        }
+    }
+
+    /// The same where coefficients are samples.
+    pub(super) fn for_each_run_of_samples(&self, count: usize, mut visit: impl FnMut(usize, &[f64])) {
+        let mut run = [0.0; 8 * RUN];
+        for first in (0..count).step_by(run.len()) {
+            let run = &mut run[..(8 * RUN).min(count - first)];
+            self.load(first, run);
             visit(first, run);
         }
     }
 
-    /// The series of `count` of `voxels` voxels from `first` on.
-    pub(super) fn series(
-        &self,
-        basis: &dyn TimeBasis,
-        voxels: usize,
-        (first, count): (usize, usize),
-        work: &mut [Lane],
-        series: &mut [Lane],
-    ) {
-        for (k, lane) in work.iter_mut().enumerate() {
-            *lane = self.lane(k * voxels + first, count);
+    /// The series of a voxel.
+    pub(super) fn series(&self, basis: &dyn TimeBasis, voxels: usize, voxel: usize) -> Vec<f64> {
+        let mut work = vec![Lane::default(); basis.coefficients()];
+        let mut series = vec![Lane::default(); basis.frames()];
+        work.iter_mut().enumerate().for_each(|(k, lane)| lane[0] = self.at(k * voxels + voxel));
+        basis.inverse(&mut work, &mut series);
+        series.iter().map(|lane| lane[0]).collect()
+    }
+}
+
+/// Voxels whose series are decoded together: so many that what they need of each plane are whole cache lines.
+const RUN: usize = 128;
+
+/// The series of a run of voxels, [`LANES`] by [`LANES`].
+struct Run {
+    /// `[voxels / LANES][k]`
+    coefficients: Vec<Lane>,
+    /// `[voxels / LANES][frame]`
+    series: Vec<Lane>,
+    /// Of one k or frame.
+    row: [f64; RUN],
+}
+
+impl Run {
+    fn new(basis: &dyn TimeBasis) -> Self {
+        let lanes = |each: usize| vec![Lane::default(); RUN / LANES * each];
+        Self { coefficients: lanes(basis.coefficients()), series: lanes(basis.frames()), row: [0.0; RUN] }
+    }
+
+    /// Loads coefficients; false if all are zero.
+    fn load(&mut self, field: &Field<'_>, voxels: usize, (first, count): (usize, usize)) -> bool {
+        let (each, mut any) = (self.coefficients.len() / (RUN / LANES), false);
+        for k in 0..each {
+            field.load(k * voxels + first, &mut self.row[..count]);
+            any |= self.row[..count].iter().fold(false, |any, c| any | (*c != 0.0));
+            let of_k = self.coefficients[k..].iter_mut().step_by(each);
+            of_k.zip(self.row.as_chunks::<LANES>().0).for_each(|(lane, row)| *lane = *row);
         }
-        basis.inverse(work, series);
+        any
+    }
+
+    fn invert(&mut self, basis: &dyn TimeBasis, nonzero: bool, lanes: usize) {
+        if !nonzero {
+            return self.series.fill(Lane::default());
+        }
+        let coefficients = self.coefficients.chunks_exact_mut(basis.coefficients());
+        let series = self.series.chunks_exact_mut(basis.frames());
+        coefficients.zip(series).take(lanes).for_each(|(coefficients, series)| basis.inverse(coefficients, series));
+    }
+
+    fn frame(&mut self, frame: usize) -> &[f64; RUN] {
+        let each = self.series.len() / (RUN / LANES);
+        let of_frame = self.series[frame..].iter().step_by(each);
+        self.row.as_chunks_mut::<LANES>().0.iter_mut().zip(of_frame).for_each(|(row, lane)| *row = *lane);
+        &self.row
     }
 }
 
-fn lane<T: Copy>(values: &[T], number: impl Fn(T) -> f64) -> Lane {
-    if let Some(values) = values.first_chunk::<LANES>() {
-        return values.map(number);
-    }
-    std::array::from_fn(|l| values.get(l).map_or(0.0, |v| number(*v)))
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn scale(step: f64, codes: &[i32], out: &mut [f64]) {
+    out.iter_mut().zip(codes).for_each(|(v, code)| *v = f64::from(*code) * step);
 }
 
-fn refined<R: Real>(pyramid: &Pyramid, shape: [usize; 4], step: f64, codes: &[i32]) -> Vec<R> {
-    let mut field = vec![R::default(); codes.len()];
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn widen(values: &[f32], out: &mut [f64]) {
+    out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
+}
+
+fn refined<R: Real + Pooled>(pyramid: &Pyramid, shape: [usize; 4], step: f64, codes: &[i32]) -> Buffer<R> {
+    let mut field = Buffer::of(codes.len());
     Passes::new(pyramid, shape).decode(step, codes, &mut field);
     field
 }

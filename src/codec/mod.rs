@@ -4,6 +4,7 @@
 //! the one decoder that the encoder checks with, and that `extract`, `verify` and the renderer use. A scheme beyond a
 //! transform along time replaces this folder's use of [`crate::wavelet`] and nothing else.
 
+pub mod buffer;
 mod check;
 pub mod decode;
 pub mod encode;

@@ -6,142 +6,193 @@
 
 use super::real::Real;
 use super::rows::{self, Change};
+use multiversion::multiversion;
+use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
 pub(crate) struct Passes<'a> {
     pyramid: &'a Pyramid,
+    /// Nodes that are refined together: all, or those of one k where k is not refined.
     shape: [usize; 4],
+    /// How many times there are so many.
+    slices: usize,
     passes: Vec<Pass>,
 }
 
 impl<'a> Passes<'a> {
-    pub(crate) fn new(pyramid: &'a Pyramid, shape: [usize; 4]) -> Self {
-        Self { pyramid, shape, passes: pyramid.passes(shape) }
+    pub(crate) fn new(pyramid: &'a Pyramid, [x, y, z, k]: [usize; 4]) -> Self {
+        let apart = !pyramid.order.contains(&Axis::T);
+        let (shape, slices) = if apart { ([x, y, z, 1], k) } else { ([x, y, z, k], 1) };
+        Self { pyramid, shape, slices, passes: pyramid.passes(shape) }
     }
 
     /// The number of codes in each level part.
     pub(crate) fn part_lengths(&self) -> Vec<usize> {
-        let of_part = |part| self.passes.iter().filter(|p| p.part == part).map(|p| p.codes(self.shape)).sum();
-        (0..Pyramid::PARTS).map(of_part).collect()
+        let of_slice = |part| self.passes.iter().filter(|p| p.part == part).map(|p| p.codes(self.shape)).sum::<usize>();
+        (0..Pyramid::PARTS).map(|part| self.slices * of_slice(part)).collect()
     }
 
     /// The nodes that the passes of a level part add.
     pub(crate) fn boxes(&self, part: u8) -> Vec<[usize; 4]> {
-        self.passes.iter().filter(|p| p.part == part).map(|p| p.extent(self.shape)).collect()
+        let of_all = |[x, y, z, k]: [usize; 4]| [x, y, z, k * self.slices];
+        self.passes.iter().filter(|p| p.part == part).map(|p| of_all(p.extent(self.shape))).collect()
     }
 
     /// Codes to the field; `codes` are all of the block's, pass after pass.
     pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) {
-        let mut codes = codes;
-        for pass in &self.passes {
-            let step = R::of(self.pyramid.step(step, pass.level));
-            self.for_each_row(pass, field, |nodes, predicted| {
-                let (row, rest) = codes.split_at(nodes.len());
-                codes = rest;
-                rows::decode(nodes, predicted, row, step);
-            });
+        for (slice, nodes) in self.slices(field).enumerate() {
+            if self.of_slice(slice).all(|(_, range)| rows::all_zero(&codes[range])) {
+                nodes.fill(R::default());
+                continue;
+            }
+            for (refined, range) in self.of_slice(slice) {
+                let step = R::of(self.pyramid.step(step, refined.pass.level));
+                decode_pass(&refined, step, &codes[range], nodes);
+            }
         }
     }
 
     /// Codes the field, in the place of which is then what the decoder makes of the codes. Nodes that are not a number get
     /// the code 0. False if a code does not fit.
     pub(crate) fn encode<R: Real>(&self, step: f64, field: &mut [R], codes: &mut [i32]) -> bool {
-        let (mut codes, mut fits) = (codes, true);
-        for pass in &self.passes {
-            let exact = self.pyramid.step(step, pass.level);
-            let (step, inverse) = (R::of(exact), R::of(1.0 / exact));
-            self.for_each_row(pass, field, |nodes, predicted| {
-                let (row, rest) = std::mem::take(&mut codes).split_at_mut(nodes.len());
-                codes = rest;
-                fits &= rows::encode(nodes, predicted, row, step, inverse);
-            });
+        let mut fits = true;
+        for (slice, nodes) in self.slices(field).enumerate() {
+            for (refined, range) in self.of_slice(slice) {
+                let step = self.pyramid.step(step, refined.pass.level);
+                fits &= encode_pass(&refined, [R::of(step), R::of(1.0 / step)], &mut codes[range], nodes);
+            }
         }
         fits
     }
 
     /// What leaving out each level part and all finer ones changes in a decoded field; `rest` is scratch.
     pub(crate) fn changes<R: Real>(&self, field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
-        let mut of_part = |part| {
-            rest.clear();
-            rest.extend_from_slice(field);
-            self.leave_out(part, rest)
-        };
-        (0..Pyramid::PARTS).map(&mut of_part).collect()
-    }
-
-    /// What leaving out a level part and all finer ones changes in a decoded field. Overwrites `field` by what is left.
-    fn leave_out<R: Real>(&self, part: u8, field: &mut [R]) -> Change {
-        let mut change = Change::default();
-        for pass in self.passes.iter().filter(|pass| pass.part >= part) {
-            self.for_each_row(pass, field, |nodes, predicted| {
-                rows::add_changes(&mut change, nodes, predicted);
-                nodes.copy_from_slice(predicted);
-            });
+        let mut changes = vec![Change::default(); usize::from(Pyramid::PARTS)];
+        for nodes in field.chunks_exact(self.slice()).filter(|nodes| nodes.iter().any(|v| *v != R::default())) {
+            for (part, change) in (0..).zip(&mut changes) {
+                rest.clear();
+                rest.extend_from_slice(nodes);
+                let finer = self.of_slice(0).filter(|(refined, _)| refined.pass.part >= part);
+                finer.for_each(|(refined, _)| leave_out_pass(&refined, change, rest));
+            }
         }
-        change
+        changes
     }
 
-    /// Calls `visit` with every row of nodes along x that a pass adds, and what they are predicted to be.
-    fn for_each_row<R: Real>(&self, pass: &Pass, field: &mut [R], mut visit: impl FnMut(&mut [R], &[R])) {
-        let shape = side_by_side(pass, self.shape);
-        let count = pass.extent(shape)[0];
-        let (first, distance) = pass.nodes(0);
-        let mut predicted = vec![R::default(); count];
-        let mut apart = Vec::new();
-        let mut gathered = [const { Vec::new() }; 4];
-        for at in rows(pass, shape) {
-            match pass.axis {
+    /// Nodes of a slice.
+    fn slice(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    fn slices<'f, R>(&self, field: &'f mut [R]) -> impl Iterator<Item = &'f mut [R]> + use<'f, R> {
+        field.chunks_exact_mut(self.slice())
+    }
+
+    /// The passes over a slice, and where its codes are among those of the block.
+    fn of_slice(&self, slice: usize) -> impl Iterator<Item = (Refined<'_>, Range<usize>)> {
+        let mut start = 0;
+        self.passes.iter().map(move |pass| {
+            let codes = pass.codes(self.shape);
+            let first = start + slice * codes;
+            start += self.slices * codes;
+            (Refined { stencil: self.pyramid.stencil, shape: self.shape, pass }, first..first + codes)
+        })
+    }
+}
+
+/// A pass over some nodes.
+struct Refined<'a> {
+    stencil: Stencil,
+    shape: [usize; 4],
+    pass: &'a Pass,
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn decode_pass<R: Real>(refined: &Refined<'_>, step: R, codes: &[i32], field: &mut [R]) {
+    refined.for_each_row(field, |first, nodes, predicted| rows::decode(nodes, predicted, &codes[first..], step));
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &mut [i32], field: &mut [R]) -> bool {
+    let mut fits = true;
+    refined.for_each_row(field, |first, nodes, predicted| {
+        fits &= rows::encode(nodes, predicted, &mut codes[first..], step, inverse);
+    });
+    fits
+}
+
+/// Adds what leaving the pass out changes. Overwrites `field` by what is left.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &mut [R]) {
+    refined.for_each_row(field, |_, nodes, predicted| {
+        rows::add_changes(change, nodes, predicted);
+        nodes.copy_from_slice(predicted);
+    });
+}
+
+impl Refined<'_> {
+    /// Calls `visit` with every row of nodes along x that the pass adds: the place of its codes, the nodes, and what they
+    /// are predicted to be.
+    #[inline(always)]
+    fn for_each_row<R: Real>(&self, field: &mut [R], mut visit: impl FnMut(usize, &mut [R], &[R])) {
+        let (first, distance) = self.pass.nodes(0);
+        let shape = self.side_by_side();
+        let count = self.pass.extent(shape)[0];
+        let mut scratch = Scratch::new(self.shape[0].max(count));
+        let Scratch { predicted, apart, gathered } = &mut scratch;
+        let predicted = &mut predicted[..count];
+        for at in Rows::new(self.pass, shape) {
+            match self.pass.axis {
                 None => predicted.fill(R::default()),
-                Some(Axis::X) => self.predict_along(pass, &field[at.start..], &mut gathered[0], &mut predicted),
-                Some(axis) => {
-                    self.predict_across(pass, (axis.index(), shape), &at, field, &mut gathered, &mut predicted);
-                }
+                Some(Axis::X) => self.predict_along(&field[at.start..], &mut gathered[0], predicted),
+                Some(axis) => self.predict_across((axis.index(), shape), &at, field, gathered, predicted),
             }
             let nodes = &mut field[at.start + first..at.start + shape[0]];
             if distance == 1 {
-                visit(nodes, &predicted);
+                visit(at.codes, nodes, predicted);
             } else {
-                gather(nodes, distance, count, &mut apart);
-                visit(&mut apart, &predicted);
-                nodes.iter_mut().step_by(distance).zip(&apart).for_each(|(node, v)| *node = *v);
+                rows::gather(nodes, distance, &mut apart[..count]);
+                visit(at.codes, &mut apart[..count], predicted);
+                nodes.iter_mut().step_by(distance).zip(&*apart).for_each(|(node, v)| *node = *v);
             }
         }
     }
 
     /// Predicts a row of nodes from rows before and behind it along another axis.
+    #[inline(always)]
     fn predict_across<R: Real>(
         &self,
-        pass: &Pass,
         (axis, shape): (usize, [usize; 4]),
         at: &RowAt,
         field: &[R],
         gathered: &mut [Vec<R>; 4],
         predicted: &mut [R],
     ) {
-        let (_, distance) = pass.nodes(axis);
+        let (_, distance) = self.pass.nodes(axis);
         let stride: usize = shape[..axis].iter().product();
         let start = at.start - at.index[axis] * stride;
-        let taps = taps(self.pyramid.stencil, at.index[axis] / distance, shape[axis].div_ceil(distance));
+        let taps = taps(self.stencil, at.index[axis] / distance, shape[axis].div_ceil(distance));
         let row = |tap: usize| &field[start + (taps.first + tap) * distance * stride..][..shape[0]];
-        let apart = pass.nodes(0).1;
+        let apart = self.pass.nodes(0).1;
         if apart == 1 {
             taps.sum(std::array::from_fn(|t| if t < taps.count { row(t) } else { &[] }), predicted);
         } else {
-            (0..taps.count).for_each(|t| gather(row(t), apart, predicted.len(), &mut gathered[t]));
+            (0..taps.count).for_each(|t| rows::gather(row(t), apart, &mut gathered[t][..predicted.len()]));
             taps.sum(gathered.each_ref().map(|row| &row[..]), predicted);
         }
     }
 
     /// Predicts the odd nodes of a row from its even ones.
-    fn predict_along<R: Real>(&self, pass: &Pass, row: &[R], evens: &mut Vec<R>, predicted: &mut [R]) {
-        let (_, distance) = pass.nodes(0);
+    #[inline(always)]
+    fn predict_along<R: Real>(&self, row: &[R], evens: &mut [R], predicted: &mut [R]) {
+        let (_, distance) = self.pass.nodes(0);
         let count = self.shape[0].div_ceil(distance);
-        gather(&row[..self.shape[0]], distance, count, evens);
+        rows::gather(&row[..self.shape[0]], distance, &mut evens[..count]);
         let mut i = 0;
         while i < predicted.len() {
-            let taps = taps(self.pyramid.stencil, i, count);
+            let taps = taps(self.stencil, i, count);
             // All nodes between the faces have the same taps, one further each.
             let run = if taps.count == INNER { (count - 2 - i).min(predicted.len() - i) } else { 1 };
             let from = |t: usize| if t < taps.count { &evens[taps.first + t..] } else { &[] };
@@ -149,44 +200,73 @@ impl<'a> Passes<'a> {
             i += run;
         }
     }
-}
 
-/// The shape in which the rows of a pass are longest: all nodes of a plane, where it adds or keeps all of them.
-fn side_by_side(pass: &Pass, shape: [usize; 4]) -> [usize; 4] {
-    let [x, y, z, k] = shape;
-    let across = matches!(pass.axis, Some(Axis::Z | Axis::T));
-    if across && [0, 1].map(|axis| pass.nodes(axis)) == [(0, 1); 2] { [x * y, 1, z, k] } else { shape }
+    /// The shape in which the rows are longest: all nodes of a plane, where the pass adds or keeps all of them.
+    fn side_by_side(&self) -> [usize; 4] {
+        let [x, y, z, k] = self.shape;
+        let across = matches!(self.pass.axis, Some(Axis::Z | Axis::T));
+        let all = [0, 1].map(|axis| self.pass.nodes(axis)) == [(0, 1); 2];
+        if across && all { [x * y, 1, z, k] } else { self.shape }
+    }
 }
 
 /// Taps of a cubic stencil between the faces.
 const INNER: usize = 4;
 
-/// Every `distance`-th of some nodes, `count` of them.
-fn gather<R: Real>(nodes: &[R], distance: usize, count: usize, out: &mut Vec<R>) {
-    out.clear();
-    out.extend(nodes.iter().step_by(distance).take(count));
+/// Rows that a pass needs for a while.
+struct Scratch<R> {
+    predicted: Vec<R>,
+    apart: Vec<R>,
+    gathered: [Vec<R>; 4],
 }
 
-/// Where a row is: the offset of its node at x = 0, and its `[x, y, z, k]`.
+impl<R: Real> Scratch<R> {
+    fn new(longest: usize) -> Self {
+        let row = || vec![R::default(); longest];
+        Self { predicted: row(), apart: row(), gathered: std::array::from_fn(|_| row()) }
+    }
+}
+
+/// Where a row is: the offset of its node at x = 0, its `[x, y, z, k]`, and the place of its first code.
 struct RowAt {
     start: usize,
     index: [usize; 4],
+    codes: usize,
 }
 
-/// The rows along x that a pass adds nodes to, in the order of codes.
-fn rows(pass: &Pass, shape: [usize; 4]) -> impl Iterator<Item = RowAt> + use<> {
-    let along = [1, 2, 3].map(|axis| {
-        let (first, distance) = pass.nodes(axis);
-        (first..shape[axis]).step_by(distance)
-    });
-    let empty = pass.extent(shape)[0] == 0;
-    let [ys, zs, ks] = along;
-    let rows = ks.flat_map(move |k| {
-        let ys = ys.clone();
-        zs.clone().flat_map(move |z| ys.clone().map(move |y| [0, y, z, k]))
-    });
-    let start = move |[_, y, z, k]: [usize; 4]| shape[0] * (y + shape[1] * (z + shape[2] * k));
-    rows.filter(move |_| !empty).map(move |index| RowAt { start: start(index), index })
+/// The rows along x that a pass adds nodes to, in an order in which those that predict them are near in memory.
+struct Rows {
+    shape: [usize; 4],
+    extent: [usize; 4],
+    nodes: [(usize, usize); 4],
+    /// Axes of the outermost and of the next loop; y is the innermost.
+    loops: [usize; 2],
+    next: usize,
+}
+
+impl Rows {
+    fn new(pass: &Pass, shape: [usize; 4]) -> Self {
+        let nodes = std::array::from_fn(|axis| pass.nodes(axis));
+        let loops = if pass.axis == Some(Axis::T) { [2, 3] } else { [3, 2] };
+        Self { shape, extent: pass.extent(shape), nodes, loops, next: 0 }
+    }
+}
+
+impl Iterator for Rows {
+    type Item = RowAt;
+
+    fn next(&mut self) -> Option<RowAt> {
+        let [nx, ny, nz, nk] = self.extent;
+        if nx == 0 || self.next >= ny * nz * nk {
+            return None;
+        }
+        let (inner, mut number) = (self.extent[self.loops[1]], [0, self.next % ny, 0, 0]);
+        (number[self.loops[0]], number[self.loops[1]]) = (self.next / ny / inner, self.next / ny % inner);
+        self.next += 1;
+        let index = std::array::from_fn(|a| if a == 0 { 0 } else { self.nodes[a].0 + number[a] * self.nodes[a].1 });
+        let flat = |[_, y, z, k]: [usize; 4], [x, ys, zs, _]: [usize; 4]| x * (y + ys * (z + zs * k));
+        Some(RowAt { start: flat(index, self.shape), codes: flat(number, self.extent), index })
+    }
 }
 
 /// Weights of some even nodes, the first being number `first`.
@@ -199,6 +279,7 @@ pub(crate) struct Taps {
 
 impl Taps {
     /// The weighted sum of rows, one for each tap, from the first tap to the last.
+    #[inline(always)]
     fn sum<R: Real>(&self, [a, b, c, d]: [&[R]; 4], out: &mut [R]) {
         let [w, x, y, z] = self.weights.map(R::of);
         match self.count {

@@ -1,11 +1,10 @@
-//! Rows of nodes, side by side: what every pass of a pyramid does to them, as vector code.
+//! Rows of nodes, side by side: what every pass of a pyramid does to them, to be compiled into it as vector code.
 
 use super::real::Real;
 use crate::wavelet::{LANES, Lane};
-use multiversion::multiversion;
 
 /// p = w0 a + w1 b
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn sum2<R: Real>(rows: [&[R]; 2], w: [R; 2], out: &mut [R]) {
     let [a, b] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
@@ -14,7 +13,7 @@ pub(super) fn sum2<R: Real>(rows: [&[R]; 2], w: [R; 2], out: &mut [R]) {
 }
 
 /// p = (w0 a + w1 b) + w2 c
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn sum3<R: Real>(rows: [&[R]; 3], w: [R; 3], out: &mut [R]) {
     let [a, b, c] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
@@ -23,7 +22,7 @@ pub(super) fn sum3<R: Real>(rows: [&[R]; 3], w: [R; 3], out: &mut [R]) {
 }
 
 /// p = ((w0 a + w1 b) + w2 c) + w3 d
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], out: &mut [R]) {
     let [a, b, c, d] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
@@ -32,7 +31,7 @@ pub(super) fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], out: &mut [R]) {
 }
 
 /// v = p + code * step
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], step: R) {
     for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
         *v = *p + R::of_code(*code) * step;
@@ -40,7 +39,7 @@ pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], s
 }
 
 /// The codes of v - p, 0 for what is not a number, and v as the decoder has it. False if a code does not fit.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32], step: R, inverse: R) -> bool {
     let (zero, least) = (R::default(), R::default() - R::MOST_CODE);
     let mut fits = true;
@@ -53,6 +52,21 @@ pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32
         *v = *p + q * step;
     }
     fits
+}
+
+/// Every `distance`-th of some nodes, as many as there is room for.
+#[inline(always)]
+pub(super) fn gather<R: Real>(nodes: &[R], distance: usize, out: &mut [R]) {
+    if distance == 2 && nodes.len() >= 2 * out.len() {
+        out.iter_mut().zip(nodes.as_chunks::<2>().0).for_each(|(v, [node, _])| *v = *node);
+    } else {
+        out.iter_mut().zip(nodes.iter().step_by(distance)).for_each(|(v, node)| *v = *node);
+    }
+}
+
+/// Whether no code says anything.
+pub(super) fn all_zero(codes: &[i32]) -> bool {
+    codes.chunks(64).all(|some| some.iter().fold(0, |any, code| any | code) == 0)
 }
 
 /// How far values change, and by how much in all.
@@ -83,7 +97,7 @@ impl Change {
 }
 
 /// Adds the changes from `nodes` to `others`.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[inline(always)]
 pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
     let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();

@@ -9,7 +9,6 @@ use crate::segments::unpack_segments;
 ///
 /// `boxes[i]` are the extents of a box along x, y, z, t.
 pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Result<usize, String> {
-    codes.fill(0);
     let total = boxes.iter().map(volume).fold(0, usize::saturating_add);
     ensure(total == codes.len(), || format!("boxes of {total} codes for {}", codes.len()))?;
     let mut streams = Streams::parse(raw, boxes.iter().map(cells).sum(), total)?;
@@ -93,13 +92,17 @@ impl<'a> Streams<'a> {
         Ok(self.ends[CLASSES + SCALES - 1] - self.ends[CLASSES - 1])
     }
 
-    /// A box, whose codes are zero so far.
+    /// A box.
     fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> Check {
-        let mut grid = Grid::new(extents);
+        let (mut grid, plane) = (Grid::new(extents), extents[0] * extents[1]);
         let mut significant = vec![0; grid.cells[0]];
         let ahead = |bit: usize| bit % 2 + extents[0] * (bit / 2 % 2 + extents[1] * (bit / 4));
         let steps = std::array::from_fn(ahead);
         for row in grid.rows() {
+            if row.y == 0 {
+                let planes = plane * (1 + usize::from(row.whole[1]));
+                codes[row.code..][..planes].fill(0); // while they are at hand
+            }
             let (around, counts) = grid.around(row);
             self.mark(around, counts, &mut significant);
             ensure(inside(&significant, row, extents[0]), || "a code outside its box is not zero".into())?;

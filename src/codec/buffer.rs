@@ -1,0 +1,88 @@
+//! Large buffers that are used again: memory fresh from the system costs about as much as decoding a block into it.
+
+use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, PoisonError};
+
+/// A slice whose memory the next one of its type takes over when it is dropped, whichever thread that is on. So no more
+/// is kept than was in use at one time.
+#[derive(Debug, Default)]
+pub struct Buffer<T: Pooled>(Vec<T>);
+
+impl<T: Pooled> Buffer<T> {
+    /// A slice of so many, each with any value.
+    pub fn of(len: usize) -> Self {
+        let mut values = spare::<T>().pop().unwrap_or_default();
+        if values.capacity() < len {
+            values = Vec::new(); // nothing of it is worth copying
+        }
+        values.resize(len, T::default());
+        Self(values)
+    }
+}
+
+impl<T: Pooled> FromIterator<T> for Buffer<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        Self(values.into_iter().collect())
+    }
+}
+
+impl<T: Pooled> Drop for Buffer<T> {
+    fn drop(&mut self) {
+        if self.0.capacity() > 0 {
+            spare::<T>().push(std::mem::take(&mut self.0));
+        }
+    }
+}
+
+impl<T: Pooled> Deref for Buffer<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T: Pooled> DerefMut for Buffer<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
+fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Vec<T>>> {
+    T::spare().lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A type of which there are buffers.
+pub trait Pooled: Copy + Default + 'static {
+    /// The buffers that nobody uses.
+    fn spare() -> &'static Mutex<Vec<Vec<Self>>>;
+}
+
+macro_rules! pooled {
+    ($($t:ty),*) => {
+        $(impl Pooled for $t {
+            fn spare() -> &'static Mutex<Vec<Vec<Self>>> {
+                static SPARE: Mutex<Vec<Vec<$t>>> = Mutex::new(Vec::new());
+                &SPARE
+            }
+        })*
+    };
+}
+
+pooled!(u8, i32, f32, f64);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_used_again_and_grows() {
+        let place = |buffer: &Buffer<f64>| buffer.as_ptr();
+        let first = Buffer::of(1 << 12);
+        let memory = place(&first);
+        drop(first);
+        let again = Buffer::of(1 << 10);
+        assert_eq!((place(&again), again.len()), (memory, 1 << 10));
+        assert_eq!(Buffer::<f64>::of(1 << 14).len(), 1 << 14);
+    }
+}
