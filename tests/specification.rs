@@ -77,7 +77,7 @@ fn pyramids_decode_to_the_specified_bits() {
             size: [extents[0], extents[1], extents[2]],
             voxels: extents[..3].iter().product(),
             step,
-            codes,
+            codes: codes.into_iter().collect(),
             outliers: Outliers::default(),
             missing: Default::default(),
             exact: None,
