@@ -1,6 +1,7 @@
 //! A coefficient file back to samples: any frames, any region, without reading the rest.
 
 use crate::codec::WindowCodec;
+use crate::codec::buffer::Buffer;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
 use crate::memory;
@@ -115,13 +116,13 @@ fn block_bytes(file: &CoefficientFile) -> usize {
     file.largest_block() * (4 + 5 + 2 * file.sample().size())
 }
 
-fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mut ExtractReport) -> Result<Vec<u8>> {
+fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mut ExtractReport) -> Result<Buffer<u8>> {
     let codec = file.codec(piece.window)?;
     let first = file.window_range(piece.window).start;
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
-    let mut out = vec![0; frames.len() * piece.region.voxels() * size];
+    let mut out = Buffer::of(frames.len() * piece.region.voxels() * size);
     for entries in file.entries(piece.window, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let decode =
