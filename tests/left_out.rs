@@ -58,6 +58,19 @@ fn a_part_states_just_what_leaving_it_and_finer_ones_out_changes() {
 }
 
 #[test]
+fn codes_too_large_to_decode_are_larger_than_anything_that_is_stated() {
+    let grid = Grid::unit([12, 12, 12]);
+    let settings = settings(Basis::Samples, FRAMES, 0.01);
+    let file = stored(&mut archive(grid, SampleType::F32, &field(&grid, FRAMES, 3)), &settings).open();
+    let (codec, entry) = (file.codec(0).unwrap(), &entries(&file)[0]);
+    let mut block = file.block(&codec, entry, &[true; FRAMES]).unwrap();
+    assert!(block.largest(&codec).iter().all(|largest| largest.is_finite()));
+    block.step = 1e38;
+    block.codes.fill(1 << 20);
+    assert!(block.largest(&codec).contains(&f64::INFINITY));
+}
+
+#[test]
 fn a_looser_tolerance_reads_fewer_parts_of_a_pyramid_and_certifies_what_it_shows() {
     let grid = Grid::unit([40, 33, 30]);
     let memory = archive(grid, SampleType::F32, &field(&grid, FRAMES, 5));

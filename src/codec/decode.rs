@@ -87,15 +87,13 @@ impl Block {
     /// What the directory should say of each level part: its largest coefficient, or with a pyramid the largest change
     /// where it and all finer ones are left out.
     pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
-        let changes = |changes: Vec<Change>| changes.iter().map(Change::largest).collect();
-        let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
-        let passes = |pyramid| Passes::new(pyramid, codec.shape(self.size));
-        match (&codec.scheme.pyramid, self.field(codec)) {
-            (_, Field::Zero) => vec![0.0; codec.parts()],
-            (Some(pyramid), Field::Single(field)) => changes(passes(pyramid).changes(&field, &mut Vec::new())),
-            (Some(pyramid), Field::Double(field)) => changes(passes(pyramid).changes(&field, &mut Vec::new())),
-            _ => codec.part_ranges(self.size).into_iter().map(|part| of_codes(&self.codes[part])).collect(),
-        }
+        let Some(pyramid) = &codec.scheme.pyramid else {
+            let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
+            let ranges = codec.part_ranges(self.size).into_iter();
+            return ranges.map(|part| self.codes.get(part).map_or(0.0, of_codes)).collect();
+        };
+        let passes = Passes::new(pyramid, codec.shape(self.size));
+        self.field(codec).changes(&passes).iter().map(Change::largest).collect()
     }
 
     /// Whether a sample is missing.

@@ -4,13 +4,22 @@ use super::WindowCodec;
 use super::buffer::{Buffer, Pooled};
 use super::pyramid::Passes;
 use super::real::Real;
+use super::rows::Change;
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use multiversion::multiversion;
 use wavesplat_format::Pyramid;
 
-/// Decoded coefficients, `k * voxels + voxel`.
+/// Decoded coefficients of a block.
 #[derive(Debug)]
-pub enum Field<'a> {
+pub struct Field<'a> {
+    values: Values<'a>,
+    /// Which k have any that are not zero, as far as that is known.
+    marked: Vec<bool>,
+}
+
+/// `k * voxels + voxel`
+#[derive(Debug)]
+enum Values<'a> {
     /// All are zero.
     Zero,
     /// Codes times a step.
@@ -29,47 +38,61 @@ pub enum Field<'a> {
 impl<'a> Field<'a> {
     /// From all codes of a block of `size` voxels; none: all are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a [i32]) -> Self {
-        match &codec.scheme.pyramid {
-            _ if codes.is_empty() => Self::Zero,
-            None => Self::Codes { step, codes },
-            Some(pyramid) if pyramid.single => Self::Single(refined(pyramid, codec.shape(size), step, codes)),
-            Some(pyramid) => Self::Double(refined(pyramid, codec.shape(size), step, codes)),
-        }
+        let all = |some| vec![some; codec.basis.coefficients()];
+        let (values, marked) = match &codec.scheme.pyramid {
+            _ if codes.is_empty() => (Values::Zero, all(false)),
+            None => (Values::Codes { step, codes }, all(true)),
+            Some(pyramid) if pyramid.single => refined(pyramid, codec.shape(size), step, codes, Values::Single),
+            Some(pyramid) => refined(pyramid, codec.shape(size), step, codes, Values::Double),
+        };
+        Self { values, marked }
     }
 
     /// Whether all coefficients are zero.
     pub fn is_zero(&self) -> bool {
-        matches!(self, Self::Zero)
+        !self.marked.contains(&true)
     }
 
     /// A coefficient.
     pub fn at(&self, index: usize) -> f64 {
-        match self {
-            Self::Zero => 0.0,
-            Self::Codes { step, codes } => f64::from(codes[index]) * step,
-            Self::Single(values) => values[index].into(),
-            Self::Double(values) => values[index],
+        match &self.values {
+            Values::Zero => 0.0,
+            Values::Codes { step, codes } => f64::from(codes[index]) * step,
+            Values::Single(values) => values[index].into(),
+            Values::Double(values) => values[index],
+        }
+    }
+
+    /// What leaving out each level part of a pyramid and all finer ones changes.
+    pub(super) fn changes(&self, passes: &Passes<'_>) -> Vec<Change> {
+        match &self.values {
+            Values::Single(field) => passes.changes(field, &mut Vec::new()),
+            Values::Double(field) => passes.changes(field, &mut Vec::new()),
+            Values::Zero | Values::Codes { .. } => vec![Change::default(); usize::from(Pyramid::PARTS)],
         }
     }
 
     /// Some coefficients from `first` on.
     fn load(&self, first: usize, out: &mut [f64]) {
-        match self {
-            Self::Zero => out.fill(0.0),
-            Self::Codes { step, codes } => scale(*step, &codes[first..], out),
-            Self::Single(values) => widen(&values[first..], out),
-            Self::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
+        match &self.values {
+            Values::Zero => out.fill(0.0),
+            Values::Codes { step, codes } => scale(*step, &codes[first..], out),
+            Values::Single(values) => widen(&values[first..], out),
+            Values::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
         }
     }
 
     /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients
     /// give.
     pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
-        let mut run = Run::new(basis);
+        let only = basis.only(&self.marked);
+        let basis = only.as_deref().unwrap_or(basis);
+        let ks = (0..self.marked.len()).filter(|k| only.is_none() || self.marked[*k]).collect();
+        let mut run = Run::new(basis, ks);
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
-            let nonzero = run.load(self, voxels, (first, count));
-            run.invert(basis, nonzero, count.div_ceil(LANES));
+            run.load(self, voxels, (first, count));
+            run.invert(basis, count.div_ceil(LANES));
             (0..basis.frames()).for_each(|frame| visit(frame * voxels + first, &run.frame(frame)[..count]));
         }
     }
@@ -99,7 +122,9 @@ const RUN: usize = 128;
 
 /// The series of a run of voxels, [`LANES`] by [`LANES`].
 struct Run {
-    /// `[voxels / LANES][k]`
+    /// Which coefficients.
+    ks: Vec<usize>,
+    /// `[voxels / LANES][of ks]`
     coefficients: Vec<Lane>,
     /// `[voxels / LANES][frame]`
     series: Vec<Lane>,
@@ -108,30 +133,24 @@ struct Run {
 }
 
 impl Run {
-    fn new(basis: &dyn TimeBasis) -> Self {
+    fn new(basis: &dyn TimeBasis, ks: Vec<usize>) -> Self {
         let lanes = |each: usize| vec![Lane::default(); RUN / LANES * each];
-        Self { coefficients: lanes(basis.coefficients()), series: lanes(basis.frames()), row: [0.0; RUN] }
+        Self { coefficients: lanes(ks.len()), series: lanes(basis.frames()), row: [0.0; RUN], ks }
     }
 
-    /// Loads coefficients; false if all are zero.
-    fn load(&mut self, field: &Field<'_>, voxels: usize, (first, count): (usize, usize)) -> bool {
-        let (each, mut any) = (self.coefficients.len() / (RUN / LANES), false);
-        for k in 0..each {
+    fn load(&mut self, field: &Field<'_>, voxels: usize, (first, count): (usize, usize)) {
+        for (i, k) in self.ks.iter().enumerate() {
             field.load(k * voxels + first, &mut self.row[..count]);
-            any |= self.row[..count].iter().fold(false, |any, c| any | (*c != 0.0));
-            let of_k = self.coefficients[k..].iter_mut().step_by(each);
+            let of_k = self.coefficients[i..].iter_mut().step_by(self.ks.len());
             of_k.zip(self.row.as_chunks::<LANES>().0).for_each(|(lane, row)| *lane = *row);
         }
-        any
     }
 
-    fn invert(&mut self, basis: &dyn TimeBasis, nonzero: bool, lanes: usize) {
-        if !nonzero {
-            return self.series.fill(Lane::default());
+    fn invert(&mut self, basis: &dyn TimeBasis, lanes: usize) {
+        let each = self.ks.len();
+        for (i, series) in self.series.chunks_exact_mut(basis.frames()).enumerate().take(lanes) {
+            basis.inverse(&mut self.coefficients[i * each..][..each], series);
         }
-        let coefficients = self.coefficients.chunks_exact_mut(basis.coefficients());
-        let series = self.series.chunks_exact_mut(basis.frames());
-        coefficients.zip(series).take(lanes).for_each(|(coefficients, series)| basis.inverse(coefficients, series));
     }
 
     fn frame(&mut self, frame: usize) -> &[f64; RUN] {
@@ -152,8 +171,14 @@ fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }
 
-fn refined<R: Real + Pooled>(pyramid: &Pyramid, shape: [usize; 4], step: f64, codes: &[i32]) -> Buffer<R> {
+fn refined<'a, R: Real + Pooled>(
+    pyramid: &Pyramid,
+    shape: [usize; 4],
+    step: f64,
+    codes: &[i32],
+    values: fn(Buffer<R>) -> Values<'a>,
+) -> (Values<'a>, Vec<bool>) {
     let mut field = Buffer::of(codes.len());
-    Passes::new(pyramid, shape).decode(step, codes, &mut field);
-    field
+    let marked = Passes::new(pyramid, shape).decode(step, codes, &mut field);
+    (values(field), marked)
 }

@@ -40,17 +40,25 @@ impl<'a> Passes<'a> {
         self.passes.iter().filter(|p| p.part == part).map(|p| of_all(p.extent(self.shape))).collect()
     }
 
-    /// Codes to the field; `codes` are all of the block's, pass after pass.
-    pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) {
-        for (slice, nodes) in self.slices(field).enumerate() {
-            if self.of_slice(slice).all(|(_, range)| rows::all_zero(&codes[range])) {
+    /// Codes to the field; `codes` are all of the block's, pass after pass. Returns of which k some node is not zero, or
+    /// true for all of them where k is refined.
+    pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) -> Vec<bool> {
+        let each = self.slices(field).enumerate().map(|(slice, nodes)| {
+            let some = self.of_slice(slice).any(|(_, range)| !rows::all_zero(&codes[range]));
+            if some {
+                self.decode_slice(slice, step, codes, nodes);
+            } else {
                 nodes.fill(R::default());
-                continue;
             }
-            for (refined, range) in self.of_slice(slice) {
-                let step = R::of(self.pyramid.step(step, refined.pass.level));
-                decode_pass(&refined, step, &codes[range], nodes);
-            }
+            std::iter::repeat_n(some, self.shape[3])
+        });
+        each.flatten().collect()
+    }
+
+    fn decode_slice<R: Real>(&self, slice: usize, step: f64, codes: &[i32], nodes: &mut [R]) {
+        for (refined, range) in self.of_slice(slice) {
+            let step = R::of(self.pyramid.step(step, refined.pass.level));
+            decode_pass(&refined, step, &codes[range], nodes);
         }
     }
 

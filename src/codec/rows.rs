@@ -77,8 +77,11 @@ pub(crate) struct Change {
 }
 
 impl Change {
-    /// The largest change, rounded up.
+    /// The largest change, rounded up; infinite where values are too large for their differences.
     pub(crate) fn largest(&self) -> f64 {
+        if self.energy().is_nan() {
+            return f64::INFINITY;
+        }
         let largest = self.largest.into_iter().fold(0.0, f64::max);
         if largest > 0.0 { largest.next_up() } else { 0.0 }
     }

@@ -30,6 +30,10 @@ impl Learned {
                 rows.extend(orthonormal(candidate, &rows));
             }
         }
+        Self::of_rows(rows, frames)
+    }
+
+    fn of_rows(rows: Vec<Vec<f64>>, frames: usize) -> Self {
         let columns = (0..frames).map(|t| rows.iter().map(|row| row[t]).collect()).collect();
         Self { rows, columns, frames }
     }
@@ -82,8 +86,12 @@ impl TimeBasis for Learned {
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        let end = coefficients.iter().rposition(|c| *c != Lane::default()).map_or(0, |last| last + 1);
-        sums_of_products(&self.columns, &coefficients[..end], series);
+        sums_of_products(&self.columns, coefficients, series);
+    }
+
+    fn only(&self, marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
+        let rows = self.rows.iter().zip(marked).filter(|(_, marked)| **marked).map(|(row, _)| row.clone());
+        Some(Box::new(Self::of_rows(rows.collect(), self.frames)))
     }
 }
 

@@ -40,6 +40,11 @@ pub trait TimeBasis: Send + Sync + Debug {
 
     /// Coefficients to samples. Overwrites `coefficients`, which are its working space.
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]);
+
+    /// What gives the same series from the marked coefficients alone, if all others are zero; none if that saves nothing.
+    fn only(&self, _marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
+        None
+    }
 }
 
 /// The basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
