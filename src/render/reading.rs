@@ -50,8 +50,8 @@ pub(super) enum Rule {
     Cheap(Price),
 }
 
-/// What a step costs in error for each byte that need not be read, in sixteenths of powers of two; of all blocks the
-/// same, so that no other choice reads fewer bytes for the same error.
+/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the same
+/// for all blocks, no other choice of steps reads fewer bytes for the same expected error.
 type Price = i32;
 
 /// Some level parts, from the finest on, of which none is left out without all before it.
