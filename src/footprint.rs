@@ -99,6 +99,16 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
+    /// The standard deviation of its Gaussian, in pixels.
+    pub fn deviation(&self) -> f64 {
+        (0.5 / self.decay).sqrt()
+    }
+
+    /// The sum of a footprint over all pixels, as a multiple of its weight at its centre.
+    pub fn area(&self) -> f64 {
+        std::f64::consts::PI / self.decay
+    }
+
     /// How far rounding can move a weight, as a share of it, if its place may be off by so many pixels along each axis
     /// and its depth, at most `depth`, by so many world units.
     pub fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {

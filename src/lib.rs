@@ -23,8 +23,8 @@
 //!    |                                      the sheared lattice of the view: render/lattice/
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
-//!  pictures, and bounds on their errors     render/finish.rs, weights.rs (eq 12), certificate.rs, colour.rs, sink.rs;
-//!                                           output.rs
+//!  pictures, and what is known of errors    render/finish.rs, weights.rs (eq 12), certificate.rs, expectation.rs,
+//!                                           colour.rs, sink.rs; output.rs
 //! ```
 //!
 //! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source. The programs in `bin/`

@@ -12,6 +12,7 @@ mod coefficients;
 mod common;
 mod determinism;
 mod every_float;
+mod expected;
 mod images;
 mod lattice;
 mod layering;

@@ -15,8 +15,7 @@ use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Quantity, RenderConfig, RenderReport, SampleError, SampleErrorReport, Scene, What,
-    render,
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render,
 };
 use wavesplat_format::Metadata;
 
@@ -80,11 +79,11 @@ struct Cli {
     /// [default: a tenth of --tolerance or the file's tolerance; 1e-4 for frames]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
-    /// Read and splat less, so that samples may be this share of the range off: no less than the file's largest sample
-    /// error, or see --error
+    /// Read and splat less, so that pictures may be this share of the range off (emissions, as samples that are): no less
+    /// than the file's largest sample error, or see --error
     #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = "Error")]
     tolerance: Option<f64>,
-    /// Which error of samples --tolerance limits; both are reported
+    /// Which error --tolerance limits; both are reported
     #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
     error: ErrorName,
     /// Write pictures of the certified error as well: no pixel is further than this from the picture of the source's
@@ -133,13 +132,13 @@ enum QuantityName {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ErrorName {
-    /// The largest
+    /// The largest of any pixel, for sure
     Certified,
-    /// The root mean square over each block: no mean along a ray is expected to be further off
+    /// The root mean square over the pixels, as it is estimated
     Expected,
 }
 
-impl From<ErrorName> for SampleError {
+impl From<ErrorName> for Limit {
     fn from(name: ErrorName) -> Self {
         match name {
             ErrorName::Certified => Self::Certified,
@@ -177,11 +176,11 @@ impl Cli {
         sink.finish()?;
         self.common.detail(summary(&report));
         if self.tolerance.is_some() {
-            let SampleErrorReport { certified_sample_error, expected_sample_error } = report.samples;
+            let RenderReport { certified_sample_error, expected_error, left_out, .. } = &report;
             self.common.note(format_args!(
-                "no sample is off by more than {certified_sample_error:.4e}, none expected to be by {expected_sample_error:.4e}; \
-                 {} coefficients left out",
-                report.left_out.coefficients
+                "no sample is off by more than {certified_sample_error:.4e}; pixels are expected to be by \
+                 {expected_error:.4e} (root mean square); {} coefficients left out",
+                left_out.coefficients
             ));
         }
         if let Some(error) = report.certified_error {

@@ -1,10 +1,11 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
-use super::RenderConfig;
+use super::expectation::Expectation;
 use super::lattice::{Coded, Lattice, Sums};
-use super::reading::{Allowance, Kept};
-use super::scene::{Contents, FrameBounds, Group, SampleErrorReport, SampleErrors, Scene};
+use super::reading::{Allowance, Cheapest, Kept, Place, Rule};
+use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
+use super::{Limit, RenderConfig};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
@@ -78,11 +79,16 @@ impl Scene for CoefficientScene {
         self.what == What::Coefficients && refined
     }
 
-    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
+    fn group<'a>(
+        &'a mut self,
+        frames: &[usize],
+        config: &RenderConfig,
+        expectation: &'a Expectation<'_>,
+    ) -> Result<Box<dyn Group + 'a>> {
         let window = self.file.window_of(frames[0]);
         let first = self.file.window_range(window).start;
         let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames, config)?))
+        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames, config, expectation)?))
     }
 }
 
@@ -112,6 +118,7 @@ struct CoefficientGroup<'a> {
     wanted: Vec<bool>,
     kept: Vec<usize>,
     layout: Layout,
+    expectation: &'a Expectation<'a>,
     allowance: Allowance,
     errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
@@ -125,6 +132,7 @@ impl<'a> CoefficientGroup<'a> {
         window: u32,
         frames: Vec<usize>,
         config: &RenderConfig,
+        expectation: &'a Expectation<'a>,
     ) -> Result<Self> {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
@@ -141,29 +149,46 @@ impl<'a> CoefficientGroup<'a> {
             error_planes: error_planes(config, codec.parts()),
             order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
         };
-        // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        let allowed = config.allowed.filter(|_| !samples).map(|allowed| (allowed, config.limited));
-        let allowance = Allowance::new(&codec, allowed);
+        let allowance = Allowance::new(&codec, expectation);
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
-        let mut group = Self { file, what, window, codec, frames, wanted, kept, layout, allowance, errors, leaf };
+        let mut group =
+            Self { file, what, window, codec, frames, wanted, kept, layout, expectation, allowance, errors, leaf };
+        // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
+        if let Some(allowed) = config.allowed.filter(|_| !samples) {
+            let rule = group.rule(allowed, config)?;
+            group.allowance = group.allowance.by(rule);
+        }
         if config.certify {
             group.errors = group.sample_errors()?;
         }
         Ok(group)
     }
 
+    /// What may be left out so that an error keeps within what is allowed.
+    fn rule(&self, allowed: f64, config: &RenderConfig) -> Result<Rule> {
+        if config.limited == Limit::Certified {
+            return Ok(Rule::Within(allowed));
+        }
+        let region = config.region.unwrap_or(self.file.grid.whole());
+        let mut cheapest = Cheapest::new(&self.allowance);
+        for entries in self.file.entries(self.window, &region) {
+            entries?.iter().for_each(|entry| cheapest.add(&self.place(entry)));
+        }
+        Ok(cheapest.within(self.expectation.allowed(allowed)))
+    }
+
     fn sample_errors(&self) -> Result<SampleErrors> {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
-        let (mut sum, mut samples) = (0.0_f64, SampleErrorReport::default());
+        let (mut sum, mut certified) = (0.0_f64, 0.0_f64);
         for leaf in self.file.leaves(self.window) {
             for entry in self.file.leaf(leaf)? {
                 sum = sum.max(self.allowance.absolute_sum(&entry));
-                samples.join(&self.keep(&entry).samples);
+                certified = certified.max(self.keep(&entry).certified);
             }
         }
         let frame = FrameBounds {
-            error: record.reached.max(samples.certified_sample_error),
+            error: record.reached.max(certified),
             range,
             // What overrides a sample is the sample less what the coefficients give.
             absolute_sum: 2.0 * sum + magnitude(range),
@@ -178,7 +203,12 @@ impl<'a> CoefficientGroup<'a> {
 
     /// What is read of a block.
     fn keep(&self, entry: &BlockEntry) -> Kept {
-        self.allowance.keep(entry, self.file.blocks.region(entry.id.block as usize).voxels())
+        self.allowance.keep(&self.place(entry))
+    }
+
+    fn place<'b>(&self, entry: &'b BlockEntry) -> Place<'b> {
+        let region = self.file.blocks.region(entry.id.block as usize);
+        Place { entry, voxels: region.voxels(), seen: self.expectation.of_block(&region) }
     }
 
     /// Whether a block adds nothing to any plane.
@@ -262,7 +292,8 @@ impl Group for CoefficientGroup<'_> {
             for entry in entries? {
                 let kept = self.keep(&entry);
                 found.left_out += kept.left_out;
-                found.samples.join(&kept.samples);
+                found.certified = found.certified.max(kept.certified);
+                found.expected += kept.expected;
                 found.empty -= u64::from(!entry.parts.is_empty());
                 if !self.adds_nothing(&kept) {
                     found.blocks.push(entry.id.block as usize);

@@ -13,7 +13,7 @@ pub(super) struct Finish<'a> {
     pub(super) group: &'a dyn Group,
     pub(super) layout: Layout,
     pub(super) quantity: Quantity,
-    pub(super) weights: Option<&'a Weights>,
+    pub(super) weights: &'a Weights,
     pub(super) certificate: Option<Certificate>,
 }
 
@@ -63,7 +63,7 @@ impl Finish<'_> {
 
     /// The value of a pixel and its error.
     fn pixel(&self, tile: &Tile, at: usize, frame: usize, emission: f64, absent: f64, errors: f64) -> (f64, f64) {
-        let Some(weight) = self.weights.map(|w| w.at(tile, at)) else { return (emission, 0.0) };
+        let weight = self.weights.at(tile, at);
         let value = match self.quantity {
             Quantity::Mean => weight.mean(emission, absent),
             Quantity::Emission => emission,

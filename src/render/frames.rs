@@ -1,6 +1,7 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
 use super::RenderConfig;
+use super::expectation::Expectation;
 use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::error::Result;
@@ -57,7 +58,12 @@ impl Scene for FrameScene {
         self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
     }
 
-    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>> {
+    fn group<'a>(
+        &'a mut self,
+        frames: &[usize],
+        config: &RenderConfig,
+        _: &'a Expectation<'_>,
+    ) -> Result<Box<dyn Group + 'a>> {
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
         let (archive, declared) = (&self.archive, self.missing_value);

@@ -15,6 +15,7 @@
 mod certificate;
 mod coefficients;
 pub mod colour;
+mod expectation;
 mod finish;
 mod frames;
 mod lattice;
@@ -27,8 +28,9 @@ mod terms;
 mod weights;
 
 pub use coefficients::{CoefficientScene, What};
+pub use expectation::Expectation;
 pub use frames::FrameScene;
-pub use scene::{LeftOut, SampleErrorReport, Scene};
+pub use scene::{LeftOut, Scene};
 
 use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
@@ -74,25 +76,24 @@ pub struct RenderConfig {
     /// place of the plane of the picture, of a mean relative to the value range, if that place is in the picture. 0 asks
     /// for the exact method.
     pub splat_error: f64,
-    /// How far a sample may be from the source's, in its unit, so that less is read and splatted; none: as near as the
-    /// file is.
+    /// How far off the picture may be, in the unit of samples, so that less is read and splatted; none: as near as the
+    /// file is. Of an emission: as far as where all samples are off by so much.
     pub allowed: Option<f64>,
-    /// Which error of samples that limits.
-    pub limited: SampleError,
+    /// Which error that limits.
+    pub limited: Limit,
     /// Whether each picture comes with a bound on the error of every pixel.
     pub certify: bool,
     /// Bytes that may be allocated.
     pub memory: usize,
 }
 
-/// A measure of how far the samples that are splatted are from the source's.
+/// An error that can be limited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum SampleError {
-    /// The largest one.
+pub enum Limit {
+    /// The largest of any sample, and so of any pixel.
     #[default]
     Certified,
-    /// At most the root mean square over a block. No mean along a ray, whose weights are positive, is expected to be
-    /// further off than the worst of its blocks.
+    /// The root mean square over the pixels of a window's pictures, as it is estimated.
     Expected,
 }
 
@@ -117,9 +118,11 @@ pub struct RenderReport {
     pub blocks_outside: u64,
     /// What a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
-    /// What is known of the errors of the samples that were splatted.
-    #[serde(flatten)]
-    pub samples: SampleErrorReport,
+    /// No sample that was splatted is further from the source's.
+    pub certified_sample_error: f64,
+    /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
+    /// splatting; in the pictures' unit.
+    pub expected_error: f64,
     /// The largest error that a pixel may have, if pictures are certified.
     pub certified_error: Option<f64>,
     /// Stored bytes that were read of blocks.
@@ -169,14 +172,15 @@ pub fn render(
     report.stated_splat_error = stated_splat_error(config.quantity, method);
     let mut clock = Instant::now();
     let weights = Weights::new(&eye, config, &budget)?;
+    let expectation = Expectation::new(&eye, config.quantity, &weights);
     lap(&mut clock, &mut report.weight_seconds);
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
         let end = scene.group_end(*first);
         let most = rest.partition_point(|f| *f < end);
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
-        let group = scene.group(now, config)?;
-        let pictures = render_group(group.as_ref(), &eye, config, weights.as_ref(), &budget, &mut report)?;
+        let group = scene.group(now, config, &expectation)?;
+        let pictures = render_group(group.as_ref(), &eye, config, &weights, &budget, &mut report)?;
         for rendered in pictures.frames(now) {
             let writing = Instant::now();
             sink(rendered)?;
@@ -187,6 +191,7 @@ pub fn render(
         rest = later;
     }
     progress.finish();
+    report.expected_error = (report.expected_error / report.frames.max(1) as f64).sqrt();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
 }
@@ -397,7 +402,7 @@ fn render_group(
     group: &dyn Group,
     eye: &Eye,
     config: &RenderConfig,
-    weights: Option<&Weights>,
+    weights: &Weights,
     budget: &Budget,
     report: &mut RenderReport,
 ) -> Result<Pictures> {
@@ -426,13 +431,15 @@ fn render_group(
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
 fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Vec<usize>> {
-    let Contents { mut blocks, empty, left_out, samples } = group.blocks(&eye.clip)?;
+    let Contents { mut blocks, empty, left_out, certified, expected } = group.blocks(&eye.clip)?;
     let held = blocks.len();
     blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
     report.blocks += eye.blocks.len() as u64;
     report.blocks_empty += empty;
     report.blocks_outside += (held - blocks.len()) as u64;
     report.left_out += left_out;
-    report.samples.join(&samples);
+    report.certified_sample_error = report.certified_sample_error.max(certified);
+    // Frame by frame, so that it is the same however frames are grouped.
+    (0..group.layout().frames).for_each(|_| report.expected_error += expected);
     Ok(blocks)
 }

@@ -1,10 +1,11 @@
 //! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
 
-use super::SampleError;
-use super::scene::{LeftOut, SampleErrorReport};
+use super::expectation::{Expectation, Seen};
+use super::scene::LeftOut;
 use crate::codec::WindowCodec;
 use crate::sample::magnitude;
-use wavesplat_format::{Basis, BlockEntry, PartEntry, PartKind};
+use std::collections::BTreeMap;
+use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
 /// What is read of a block.
 #[derive(Debug)]
@@ -14,8 +15,10 @@ pub(super) struct Kept {
     /// The error of its samples: first what holds in every frame, then for each level part what counts
     /// [`Allowance::gains`] times in a frame.
     pub(super) errors: Vec<f64>,
-    /// What that comes to.
-    pub(super) samples: SampleErrorReport,
+    /// No sample is further off.
+    pub(super) certified: f64,
+    /// What its errors are expected to come to in the mean square over pixels.
+    pub(super) expected: f64,
     pub(super) left_out: LeftOut,
 }
 
@@ -26,13 +29,49 @@ pub(super) struct Allowance {
     pub(super) gains: Vec<Vec<f64>>,
     /// The largest of each part's gains.
     largest_gain: Vec<f64>,
+    /// Of each part: what the energy of samples is as a multiple of that of their coefficients.
+    energy_gain: Vec<f64>,
+    /// How many voxels err as one: in what a part and finer ones change, and last in the file's own errors.
+    alike: Vec<f64>,
     /// Whether what the directory says of a part counts all finer ones, too.
     cumulative: bool,
-    /// The energy of samples is at most so many times that of their coefficients.
-    energy_gain: f64,
     frames: usize,
-    /// How far a sample may be from the source's, and by which measure; none: leave nothing out.
-    allowed: Option<(f64, SampleError)>,
+    rule: Rule,
+}
+
+/// What may be left out.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Rule {
+    /// Nothing.
+    Nothing,
+    /// All parts, from the finest on, with which no sample of their block is further off.
+    Within(f64),
+    /// Steps of at most this price.
+    Cheap(Price),
+}
+
+/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the same
+/// for all blocks, no other choice of steps reads fewer bytes for the same expected error.
+type Price = i32;
+
+/// Some level parts, from the finest on, of which none is left out without all before it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Step {
+    /// How many of a block's level parts are left out with it.
+    parts: usize,
+    /// What is then not read.
+    bytes: u64,
+    /// The mean square of what they change.
+    change: f64,
+    price: Price,
+}
+
+/// A block as its entry and the view have it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) entry: &'a BlockEntry,
+    pub(super) voxels: usize,
+    pub(super) seen: Seen,
 }
 
 /// What some level parts of a block come to where they are left out.
@@ -40,96 +79,214 @@ pub(super) struct Allowance {
 struct Without {
     largest: f64,
     energy: f64,
+    /// Of the samples, in the mean square over pixels.
+    change: f64,
+}
+
+/// Finds what is cheapest to leave out of a window.
+#[derive(Debug)]
+pub(super) struct Cheapest<'a> {
+    allowance: &'a Allowance,
+    /// The mean square of the file's own errors.
+    own: f64,
+    /// What the steps of each price come to.
+    changes: BTreeMap<Price, f64>,
+}
+
+impl<'a> Cheapest<'a> {
+    pub(super) fn new(allowance: &'a Allowance) -> Self {
+        Self { allowance, own: 0.0, changes: BTreeMap::new() }
+    }
+
+    /// Goes on to a further block.
+    pub(super) fn add(&mut self, place: &Place<'_>) {
+        self.own += self.allowance.own(place);
+        let mut before = 0.0;
+        for step in self.allowance.steps(place) {
+            *self.changes.entry(step.price).or_default() += step.change - before;
+            before = step.change;
+        }
+    }
+
+    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to come
+    /// to at most `allowed` in the mean square over pixels.
+    pub(super) fn within(&self, allowed: f64) -> Rule {
+        let mut sum = self.own;
+        let affordable = self.changes.iter().take_while(|(_, change)| {
+            sum += **change;
+            sum <= allowed
+        });
+        affordable.last().map_or(Rule::Nothing, |(price, _)| Rule::Cheap(*price))
+    }
 }
 
 impl Allowance {
-    pub(super) fn new(codec: &WindowCodec, allowed: Option<(f64, SampleError)>) -> Self {
+    /// Leaves nothing out yet.
+    pub(super) fn new(codec: &WindowCodec, expectation: &Expectation<'_>) -> Self {
         let gains = codec.part_gains();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
         let cumulative = codec.scheme.pyramid.is_some();
-        let energy_gain = if codec.scheme.basis == Basis::Multi { MULTI_ENERGY } else { 1.0 };
-        Self { gains, largest_gain, cumulative, energy_gain, frames: codec.frames(), allowed }
+        let alike = codec.sides_alike().into_iter().map(|side| expectation.alike(side)).collect();
+        let (energy_gain, frames) = (codec.energy_gains(), codec.frames());
+        Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
     }
 
-    /// What is read of a block of so many voxels: of one that is as good as zero nothing but what is missing, else all but
-    /// the parts, from the finest on, whose effect fits in what is allowed.
-    pub(super) fn keep(&self, entry: &BlockEntry, voxels: usize) -> Kept {
-        let stats = entry.stats;
-        let as_zero = (magnitude((stats.min, stats.max)) + stats.reached).next_up();
+    /// With a rule.
+    pub(super) fn by(self, rule: Rule) -> Self {
+        Self { rule, ..self }
+    }
+
+    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that the
+    /// rule leaves out.
+    pub(super) fn keep(&self, place: &Place<'_>) -> Kept {
+        let (entry, stats) = (place.entry, place.entry.stats);
         let mut kept = Kept {
             entry: entry.clone(),
             errors: vec![0.0; 1 + self.gains.len()],
-            samples: self.errors(entry, voxels, Without::default()),
+            certified: stats.reached,
+            expected: self.own(place),
             left_out: LeftOut::default(),
         };
         kept.errors[0] = stats.reached;
-        match self.allowed {
-            Some((allowed, _)) if as_zero <= allowed => {
-                kept.errors[0] = as_zero;
-                kept.samples = SampleErrorReport { certified_sample_error: as_zero, expected_sample_error: as_zero };
-                kept.entry.parts.retain(|p| p.kind == PartKind::Missing);
+        match self.rule {
+            Rule::Nothing => {}
+            Rule::Within(allowed) if as_zero(entry) <= allowed => self.leave_all_out(place, &mut kept),
+            Rule::Within(allowed) => self.leave_out_within(allowed, place, &mut kept),
+            Rule::Cheap(price) => {
+                let parts = self.steps(place).iter().take_while(|s| s.price <= price).last().map_or(0, |s| s.parts);
+                let levels = levels(entry);
+                levels[..parts].iter().fold(Without::default(), |without, part| {
+                    let more = self.with(without, part, place);
+                    self.leave_out(part, more, place, &mut kept);
+                    more
+                });
             }
-            Some((allowed, measure)) => self.leave_out_levels(allowed, measure, voxels, &mut kept),
-            None => {}
         }
         kept.left_out = left_out(entry, &kept.entry);
         kept
     }
 
-    fn leave_out_levels(&self, allowed: f64, measure: SampleError, voxels: usize, kept: &mut Kept) {
-        let levels: Vec<(usize, PartEntry)> = kept.entry.parts.iter().rev().filter_map(level_of).collect();
+    fn leave_all_out(&self, place: &Place<'_>, kept: &mut Kept) {
+        let as_zero = as_zero(place.entry);
+        (kept.errors[0], kept.certified) = (as_zero, as_zero);
+        let all = levels(place.entry).iter().fold(Without::default(), |w, part| self.with(w, part, place));
+        let exact = place.entry.part(PartKind::Exact).is_some();
+        kept.expected =
+            if exact { finite(as_zero * as_zero * place.seen.of(f64::INFINITY)) } else { kept.expected + all.change };
+        kept.entry.parts.retain(|p| p.kind == PartKind::Missing);
+    }
+
+    fn leave_out_within(&self, allowed: f64, place: &Place<'_>, kept: &mut Kept) {
         let mut without = Without::default();
-        for (level, part) in levels {
-            let more = self.with(without, level, &part);
-            let samples = self.errors(&kept.entry, voxels, more);
-            let error = match measure {
-                SampleError::Certified => samples.certified_sample_error,
-                SampleError::Expected => samples.expected_sample_error,
-            };
-            if error <= allowed {
-                (without, kept.samples) = (more, samples);
-                if self.cumulative {
-                    kept.errors[1..].fill(0.0);
-                }
-                kept.errors[1 + level] = part.stats.largest;
-                kept.entry.parts.retain(|p| p.kind != part.kind);
+        for part in levels(place.entry) {
+            let more = self.with(without, &part, place);
+            if (place.entry.stats.reached + more.largest).next_up() <= allowed {
+                self.leave_out(&part, more, place, kept);
+                without = more;
             } else if self.cumulative {
                 break;
             }
         }
     }
 
-    /// What parts come to with one more.
-    fn with(&self, without: Without, level: usize, part: &PartEntry) -> Without {
-        let before = if self.cumulative { Without::default() } else { without };
-        let largest = (before.largest + part.stats.largest * self.largest_gain[level]).next_up();
-        Without { largest, energy: before.energy + part.stats.energy * self.energy_gain }
+    /// Leaves out a part, with which all that is left out comes to `without`.
+    fn leave_out(&self, part: &LevelPart, without: Without, place: &Place<'_>, kept: &mut Kept) {
+        kept.certified = (place.entry.stats.reached + without.largest).next_up();
+        kept.expected = self.own(place) + without.change;
+        if self.cumulative {
+            kept.errors[1..].fill(0.0);
+        }
+        kept.errors[1 + part.level] = part.entry.stats.largest;
+        kept.entry.parts.retain(|p| p.kind != part.entry.kind);
     }
 
-    /// The errors of a block's samples without some parts. The root of a mean square is at most the sum of those of the
-    /// file's own errors and of what is left out.
-    fn errors(&self, entry: &BlockEntry, voxels: usize, without: Without) -> SampleErrorReport {
-        let missing = entry.part(PartKind::Missing).map_or(0, |part| part.stats.count as usize);
-        let samples = (self.frames * voxels).saturating_sub(missing).max(1) as f64;
-        let rms = |squares: f64| (squares / samples).sqrt();
-        let certified = (entry.stats.reached + without.largest).next_up();
-        let expected = rms(entry.stats.squared_error) + rms(without.energy);
-        SampleErrorReport { certified_sample_error: certified, expected_sample_error: expected.min(certified) }
+    /// What parts come to with one more.
+    fn with(&self, without: Without, part: &LevelPart, place: &Place<'_>) -> Without {
+        let (level, stats) = (part.level, part.entry.stats);
+        let energy = stats.energy * self.energy_gain[level];
+        let largest = stats.largest * self.largest_gain[level];
+        let (largest, energy, more) = if self.cumulative {
+            (largest, energy, (energy - without.energy).max(0.0))
+        } else {
+            (without.largest + largest, without.energy + energy, energy)
+        };
+        let change = finite(without.change + self.in_pixels(more, self.alike[level], place));
+        Without { largest: largest.next_up(), energy, change }
+    }
+
+    /// What the file's own errors come to in the mean square over pixels.
+    fn own(&self, place: &Place<'_>) -> f64 {
+        self.in_pixels(place.entry.stats.squared_error, self.alike[self.alike.len() - 1], place)
+    }
+
+    fn in_pixels(&self, energy: f64, alike: f64, place: &Place<'_>) -> f64 {
+        finite(energy / (self.frames * place.voxels) as f64 * place.seen.of(alike))
+    }
+
+    /// The ways to leave out parts of a block, of which each costs more for a byte than the one before; none of a block
+    /// that is not seen.
+    fn steps(&self, place: &Place<'_>) -> Vec<Step> {
+        let (mut steps, mut at, mut without) = (vec![Step::default()], Step::default(), Without::default());
+        for part in levels(place.entry) {
+            without = self.with(without, &part, place);
+            at = Step {
+                parts: at.parts + 1,
+                bytes: at.bytes + u64::from(part.entry.stored_len),
+                change: without.change,
+                price: 0,
+            };
+            while let [.., before, last] = steps[..]
+                && price(&before, &at) <= last.price
+            {
+                steps.pop();
+            }
+            at.price = price(&steps[steps.len() - 1], &at);
+            steps.push(at);
+        }
+        steps.remove(0);
+        steps.retain(|_| !place.seen.is_nothing());
+        steps
     }
 
     /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
     pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
-        let levels = entry.parts.iter().filter_map(level_of);
-        let each = levels.map(|(level, part)| part.stats.largest * self.largest_gain[level]);
+        let levels = levels(entry).into_iter();
+        let each = levels.map(|part| part.entry.stats.largest * self.largest_gain[part.level]);
         if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() }
     }
 }
 
-/// Multiwavelets are orthonormal as functions, not as samples: 4.03 for three frames, less for more (method.md section 3).
-const MULTI_ENERGY: f64 = 4.1;
+/// What it costs to go from one step to the next.
+fn price(from: &Step, to: &Step) -> Price {
+    let bytes = to.bytes.saturating_sub(from.bytes).max(1) as f64;
+    let each = ((to.change - from.change).max(0.0) / bytes).clamp(f64::MIN_POSITIVE, f64::MAX);
+    (16.0 * libm::log2(each)).floor() as Price
+}
 
-fn level_of(part: &PartEntry) -> Option<(usize, PartEntry)> {
-    if let PartKind::Level(level) = part.kind { Some((level.into(), *part)) } else { None }
+/// No sample of a block is further from zero.
+fn as_zero(entry: &BlockEntry) -> f64 {
+    (magnitude((entry.stats.min, entry.stats.max)) + entry.stats.reached).next_up()
+}
+
+/// Energies may be infinite, and nothing of them may be seen.
+fn finite(change: f64) -> f64 {
+    if change.is_nan() { 0.0 } else { change.min(f64::MAX) }
+}
+
+/// A level part of a block.
+#[derive(Debug, Clone, Copy)]
+struct LevelPart {
+    level: usize,
+    entry: PartEntry,
+}
+
+/// The level parts of a block, finest first.
+fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
+    let of = |entry: &PartEntry| match entry.kind {
+        PartKind::Level(level) => Some(LevelPart { level: level.into(), entry: *entry }),
+        _ => None,
+    };
+    entry.parts.iter().rev().filter_map(of).collect()
 }
 
 /// The difference between a whole entry and what is kept of it.
@@ -138,7 +295,7 @@ fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
     LeftOut {
         blocks: u64::from(kept.parts.is_empty() && !entry.parts.is_empty()),
         parts: parts().count() as u64,
-        coefficients: parts().filter_map(level_of).map(|(_, p)| p.stats.count).sum(),
+        coefficients: parts().filter(|p| matches!(p.kind, PartKind::Level(_))).map(|p| p.stats.count).sum(),
         bytes: parts().map(|p| u64::from(p.stored_len)).sum(),
     }
 }

@@ -4,6 +4,7 @@
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
 use super::RenderConfig;
+use super::expectation::Expectation;
 use super::lattice::{Lattice, Sums};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
@@ -37,7 +38,12 @@ pub trait Scene {
     }
 
     /// Opens some frames of one group, ascending.
-    fn group(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<dyn Group + '_>>;
+    fn group<'a>(
+        &'a mut self,
+        frames: &[usize],
+        config: &RenderConfig,
+        expectation: &'a Expectation<'_>,
+    ) -> Result<Box<dyn Group + 'a>>;
 }
 
 /// Some frames that are rendered together.
@@ -75,25 +81,10 @@ pub struct Contents {
     pub empty: u64,
     /// What a looser tolerance leaves out of all.
     pub left_out: LeftOut,
-    /// The errors of their samples.
-    pub samples: SampleErrorReport,
-}
-
-/// What is known of the errors of samples, in their unit: those of the file, and what is left out of it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct SampleErrorReport {
-    /// No sample is further off.
-    pub certified_sample_error: f64,
-    /// In no block is the root mean square of the errors larger.
-    pub expected_sample_error: f64,
-}
-
-impl SampleErrorReport {
-    /// Of these samples and others.
-    pub fn join(&mut self, other: &Self) {
-        self.certified_sample_error = self.certified_sample_error.max(other.certified_sample_error);
-        self.expected_sample_error = self.expected_sample_error.max(other.expected_sample_error);
-    }
+    /// No sample of them is further off.
+    pub certified: f64,
+    /// What the errors of their samples are expected to come to in the mean square over pixels.
+    pub expected: f64,
 }
 
 /// What a looser tolerance leaves out.

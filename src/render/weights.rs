@@ -17,7 +17,7 @@ const LEAST_PRESENT: f64 = 1e-6;
 /// The sums of weights of all voxels of a view.
 #[derive(Debug)]
 pub(super) struct Weights {
-    width: usize,
+    size: [usize; 2],
     /// With the footprints that values are splatted with, so that the quotient is a mean.
     sums: Vec<f64>,
     /// With uncut footprints, so that the background is the same for every splat method. Empty: the same sums.
@@ -49,12 +49,9 @@ impl PixelWeight {
 }
 
 impl Weights {
-    /// Splats a 1 for every voxel, if the quantity or its certificate needs that.
-    pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Option<Self>> {
+    /// Splats a 1 for every voxel.
+    pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Self> {
         let mean = config.quantity == Quantity::Mean;
-        if !mean && !config.certify {
-            return Ok(None);
-        }
         let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
         let seen_by = |footprint: Footprint| Eye { footprint, lattice: None, ..eye.clone() };
         let sums = sums(eye, budget)?;
@@ -71,13 +68,27 @@ impl Weights {
             certificate::leave_beyond(&whole, &sums, &mut beyond);
         }
         let largest = if uncut.is_empty() { &sums } else { &uncut }.iter().copied().fold(0.0, f64::max);
-        Ok(Some(Self { width: eye.camera.size[0], sums, uncut, beyond, threshold: BACKGROUND * largest }))
+        Ok(Self { size: eye.camera.size, sums, uncut, beyond, threshold: BACKGROUND * largest })
+    }
+
+    /// The sums of the pixels that are not background.
+    pub(super) fn shown(&self) -> impl Iterator<Item = f64> {
+        self.sums.iter().copied().filter(|sum| *sum >= self.threshold)
+    }
+
+    /// The sum at a place of the picture, and that of the nearest pixel up to `reach` pixels beside it; at least what is
+    /// not background.
+    pub(super) fn near(&self, place: [f64; 2], reach: f64) -> Option<f64> {
+        let within = |a: usize| place[a] >= -reach && place[a] < self.size[a] as f64 + reach;
+        let pixel = |a: usize| (place[a].max(0.0) as usize).min(self.size[a] - 1);
+        let seen = within(0) && within(1) && self.threshold > 0.0;
+        seen.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
     }
 
     /// The weights of a tile's pixel, counted row by row.
     pub(super) fn at(&self, tile: &Tile, pixel: usize) -> PixelWeight {
         let (x, y) = (tile.x.start + pixel % tile.x.len(), tile.y.start + pixel / tile.x.len());
-        let at = y * self.width + x;
+        let at = y * self.size[0] + x;
         let sum = self.sums[at];
         let uncut = self.uncut.get(at).copied().unwrap_or(sum);
         PixelWeight { sum, uncut, beyond: self.beyond.get(at).copied().unwrap_or(0.0), threshold: self.threshold }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
-use wavesplat_tools::bench::{self, plan::Sweep, sanity};
+use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity};
 use wavesplat_tools::demo;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
@@ -23,6 +23,7 @@ Examples:
   wavesplat-tools bench --quick -o quick
   wavesplat-tools bench size --peers python3 -o sizes
   wavesplat-tools bench size mine.npy --tolerances 1e-2,1e-3
+  wavesplat-tools bench layers mine.npy -o layers
 
 wavesplat's own instruments: the demo, synthetic archives and the benchmark.";
 
@@ -118,6 +119,24 @@ struct BenchArgs {
 enum OtherBench {
     /// Print file sizes under a hard bound, conversion and decoding times on one core, and the same of other coders
     Size(SizeArgs),
+    /// Print what looser tolerances of pictures leave unread, and the errors: certified, expected, true
+    Layers(LayersArgs),
+}
+
+#[derive(Args)]
+struct LayersArgs {
+    /// Archives (t, z, y, x), each one .npy
+    #[arg(value_name = "INPUT.npy", required = true)]
+    inputs: Vec<PathBuf>,
+    /// The folder of layers.json and layers.md
+    #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
+    output: PathBuf,
+    /// Of pictures, shares of the value range, with commas between them
+    #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-3,3e-3,1e-2,3e-2,1e-1,3e-1", value_parser = parse_tolerance)]
+    tolerances: Vec<f64>,
+    /// The day to write into the results [default: the clock's]
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    date: Option<String>,
 }
 
 #[derive(Args)]
@@ -238,6 +257,19 @@ fn bench_size(args: &SizeArgs) -> Result<()> {
     Err(Error::BoundMissed { path: args.output.clone(), what: format!("THE BOUND IS MISSED\n{}", wrong.join("\n")) })
 }
 
+fn bench_layers(args: &LayersArgs) -> Result<()> {
+    let LayersArgs { inputs, output, tolerances, date } = args;
+    let (inputs, tolerances, output) = (inputs.clone(), tolerances.clone(), output.clone());
+    let config = layers::Config { inputs, tolerances, output, program: this_program()?, date: date.clone() };
+    let (results, table) = layers::run(&config, &mut say)?;
+    wavesplat::cli::print(&table)?;
+    let wrong = layers::complaints(&results);
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    Err(Error::BoundMissed { path: args.output.clone(), what: wrong.join("\n") })
+}
+
 fn bench(args: &BenchArgs) -> Result<()> {
     let program = this_program()?;
     let (output, date) = (args.output.clone(), args.date.clone());
@@ -262,6 +294,7 @@ fn main() -> ExitCode {
         Command::Synth(args) => synth(&args),
         Command::Bench(args) => match &args.other {
             Some(OtherBench::Size(args)) => bench_size(args),
+            Some(OtherBench::Layers(args)) => bench_layers(args),
             None => bench(&args),
         },
         Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),

@@ -14,12 +14,14 @@
 //! machine   where it ran, and when
 //! report    results.json and results.md;  plot, chart: the figures
 //! size      another benchmark: sizes under a hard bound, and times, beside other coders
+//! layers    another: what a looser tolerance of a picture leaves unread, and the errors
 //! ```
 //!
 //! Errors are shares of the archive's value range throughout.
 
 mod chart;
 mod journal;
+pub mod layers;
 mod look;
 mod machine;
 mod measure;

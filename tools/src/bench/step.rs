@@ -1,6 +1,7 @@
 //! One measured stage in a process of its own: its times are undisturbed by what went before, and its peak of memory
 //! is its own.
 
+use super::layers;
 use super::look::Look;
 use super::size::own;
 use super::stages;
@@ -17,6 +18,7 @@ pub(super) enum Step {
     Convert(Convert),
     Render(Render),
     Size(own::Task),
+    Layers(layers::Task),
 }
 
 /// Frames to a coefficient file.
@@ -108,6 +110,7 @@ pub fn run_step(text: &str) -> Result<String> {
         Step::Convert(step) => answer(stages::convert(&step)?),
         Step::Render(step) => answer(stages::render(&step)?),
         Step::Size(task) => answer(own::measure(&task)?),
+        Step::Layers(task) => answer(layers::measure(&task)?),
     }
     .map_err(wrong)
 }

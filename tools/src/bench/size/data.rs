@@ -98,7 +98,7 @@ pub struct Data {
     pub name: String,
     /// The file.
     #[serde(skip)]
-    pub(super) path: PathBuf,
+    pub(in crate::bench) path: PathBuf,
     /// Voxels along x, y, z.
     pub dims: [usize; 3],
     /// Frames.
@@ -113,7 +113,7 @@ pub struct Data {
 
 impl Data {
     /// Of a file; every sample is read.
-    pub(super) fn of(path: PathBuf) -> Result<Self> {
+    pub(in crate::bench) fn of(path: PathBuf) -> Result<Self> {
         let mut source = source::open(std::slice::from_ref(&path), &OpenOptions::default())?;
         let archive = source.archive().clone();
         let (whole, ty, frames) = (archive.grid.whole(), archive.sample, archive.frames.unwrap_or(0));

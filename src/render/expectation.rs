@@ -1,0 +1,118 @@
+//! How far off pixels are expected to be: the energies of blocks' errors by way of the weights of a view. An estimate.
+//!
+//! A pixel is the mean of its voxels by their weights w_i. Where these are off by s_i in the mean square, each by itself,
+//! the pixel is off by sum w_i^2 s_i^2 / W^2, with W = sum w_i; where all err together, by at most sum w_i s_i^2 / W.
+//! Errors of neighbours are alike, as if boxes of so many voxels erred together, so what counts is between the two:
+//!
+//! ```text
+//! s_i^2 w_i / W min(1, F w_i / W)        F = L L^2 (1 + n) / (L^2 + n)
+//! ```
+//!
+//! for boxes of L voxels a side and footprints of n = 4 pi sigma^2 voxels: along the ray L voxels count as one, and
+//! across it those of a box that a footprint holds. In the mean over pixels w_i becomes a = 2 pi sigma^2 w_i pixels, and
+//! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
+//! voxels, and what is missing to be there.
+
+use super::weights::Weights;
+use super::{Eye, Quantity};
+use crate::volume::Region;
+use std::f64::consts::PI;
+
+/// A view that errors are seen in.
+#[derive(Debug, Clone, Copy)]
+pub struct Expectation<'a> {
+    eye: &'a Eye,
+    weights: &'a Weights,
+    quantity: Quantity,
+    /// Pixels that are not background.
+    pixels: f64,
+    /// The mean square over these of what an error of 1 in every sample comes to.
+    unit: f64,
+    /// a / w.
+    area: f64,
+    /// n.
+    footprint: f64,
+}
+
+/// What a block's errors, of a mean square of 1, come to in the mean square over pixels.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// If all err together.
+    together: f64,
+    /// If each errs by itself.
+    apart: f64,
+}
+
+impl Seen {
+    /// If `alike` err as one: F.
+    pub(super) fn of(&self, alike: f64) -> f64 {
+        if alike.is_finite() { (alike * self.apart).min(self.together) } else { self.together }
+    }
+
+    /// Whether no pixel sees them.
+    pub(super) fn is_nothing(&self) -> bool {
+        self.together == 0.0
+    }
+}
+
+impl<'a> Expectation<'a> {
+    pub(super) fn new(eye: &'a Eye, quantity: Quantity, weights: &'a Weights) -> Self {
+        let (mut pixels, mut squares) = (0.0, 0.0);
+        for sum in weights.shown() {
+            pixels += 1.0;
+            squares += sum * sum;
+        }
+        let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
+        let unit = if quantity == Quantity::Mean { 1.0 } else { squares / pixels };
+        let cell: f64 = eye.grid.spacing.iter().product();
+        let (area, sigma) = (eye.footprint.area(), eye.footprint.deviation() / eye.camera.scale);
+        let footprint = 4.0 * PI * sigma * sigma / libm::cbrt(cell * cell);
+        Self { eye, weights, quantity, pixels, unit, area, footprint }
+    }
+
+    /// The mean square over pixels that samples come to which all are off by `error`.
+    pub(super) fn allowed(&self, error: f64) -> f64 {
+        error * error * self.unit
+    }
+
+    /// F of boxes of `side` voxels.
+    pub(super) fn alike(&self, side: f64) -> f64 {
+        let across = (1.0 + self.footprint) / (1.0 + self.footprint / (side * side));
+        side * across
+    }
+
+    /// What the errors of the block at `region` come to.
+    pub(super) fn of_block(&self, region: &Region) -> Seen {
+        let clip = region.intersect(&self.eye.clip);
+        let mut seen = Seen::default();
+        let mut points = 0.0;
+        for voxel in spread(&clip) {
+            let one = self.of_voxel(voxel);
+            points += 1.0;
+            seen.together += one.together;
+            seen.apart += one.apart;
+        }
+        let share = clip.voxels() as f64 / (self.pixels * f64::max(points, 1.0));
+        Seen { together: seen.together * share, apart: seen.apart * share }
+    }
+
+    /// Summed over pixels.
+    fn of_voxel(&self, voxel: [usize; 3]) -> Seen {
+        let [x, y, z] = self.eye.camera.project(self.eye.grid.position(voxel));
+        let Some(sum) = self.weights.near([x, y], self.eye.footprint.reach) else { return Seen::default() };
+        let weight = self.eye.footprint.at_depth(z);
+        let unit = if self.quantity == Quantity::Mean { 1.0 } else { sum * sum };
+        let together = self.area * weight / sum * unit;
+        Seen { together, apart: together * (0.5 * weight / sum) }
+    }
+}
+
+/// Some voxels that stand for all of a region.
+fn spread(region: &Region) -> impl Iterator<Item = [usize; 3]> + use<> {
+    const A_SIDE: usize = 4;
+    let dims = region.dims();
+    let counts = if region.is_empty() { [0; 3] } else { dims.map(|n| n.min(A_SIDE)) };
+    let start = region.start;
+    let at = move |i: [usize; 3]| std::array::from_fn(|a| start[a] + (2 * i[a] + 1) * dims[a] / (2 * counts[a]));
+    Region { start: [0; 3], end: counts }.iter().map(at)
+}

@@ -1,0 +1,238 @@
+//! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
+
+use super::look::{Look, SIGMA};
+use super::machine::{self, Machine};
+use super::size::Data;
+use super::stages::MEMORY;
+use super::step::{Outcome, Step, in_process};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+use wavesplat::convert::{Coding, ConvertConfig, convert};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::footprint::Kernel;
+use wavesplat::mapped::Access;
+use wavesplat::progress::Silent;
+use wavesplat::render::{
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render,
+};
+use wavesplat::source::{self, OpenOptions};
+
+/// The number of the layout of `layers.json`; a change of a key's meaning changes it.
+pub const SCHEMA: u32 = 1;
+/// What files are converted with, as a share of the value range.
+const FINE: f64 = 1e-3;
+/// What splatting may add: little, so that it is not what is compared.
+const SPLAT: f64 = 1e-5;
+/// Pixels a side of a picture.
+const SIZE: usize = 256;
+/// How often every time is taken; the least counts.
+const REPEATS: usize = 3;
+
+/// What to measure, with what, and where results go.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Archives.
+    pub inputs: Vec<PathBuf>,
+    /// Of pictures, as shares of the value range.
+    pub tolerances: Vec<f64>,
+    /// The folder of results.
+    pub output: PathBuf,
+    /// `wavesplat-tools` itself, whose `bench-step` measures.
+    pub program: PathBuf,
+    /// The day to write into the results; by default that of the clock.
+    pub date: Option<String>,
+}
+
+/// All results of a run: `layers.json`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Results {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// The version of the tools.
+    pub version: String,
+    /// Where it ran.
+    pub machine: Machine,
+    /// The day it was written.
+    pub date: String,
+    /// What was measured.
+    pub data: Vec<Data>,
+    /// Every archive at every tolerance by both measures, after the whole file.
+    pub rows: Vec<Row>,
+}
+
+/// Pictures of one archive at one tolerance. Errors are shares of the largest absolute pixel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The name of the archive.
+    pub data: String,
+    /// As a share of the value range, and the measure that it limits; none: the whole file.
+    pub limit: Option<(f64, String)>,
+    /// Share of the file's nonzero codes that were read.
+    pub codes: f64,
+    /// Share of the bytes of blocks that were read.
+    pub bytes: f64,
+    /// Time of the pictures, as a share of that of the whole file's.
+    pub time: f64,
+    /// What no pixel is further off than.
+    pub certified: f64,
+    /// What the root mean square is expected to be.
+    pub expected: f64,
+    /// The largest error.
+    pub largest: f64,
+    /// The root mean square.
+    pub rms: f64,
+}
+
+/// One archive, measured in a process of its own.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Task {
+    name: String,
+    source: PathBuf,
+    dims: [usize; 3],
+    frames: usize,
+    range: (f64, f64),
+    tolerances: Vec<f64>,
+    file: PathBuf,
+}
+
+/// Measures everything and writes `layers.json` and `layers.md`; returns the results and the table. `say` hears what is
+/// going on.
+pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, String)> {
+    fs::create_dir_all(&config.output).map_err(|e| Error::io(&config.output, "creating the folder", e))?;
+    let data = config.inputs.iter().cloned().map(Data::of).collect::<Result<Vec<_>>>()?;
+    let file = config.output.join("layers-work.wspl");
+    let mut rows = Vec::new();
+    for one in &data {
+        say(&format!("measuring {}", one.name));
+        let (tolerances, file) = (config.tolerances.clone(), file.clone());
+        let (name, source, dims, frames, range) = (one.name.clone(), one.path.clone(), one.dims, one.frames, one.range);
+        let task = Task { name, source, dims, frames, range, tolerances, file };
+        let outcome: Outcome<Vec<Row>> = in_process(&config.program, &Step::Layers(task))?;
+        rows.extend(outcome.did);
+    }
+    let date = config.date.clone().unwrap_or_else(machine::today);
+    let version = env!("CARGO_PKG_VERSION").into();
+    let results = Results { schema: SCHEMA, version, machine: Machine::this(), date, data, rows };
+    let text = markdown(&results);
+    let json = config.output.join("layers.json");
+    let numbers = serde_json::to_string_pretty(&results).map_err(|e| super::bad_json(&json, &e))?;
+    for (path, text) in [(json, &numbers), (config.output.join("layers.md"), &text)] {
+        fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
+    }
+    Ok((results, text))
+}
+
+/// Converts and renders in this process.
+pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
+    let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
+    let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
+    let settings = ConvertConfig { range: Some(task.range), ..ConvertConfig::new(Coding::AUTO, 32, FINE, MEMORY) };
+    let mut bytes = Vec::new();
+    convert(open()?.as_mut(), &settings, &task.file, &mut bytes, &Silent)?;
+    fs::write(&task.file, bytes).map_err(|e| Error::io(&task.file, "writing", e))?;
+    let measures = [("certified", Limit::Certified), ("expected", Limit::Expected)];
+    let limits = measures.into_iter().flat_map(|m| task.tolerances.iter().map(move |t| Some((*t, m))));
+    let (mut rows, mut whole) = (Vec::new(), RenderReport::default());
+    for limit in std::iter::once(None).chain(limits) {
+        let file = CoefficientFile::open(&task.file, Access::Map)?;
+        let mut scene = CoefficientScene::new(file, What::Coefficients);
+        let allowed = limit.map(|(tolerance, (_, limit))| (tolerance * (task.range.1 - task.range.0), limit));
+        let (found, report) = pictures(&mut scene, task, SPLAT, allowed)?;
+        if limit.is_none() {
+            whole = report.clone();
+        }
+        let limit = limit.map(|(tolerance, (name, _))| (tolerance, name.into()));
+        rows.push(row(task, limit, (&found, &truth), (&report, &whole)));
+    }
+    fs::remove_file(&task.file).map_err(|e| Error::io(&task.file, "removing", e))?;
+    Ok(rows)
+}
+
+/// All pictures of a view, and the report of the fastest time; the truth is rendered once.
+fn pictures(
+    scene: &mut dyn Scene,
+    task: &Task,
+    splat_error: f64,
+    allowed: Option<(f64, Limit)>,
+) -> Result<(Vec<f32>, RenderReport)> {
+    let config = RenderConfig {
+        view: Look::first(task.dims, SIZE).view(),
+        kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
+        quantity: Quantity::Mean,
+        frames: (0..task.frames).collect(),
+        region: None,
+        splat_error,
+        allowed: allowed.map(|(allowed, _)| allowed),
+        limited: allowed.map(|(_, limit)| limit).unwrap_or_default(),
+        certify: false,
+        memory: MEMORY,
+    };
+    let (mut found, mut best) = (Vec::new(), RenderReport { seconds: f64::INFINITY, ..RenderReport::default() });
+    for _ in 0..if splat_error > 0.0 { REPEATS } else { 1 } {
+        found.clear();
+        let report = render(scene, &config, &Silent, &mut |rendered| {
+            found.extend_from_slice(rendered.picture);
+            Ok(())
+        })?;
+        best = if report.seconds < best.seconds { report } else { best };
+    }
+    Ok((found, best))
+}
+
+fn row(
+    task: &Task,
+    limit: Option<(f64, String)>,
+    (found, truth): (&[f32], &[f32]),
+    (report, whole): (&RenderReport, &RenderReport),
+) -> Row {
+    let shown = || found.iter().zip(truth).filter(|(_, truth)| !truth.is_nan());
+    let brightest = shown().map(|(_, truth)| f64::from(truth.abs())).fold(0.0, f64::max);
+    let off = || shown().map(|(a, b)| f64::from(a - b) / brightest);
+    Row {
+        data: task.name.clone(),
+        limit,
+        codes: report.coefficients as f64 / whole.coefficients as f64,
+        bytes: report.bytes_read as f64 / whole.bytes_read as f64,
+        time: report.seconds / whole.seconds,
+        certified: report.certified_sample_error / brightest,
+        expected: report.expected_error / brightest,
+        largest: off().map(f64::abs).fold(0.0, f64::max),
+        rms: (off().map(|d| d * d).sum::<f64>() / off().count().max(1) as f64).sqrt(),
+    }
+}
+
+const HEAD: &str = "\
+Files keep every sample within 1e-3 of the value range. *Tolerance* is a share of that range, too; all errors are shares
+of the largest absolute pixel, against pictures of the archive by the exact method: *certified* no pixel is further off
+(but for what the splat adds, 1e-5 of the range), *expected* is an estimate of *rms*, which is the true root mean square
+over all pixels and frames. Codes, bytes and time are shares of what the whole file takes.
+";
+
+const TITLES: &str = "\
+| data | tolerance | codes | bytes | time | certified | expected | largest | rms | rms / expected |
+|---|---|--:|--:|--:|--:|--:|--:|--:|--:|
+";
+
+fn markdown(results: &Results) -> String {
+    let Results { machine, version, date, .. } = results;
+    let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
+    let made = format!("wavesplat {version}, {} threads of {cpu}, {}, {date}", machine.cores, machine.system);
+    let mut text = format!("# What a looser tolerance leaves unread\n\n{made}.\n\n{HEAD}\n{TITLES}");
+    for row in &results.rows {
+        let Row { data, limit, codes, bytes, time, certified, expected, largest, rms } = row;
+        let limit = limit.as_ref().map_or("whole file".into(), |(t, name)| format!("{t:e} {name}"));
+        let read = format!("{codes:.3} | {bytes:.3} | {time:.2}");
+        let errors = [certified, expected, largest, rms].map(|e| format!("{e:.1e}")).join(" | ");
+        let _ = writeln!(text, "| {data} | {limit} | {read} | {errors} | {:.2} |", rms / expected);
+    }
+    text
+}
+
+/// A sentence for every row that is further off than certified and what the splat adds.
+pub fn complaints(results: &Results) -> Vec<String> {
+    let missed = results.rows.iter().filter(|r| r.largest > r.certified * (1.0 + SPLAT / FINE) + 1e-6);
+    missed.map(|r| format!("{}, {:?}: {:e} of {:e}", r.data, r.limit, r.largest, r.certified)).collect()
+}
