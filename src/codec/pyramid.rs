@@ -6,6 +6,7 @@
 
 use super::real::Real;
 use super::rows::{self, Change};
+use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
@@ -63,12 +64,21 @@ impl<'a> Passes<'a> {
 
     /// What leaving out each level part and all finer ones changes in a decoded field; `rest` is scratch.
     pub(crate) fn changes<R: Real>(&self, field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
-        let mut of_part = |part| {
-            rest.clear();
-            rest.extend_from_slice(field);
-            self.leave_out(part, rest)
-        };
-        (0..Pyramid::PARTS).map(&mut of_part).collect()
+        (0..Pyramid::PARTS).map(|part| self.change(part, field, rest)).collect()
+    }
+
+    /// As [`Self::changes`], for parts with a code that is not zero alone: the directory says nothing of the others.
+    pub(crate) fn changes_of_coded<R: Real>(&self, codes: &[i32], field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
+        let ranges = crate::wavelet::ranges(&self.part_lengths());
+        let coded = |range: Range<usize>| codes[range].iter().any(|code| *code != 0);
+        let mut change = |(part, range)| if coded(range) { self.change(part, field, rest) } else { Change::default() };
+        (0..).zip(ranges).map(&mut change).collect()
+    }
+
+    fn change<R: Real>(&self, part: u8, field: &[R], rest: &mut Vec<R>) -> Change {
+        rest.clear();
+        rest.extend_from_slice(field);
+        self.leave_out(part, rest)
     }
 
     /// What leaving out a level part and all finer ones changes in a decoded field. Overwrites `field` by what is left.

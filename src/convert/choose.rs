@@ -4,14 +4,14 @@ use super::ConvertConfig;
 use super::learn::learned_functions;
 use crate::bound::{Measure, Promise};
 use crate::codec::WindowCodec;
-use crate::codec::encode::Encoder;
+use crate::codec::real::Real;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
+use crate::codec::trial::{Scratch, Trial};
 use crate::error::{Error, Result};
 use crate::source::{Archive, FrameWindow, read_frames};
 use crate::volume::Region;
 use crate::wavelet::Basis;
 use rayon::prelude::*;
-use wavesplat_format::BlockId;
 
 /// What of a scheme is fixed; the rest is chosen for each window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +62,12 @@ struct Sampled {
     samples: Vec<u8>,
 }
 
+/// A transform along time, and the boxes as it leaves them.
+struct Transformed<'a, R> {
+    basis: Basis,
+    boxes: Vec<Trial<'a, R>>,
+}
+
 impl Chooser<'_> {
     /// The scheme that codes some boxes of the window in the fewest bytes. The same for any number of threads.
     pub(super) fn choose(&self) -> Result<Scheme> {
@@ -73,36 +79,85 @@ impl Chooser<'_> {
         if self.promise.delta <= 0.0 {
             return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
         }
+        let families = self.families()?;
+        match &families[..] {
+            [alone] if alone.pyramid.is_none() => Ok(alone.clone()),
+            _ if self.single() => self.smallest::<f32>(families),
+            _ => self.smallest::<f64>(families),
+        }
+    }
+
+    /// The smallest of some families and their variants, all of which have a pyramid.
+    fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
         let boxes = self.boxes()?;
-        let families = self.tried(self.families()?, &boxes)?;
+        let boxes = self.transformed::<R>(&families, &boxes);
+        let families = self.tried(families, &boxes);
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
         let promising = families.into_par_iter().filter(|f| f.0 <= least * PROMISING);
-        let tuned: Result<Vec<_>> = promising.map(|f| self.coarsest(f, &boxes)).collect();
+        let tuned: Vec<_> = promising.map(|f| self.coarsest(f, &boxes)).collect();
         let mut best =
-            tuned?.into_iter().reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
-        for variants in [Self::stencils, Self::growths] {
-            best = self.tried(variants(self, &best.1), &boxes)?.into_iter().fold(best, fewer);
+            tuned.into_iter().reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
+        for variants in [Self::orders, Self::stencils, Self::growths] {
+            best = self.tried(variants(self, &best.1), &boxes).into_iter().fold(best, fewer);
         }
         Ok(best.1)
     }
 
+    /// The boxes under each of the transforms along time of some schemes.
+    fn transformed<'a, R: Real + Send + Sync>(
+        &self,
+        schemes: &[Scheme],
+        boxes: &'a [Sampled],
+    ) -> Vec<Transformed<'a, R>> {
+        let mut found: Vec<Transformed<'a, R>> = Vec::new();
+        for scheme in schemes {
+            if found.iter().all(|f| f.basis != scheme.basis) {
+                let codec = self.codec(scheme);
+                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, &b.samples);
+                found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
+            }
+        }
+        found
+    }
+
     /// Schemes, and about how many bytes the window takes with each.
-    fn tried(&self, schemes: Vec<Scheme>, boxes: &[Sampled]) -> Result<Vec<(f64, Scheme)>> {
-        schemes.into_par_iter().map(|scheme| Ok((self.bytes(&scheme, boxes)?, scheme))).collect()
+    fn tried<R: Real + Send + Sync>(&self, schemes: Vec<Scheme>, boxes: &[Transformed<'_, R>]) -> Vec<(f64, Scheme)> {
+        schemes.into_par_iter().map(|scheme| (self.bytes(&scheme, boxes), scheme)).collect()
     }
 
     /// A scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
-    fn coarsest(&self, mut best: (f64, Scheme), boxes: &[Sampled]) -> Result<(f64, Scheme)> {
-        let fixed = best.1.pyramid.is_none() || best.1.coarseness == 1.0;
-        for factor in FACTORS.into_iter().filter(|_| !fixed) {
-            let coarser = Scheme { coarseness: best.1.coarseness * factor, ..best.1.clone() };
-            let bytes = self.bytes(&coarser, boxes)?;
-            if bytes >= best.0 && factor > 1.0 {
-                break;
-            }
-            best = fewer(best, (bytes, coarser));
+    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), boxes: &[Transformed<'_, R>]) -> (f64, Scheme) {
+        if first.1.coarseness == 1.0 {
+            return first;
         }
-        Ok(best)
+        let coarser = self.while_smaller(&first, COARSER, boxes);
+        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, boxes) }
+    }
+
+    fn while_smaller<R: Real + Send + Sync>(
+        &self,
+        first: &(f64, Scheme),
+        factor: f64,
+        boxes: &[Transformed<'_, R>],
+    ) -> (f64, Scheme) {
+        let mut best = first.clone();
+        loop {
+            let next = self.with_step(&best.1, factor, boxes);
+            if next.0 >= best.0 {
+                return best;
+            }
+            best = next;
+        }
+    }
+
+    fn with_step<R: Real + Send + Sync>(
+        &self,
+        scheme: &Scheme,
+        factor: f64,
+        boxes: &[Transformed<'_, R>],
+    ) -> (f64, Scheme) {
+        let scheme = Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() };
+        (self.bytes(&scheme, boxes), scheme)
     }
 
     /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes.
@@ -140,15 +195,12 @@ impl Chooser<'_> {
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(2.0) });
+            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(4.0) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
             let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
-            let of_order = |order: [Axis; 4]| {
-                let pyramid = Some(self.pyramid(&order, stencil));
-                Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) }
-            };
-            found.extend(ORDERS.map(of_order));
+            let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
+            found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
         }
         Ok(found)
     }
@@ -164,9 +216,14 @@ impl Chooser<'_> {
     }
 
     fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
+        let (growth, most) = GROWTHS[0];
+        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single() }
+    }
+
+    /// Whether 32-bit floats are precise enough.
+    fn single(&self) -> bool {
         let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
-        let single = normal && self.promise.delta >= self.magnitude * SINGLE;
-        Pyramid { order: order.to_vec(), stencil, growth: GROWTHS[0].0, most: GROWTHS[0].1, single }
+        normal && self.promise.delta >= self.magnitude * SINGLE
     }
 
     /// Steps under a bound of means are chosen for dropping coefficients, too ([`Promise::step`]).
@@ -175,6 +232,11 @@ impl Chooser<'_> {
             Measure::Largest => coarseness,
             Measure::RootMeanSquare => 1.4 * coarseness,
         }
+    }
+
+    fn orders(&self, best: &Scheme) -> Vec<Scheme> {
+        let others = if best.basis == Basis::Samples { &ORDERS[1..] } else { &[] };
+        variants(best, |p| others.iter().map(|order| Pyramid { order: order.to_vec(), ..p.clone() }).collect())
     }
 
     fn stencils(&self, best: &Scheme) -> Vec<Scheme> {
@@ -190,20 +252,32 @@ impl Chooser<'_> {
     }
 
     /// About how many bytes the window takes.
-    fn bytes(&self, scheme: &Scheme, boxes: &[Sampled]) -> Result<f64> {
+    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, boxes: &[Transformed<'_, R>]) -> f64 {
+        let codec = self.codec(scheme);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, boxes.iter().find(|b| b.basis == scheme.basis)) else {
+            return f64::INFINITY;
+        };
+        let tried =
+            of_basis.boxes.par_iter().map_init(Scratch::default, |s, b| (b.bytes(&codec, pyramid, s), b.voxels()));
+        let (bytes, voxels) = tried.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let whole: usize = self.archive.grid.dims.iter().product();
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "{:10.0} {} {:?} {:?}",
+                bytes as f64 * whole as f64 / voxels as f64,
+                scheme.name(),
+                scheme.coarseness,
+                pyramid.growth
+            );
+        }
+        bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
+    }
+
+    fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.window.frames();
         let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGE);
         codec.missing_value = self.config.missing_value;
-        let mut encoder = Encoder::for_trials(self.config.level).map_err(super::bug)?;
-        let (mut bytes, mut voxels) = (0, 0);
-        for Sampled { size, samples } in boxes {
-            let id = BlockId { window: 0, block: 0, channel: 0 };
-            let encoded = encoder.block(&codec, id, *size, samples).map_err(super::bug)?;
-            bytes += encoded.block.parts.iter().map(|p| p.stored.len()).sum::<usize>();
-            voxels += size.iter().product::<usize>();
-        }
-        let whole: usize = self.archive.grid.dims.iter().product();
-        Ok(bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64)
+        codec
     }
 }
 
@@ -247,8 +321,8 @@ const ORDERS: [[Axis; 4]; 3] =
 /// How steps of coarser levels shrink, and by how much at most; the first is taken to begin with.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
 
-/// Factors of the step that are tried one after another, until a coarser one does not pay.
-const FACTORS: [f64; 5] = [0.7, 1.4, 1.4, 1.4, 1.4];
+/// Steps grow, or shrink, by this as long as it pays.
+const COARSER: f64 = 1.4;
 
 /// The least bound, in units of the largest sample, for 32-bit floats: their rounding takes next to nothing of it.
 const SINGLE: f64 = 1.0 / (1 << 15) as f64;

@@ -2,13 +2,13 @@
 
 use super::choose::Chooser;
 use super::sampled::{self, Pixel};
-use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
+use super::{ConvertConfig, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
 use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
-use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
+use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 use crate::volume::Grid;
 use crossbeam::channel::Sender;
 use std::sync::Arc;
@@ -28,6 +28,7 @@ pub(super) fn read(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
     plan: &Plan,
+    idle: &Idle<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
     let archive = source.archive().clone();
@@ -35,7 +36,7 @@ pub(super) fn read(
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
     };
-    let mut reader = WindowReader { config, plan, archive, pixels, range: None, id: None };
+    let mut reader = WindowReader { config, plan, idle, archive, pixels, range: None, id: None };
     let mut busy = Duration::ZERO;
     for index in 0.. {
         let started = Instant::now();
@@ -64,6 +65,8 @@ pub(super) fn read(
 struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan,
+    /// Room for the samples of blocks.
+    idle: &'a Idle<Vec<u8>>,
     archive: Archive,
     /// Where a sampled bound looks.
     pixels: Vec<Pixel>,
@@ -146,7 +149,8 @@ impl WindowReader<'_> {
     /// The samples of one block, frame by frame.
     fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let region = self.plan.blocks.region(block);
-        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
+        let mut samples = self.idle.take().unwrap_or_default();
+        read_frames_into(window, 0..window.frames(), &region, self.archive.sample, &mut samples)?;
         Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
     }
 }
