@@ -76,6 +76,9 @@ impl<'a> Passes<'a> {
     }
 
     fn change<R: Real>(&self, part: u8, field: &[R], rest: &mut Vec<R>) -> Change {
+        if part == 0 {
+            return change_to_zero(field);
+        }
         rest.clear();
         rest.extend_from_slice(field);
         self.leave_out(part, rest)
@@ -159,6 +162,14 @@ impl<'a> Passes<'a> {
             i += run;
         }
     }
+}
+
+/// What leaving out everything changes: all is then predicted to be zero.
+fn change_to_zero<R: Real>(field: &[R]) -> Change {
+    const RUN: usize = 4096;
+    let (mut change, zeros) = (Change::default(), [R::default(); RUN]);
+    field.chunks(RUN).for_each(|nodes| rows::add_changes(&mut change, nodes, &zeros[..nodes.len()]));
+    change
 }
 
 /// The shape in which the rows of a pass are longest: all nodes of a plane, where it adds or keeps all of them.

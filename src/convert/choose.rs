@@ -1,7 +1,7 @@
 //! Which scheme a window is coded with: the one that makes some of its boxes smallest.
 
-use super::ConvertConfig;
 use super::learn::learned_functions;
+use super::{ConvertConfig, Idle};
 use crate::bound::{Measure, Promise};
 use crate::codec::WindowCodec;
 use crate::codec::real::Real;
@@ -54,6 +54,8 @@ pub(super) struct Chooser<'a> {
     pub(super) promise: Promise,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
+    /// What the window before was coded with, if the choice may begin there.
+    pub(super) before: Option<&'a Scheme>,
 }
 
 /// A box of samples, frame by frame.
@@ -66,6 +68,12 @@ struct Sampled {
 struct Transformed<'a, R> {
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
+}
+
+/// What schemes are tried on, and with.
+struct Trials<'a, R> {
+    boxes: Vec<Transformed<'a, R>>,
+    idle: Idle<Scratch<R>>,
 }
 
 impl Chooser<'_> {
@@ -90,15 +98,21 @@ impl Chooser<'_> {
     /// The smallest of some families and their variants, all of which have a pyramid.
     fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
         let boxes = self.boxes()?;
-        let boxes = self.transformed::<R>(&families, &boxes);
-        let families = self.tried(families, &boxes);
+        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Idle::default() };
+        let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
-        let promising = families.into_par_iter().filter(|f| f.0 <= least * PROMISING);
-        let tuned: Vec<_> = promising.map(|f| self.coarsest(f, &boxes)).collect();
-        let mut best =
-            tuned.into_iter().reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
+        let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
+        if let Some(before) = self.before {
+            let best = promising.clone().reduce(fewer);
+            if let Some((_, scheme)) = best.filter(|best| best.1.basis == before.basis) {
+                return Ok(scheme);
+            }
+        }
+        let tuned = promising.map(|f| self.coarsest(f, &trials));
+        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
         for variants in [Self::orders, Self::stencils, Self::growths] {
-            best = self.tried(variants(self, &best.1), &boxes).into_iter().fold(best, fewer);
+            let mut others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
+            best = others.find(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
         Ok(best.1)
     }
@@ -120,29 +134,24 @@ impl Chooser<'_> {
         found
     }
 
-    /// Schemes, and about how many bytes the window takes with each.
-    fn tried<R: Real + Send + Sync>(&self, schemes: Vec<Scheme>, boxes: &[Transformed<'_, R>]) -> Vec<(f64, Scheme)> {
-        schemes.into_par_iter().map(|scheme| (self.bytes(&scheme, boxes), scheme)).collect()
-    }
-
     /// A scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
-    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), boxes: &[Transformed<'_, R>]) -> (f64, Scheme) {
+    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &Trials<'_, R>) -> (f64, Scheme) {
         if first.1.coarseness == 1.0 {
             return first;
         }
-        let coarser = self.while_smaller(&first, COARSER, boxes);
-        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, boxes) }
+        let coarser = self.while_smaller(&first, COARSER, trials);
+        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, trials) }
     }
 
     fn while_smaller<R: Real + Send + Sync>(
         &self,
         first: &(f64, Scheme),
         factor: f64,
-        boxes: &[Transformed<'_, R>],
+        trials: &Trials<'_, R>,
     ) -> (f64, Scheme) {
         let mut best = first.clone();
         loop {
-            let next = self.with_step(&best.1, factor, boxes);
+            let next = self.with_step(&best.1, factor, trials);
             if next.0 >= best.0 {
                 return best;
             }
@@ -150,23 +159,27 @@ impl Chooser<'_> {
         }
     }
 
-    fn with_step<R: Real + Send + Sync>(
-        &self,
-        scheme: &Scheme,
-        factor: f64,
-        boxes: &[Transformed<'_, R>],
-    ) -> (f64, Scheme) {
-        let scheme = Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() };
-        (self.bytes(&scheme, boxes), scheme)
+    fn with_step<R: Real + Send + Sync>(&self, scheme: &Scheme, factor: f64, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        self.tried(Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() }, trials)
+    }
+
+    /// A scheme, and about how many bytes the window takes with it.
+    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        (self.bytes(&scheme, trials), scheme)
     }
 
     /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
         let whole: usize = dims.iter().product();
-        let edge = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
+        let edge = if whole >= LARGE {
+            EDGE
+        } else {
+            std::env::var("EDGE").map(|v| v.parse().unwrap()).unwrap_or(EDGE / 3 * 2)
+        };
         let size = dims.map(|n| n.min(edge));
-        let count = (whole / SHARE / size.iter().product::<usize>()).clamp(LEAST_BOXES, MOST_BOXES);
+        let count = (whole / SHARE / size.iter().product::<usize>())
+            .clamp(std::env::var("BOXES").map(|v| v.parse().unwrap()).unwrap_or(LEAST_BOXES), MOST_BOXES);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
@@ -195,12 +208,24 @@ impl Chooser<'_> {
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(4.0) });
+            found.push(Scheme {
+                basis,
+                functions,
+                pyramid,
+                coarseness: self.coarseness(std::env::var("C0").map(|v| v.parse().unwrap()).unwrap_or(4.0)),
+            });
         }
         if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
             let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
             let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
             found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
+        }
+        if let Some(before) = self.before {
+            let begin = |scheme: &mut Scheme| {
+                scheme.pyramid = before.pyramid.as_ref().map(|p| Pyramid { single: self.single(), ..p.clone() });
+                scheme.coarseness = before.coarseness;
+            };
+            found.iter_mut().filter(|scheme| scheme.basis == before.basis).for_each(begin);
         }
         Ok(found)
     }
@@ -252,14 +277,17 @@ impl Chooser<'_> {
     }
 
     /// About how many bytes the window takes.
-    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, boxes: &[Transformed<'_, R>]) -> f64 {
+    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
         let codec = self.codec(scheme);
-        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, boxes.iter().find(|b| b.basis == scheme.basis)) else {
-            return f64::INFINITY;
+        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
+        let bytes = |b: &Trial<'_, R>| {
+            let mut scratch = trials.idle.take().unwrap_or_default();
+            let bytes = b.bytes(&codec, pyramid, &mut scratch);
+            trials.idle.put(scratch);
+            (bytes, b.voxels())
         };
-        let tried =
-            of_basis.boxes.par_iter().map_init(Scratch::default, |s, b| (b.bytes(&codec, pyramid, s), b.voxels()));
-        let (bytes, voxels) = tried.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let whole: usize = self.archive.grid.dims.iter().product();
         if std::env::var("DBG").is_ok() {
             eprintln!(
@@ -310,6 +338,9 @@ const LEARNING: usize = 1000;
 
 /// A scheme is worth tuning that is at most so many times as large as the smallest before.
 const PROMISING: f64 = 1.3;
+
+/// A variant must make boxes smaller by this to be taken: less says little about blocks, which are larger.
+const CLEARLY: f64 = 0.99;
 
 /// Fractions whose multiples spread evenly: powers of the inverse of the root of x^4 = x + 1.
 const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];

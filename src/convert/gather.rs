@@ -5,6 +5,7 @@ use super::sampled::{self, Pixel};
 use super::{ConvertConfig, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
+use crate::codec::scheme::Scheme;
 use crate::error::{Error, Result};
 use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
@@ -36,7 +37,7 @@ pub(super) fn read(
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
     };
-    let mut reader = WindowReader { config, plan, idle, archive, pixels, range: None, id: None };
+    let mut reader = WindowReader { config, plan, idle, archive, pixels, range: None, id: None, scheme: None };
     let mut busy = Duration::ZERO;
     for index in 0.. {
         let started = Instant::now();
@@ -73,6 +74,8 @@ struct WindowReader<'a> {
     /// Range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
+    /// Of the window before.
+    scheme: Option<Scheme>,
 }
 
 impl WindowReader<'_> {
@@ -86,7 +89,9 @@ impl WindowReader<'_> {
         let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(seen.range);
-        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude }.choose()?;
+        let before = self.scheme.as_ref().filter(|_| index % ANEW != 0);
+        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, before }.choose()?;
+        self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
@@ -154,6 +159,9 @@ impl WindowReader<'_> {
         Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
     }
 }
+
+/// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
+const ANEW: usize = 8;
 
 /// A name for the file that follows from settings and data: the same conversion has the same one everywhere.
 fn file_id(config: &ConvertConfig, archive: &Archive, plan: &Plan, digest: u64) -> FileId {
