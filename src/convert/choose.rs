@@ -172,14 +172,9 @@ impl Chooser<'_> {
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
         let whole: usize = dims.iter().product();
-        let edge = if whole >= LARGE {
-            EDGE
-        } else {
-            std::env::var("EDGE").map(|v| v.parse().unwrap()).unwrap_or(EDGE / 3 * 2)
-        };
+        let edge = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
         let size = dims.map(|n| n.min(edge));
-        let count = (whole / SHARE / size.iter().product::<usize>())
-            .clamp(std::env::var("BOXES").map(|v| v.parse().unwrap()).unwrap_or(LEAST_BOXES), MOST_BOXES);
+        let count = (whole / SHARE / size.iter().product::<usize>()).clamp(LEAST_BOXES, MOST_BOXES);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
@@ -208,12 +203,7 @@ impl Chooser<'_> {
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme {
-                basis,
-                functions,
-                pyramid,
-                coarseness: self.coarseness(std::env::var("C0").map(|v| v.parse().unwrap()).unwrap_or(4.0)),
-            });
+            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
             let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
@@ -289,15 +279,6 @@ impl Chooser<'_> {
         };
         let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let whole: usize = self.archive.grid.dims.iter().product();
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "{:10.0} {} {:?} {:?}",
-                bytes as f64 * whole as f64 / voxels as f64,
-                scheme.name(),
-                scheme.coarseness,
-                pyramid.growth
-            );
-        }
         bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
     }
 
@@ -326,7 +307,7 @@ const EDGE: usize = 30;
 const SHARE: usize = 50;
 
 /// Boxes that are tried.
-const LEAST_BOXES: usize = 3;
+const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
 /// Voxels of a volume that is not small: a few boxes are then a small part of it.
@@ -351,6 +332,9 @@ const ORDERS: [[Axis; 4]; 3] =
 
 /// How steps of coarser levels shrink, and by how much at most; the first is taken to begin with.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
+
+/// The step of learned functions that is tried first, in units of the one for which rounding alone keeps the promise.
+const COARSE: f64 = 3.92;
 
 /// Steps grow, or shrink, by this as long as it pays.
 const COARSER: f64 = 1.4;

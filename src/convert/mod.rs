@@ -228,7 +228,7 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let field = if config.coding.space == Space::Alone { 0 } else { 2 * codes };
     let scratch = samples + 2 * codes + field + raw + ZSTD_SCRATCH;
     let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + memory::FIXED;
-    let enough = (BATCH * rayon::current_num_threads()).min(memory::MOST_BLOCKS);
+    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
     let fits = (1..=enough).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(config.reserved).max(1) as f64;
@@ -237,9 +237,6 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
         Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))
     })
 }
-
-/// Blocks of a batch for each worker: few, for memory that was just used is near.
-const BATCH: usize = 4;
 
 /// Coefficients of a voxel in a whole window.
 fn most_coefficients(config: &ConvertConfig) -> usize {
