@@ -88,10 +88,7 @@ impl<'a> Passes<'a> {
     fn leave_out<R: Real>(&self, part: u8, field: &mut [R]) -> Change {
         let mut change = Change::default();
         for pass in self.passes.iter().filter(|pass| pass.part >= part) {
-            self.for_each_row(pass, field, |nodes, predicted| {
-                rows::add_changes(&mut change, nodes, predicted);
-                nodes.copy_from_slice(predicted);
-            });
+            self.for_each_row(pass, field, |nodes, predicted| rows::replace(&mut change, nodes, predicted));
         }
         change
     }

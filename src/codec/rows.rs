@@ -82,6 +82,21 @@ impl Change {
     }
 }
 
+/// Adds the changes from `nodes` to `others`, which take their place.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn replace<R: Real>(change: &mut Change, nodes: &mut [R], others: &[R]) {
+    let (nodes, last_nodes) = nodes.as_chunks_mut::<LANES>();
+    let (others, last_others) = others.as_chunks::<LANES>();
+    for (a, b) in nodes.iter_mut().zip(others) {
+        (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
+        *a = *b;
+    }
+    last_nodes.iter_mut().zip(last_others).enumerate().for_each(|(l, (a, b))| {
+        change.add(l, *a, *b);
+        *a = *b;
+    });
+}
+
 /// Adds the changes from `nodes` to `others`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
