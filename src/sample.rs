@@ -146,8 +146,7 @@ impl<const N: usize> Range<N> {
 
     #[inline(always)]
     fn add(&mut self, values: &[f64; N], declared: f64) {
-        for i in 0..N {
-            let v = values[i];
+        for (i, &v) in values.iter().enumerate() {
             self.lo[i] = if v < self.lo[i] { v } else { self.lo[i] };
             self.hi[i] = if v > self.hi[i] { v } else { self.hi[i] };
             self.missing[i] = if (v.abs() < f64::INFINITY) & (v != declared) { self.missing[i] } else { f64::NAN };

@@ -71,3 +71,46 @@ impl<'a, R: Real> Trial<'a, R> {
 
 /// Bytes of the place of an outlier, and what packing its sample saves: about as many.
 const GAP: usize = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bound::{Bound, Promise};
+    use crate::codec::encode::Encoder;
+    use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
+    use crate::sample::{self, SampleType};
+    use wavesplat_format::BlockId;
+
+    const SIZE: [usize; 3] = [20, 18, 16];
+    const FRAMES: usize = 16;
+
+    /// Waves, and a little noise.
+    fn samples() -> Vec<u8> {
+        let noise = |i: usize| f64::from((i as u32).wrapping_mul(0x9E37_79B1) >> 16) / 65536.0 - 0.5;
+        let voxels: usize = SIZE.iter().product();
+        let value = |i: usize| ((i % 20) as f64 / 5.0 + (i / voxels) as f64 / 9.0).sin() + 0.05 * noise(i);
+        let values: Vec<f64> = (0..voxels * FRAMES).map(value).collect();
+        let mut bytes = vec![0; 4 * values.len()];
+        sample::store(SampleType::F32, &values, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn estimates_are_close_to_what_is_stored() {
+        let (samples, xyz) = (samples(), [Axis::X, Axis::Y, Axis::Z]);
+        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        for (basis, coarseness, order) in [(Basis::Haar, 3.0, &xyz[..]), (Basis::Samples, 1.0, &xyz[..])] {
+            let (order, stencil) = (order.to_vec(), Stencil::Cubic);
+            let pyramid = Pyramid { order, stencil, growth: 1.5, most: 3.0, single: true };
+            let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
+            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, promise, 32);
+            let mut encoder = Encoder::new(3).expect("a usual level");
+            let id = BlockId { window: 0, block: 0, channel: 0 };
+            let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
+            let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
+            let trial = Trial::<f32>::new(&codec, SIZE, &samples);
+            let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
+            assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
+        }
+    }
+}

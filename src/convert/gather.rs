@@ -89,7 +89,7 @@ impl WindowReader<'_> {
         let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(seen.range);
-        let before = self.scheme.as_ref().filter(|scheme| index % ANEW != 0 && scheme.pyramid.is_some());
+        let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
         let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, before }.choose()?;
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
