@@ -126,7 +126,7 @@ impl Source<'_> {
                 tally.add_series(self.codec, &Compared { source, decoded }, last_source.len(), present, place(first));
             }
         });
-        self.few(&tally).then_some(tally)
+        self.few(tally.places.len()).then_some(tally)
     }
 
     /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
@@ -159,23 +159,24 @@ impl Source<'_> {
         codec.basis.inverse(&mut group.coefficients, &mut group.decoded);
     }
 
-    /// About how many samples miss the bound: a few of the series are looked at.
-    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> usize {
+    /// About how many samples miss the bound: a few of the series are looked at. None if too many do.
+    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> Option<usize> {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
-            return 0;
+            return Some(0);
         }
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
             self.decode_group(weighing, field, (first, count), &mut group);
             self.add(&group, (first, count), &mut tally);
         }
-        tally.places.len() * LOOKED_AT
+        let outliers = tally.places.len() * LOOKED_AT;
+        self.few(outliers).then_some(outliers)
     }
 
     /// Compares a group's decoded series with the source. None if too many samples miss the bound by now.
     pub(super) fn check(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) -> Option<()> {
         self.add(group, (first, count), tally);
-        self.few(tally).then_some(())
+        self.few(tally.places.len()).then_some(())
     }
 
     fn add(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) {
@@ -190,8 +191,8 @@ impl Source<'_> {
     }
 
     /// Whether so few samples miss the bound that storing them is cheaper than storing all.
-    fn few(&self, tally: &Tally) -> bool {
-        tally.places.len() <= self.missing.mask.len() / MOST_OUTLIERS
+    fn few(&self, outliers: usize) -> bool {
+        outliers <= self.missing.mask.len() / MOST_OUTLIERS
     }
 }
 
