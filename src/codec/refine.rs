@@ -159,18 +159,17 @@ impl Source<'_> {
         codec.basis.inverse(&mut group.coefficients, &mut group.decoded);
     }
 
-    /// About how many samples miss the bound: a few of the series are looked at. None if too many do.
-    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> Option<usize> {
+    /// About how many samples miss the bound: a few of the series are looked at.
+    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> usize {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
-            return Some(0);
+            return 0;
         }
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
             self.decode_group(weighing, field, (first, count), &mut group);
             self.add(&group, (first, count), &mut tally);
         }
-        let outliers = tally.places.len() * LOOKED_AT;
-        self.few(outliers).then_some(outliers)
+        tally.places.len() * LOOKED_AT
     }
 
     /// Compares a group's decoded series with the source. None if too many samples miss the bound by now.
@@ -191,7 +190,7 @@ impl Source<'_> {
     }
 
     /// Whether so few samples miss the bound that storing them is cheaper than storing all.
-    fn few(&self, outliers: usize) -> bool {
+    pub(super) fn few(&self, outliers: usize) -> bool {
         outliers <= self.missing.mask.len() / MOST_OUTLIERS
     }
 }

@@ -43,7 +43,7 @@ impl<'a, R: Real> Trial<'a, R> {
 
     /// About how many bytes the box takes; those of missing samples, which are always the same, are left out.
     pub(crate) fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
-        self.coded(codec, pyramid, scratch).map_or(self.samples.len(), |bytes| bytes.min(self.samples.len()))
+        self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
     }
 
     /// None if the box must be stored exactly.
@@ -62,10 +62,12 @@ impl<'a, R: Real> Trial<'a, R> {
         if !passes.encode(step, field, codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field)?;
+        let outliers = source.estimate_outliers(weighing, field);
         let parts = (0..).zip(codec.part_ranges(self.size));
         let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
-        Some(packed + outliers * (GAP + codec.sample.size()))
+        // Where there are too many, all is stored exactly; the fewer, the nearer is a step that does.
+        let rest = if source.few(outliers) { packed } else { self.samples.len() };
+        Some(rest + outliers * (GAP + codec.sample.size()))
     }
 }
 
