@@ -25,13 +25,32 @@ macro_rules! for_type {
 
 /// Fills `out` with the numbers whose little-endian bytes are `bytes` (`out.len() * ty.size()` of them).
 pub fn load(ty: SampleType, bytes: &[u8], out: &mut [f64]) {
+    load_as(ty, bytes, out, |v| v);
+}
+
+/// As [`load`], each number made another by `of`.
+pub fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) -> T) {
     assert_eq!(bytes.len(), out.len() * ty.size(), "bytes of {} samples", out.len());
     macro_rules! run {
         ($t:ty, $bytes:expr, $out:expr) => {
             for (o, b) in $out.iter_mut().zip($bytes.as_chunks::<{ size_of::<$t>() }>().0) {
-                *o = f64::from(<$t>::from_le_bytes(*b));
+                *o = of(f64::from(<$t>::from_le_bytes(*b)));
             }
         };
+    }
+    for_type!(ty, run, bytes, out);
+}
+
+/// Fills each of `out` with `N` neighbouring samples, those of the next one `stride` samples further on.
+pub fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride: usize, out: &mut [[f64; N]]) {
+    macro_rules! run {
+        ($t:ty, $bytes:expr, $out:expr) => {{
+            let samples = $bytes.as_chunks::<{ size_of::<$t>() }>().0;
+            for (i, lane) in $out.iter_mut().enumerate() {
+                let samples: &[_; N] = samples[i * stride..].first_chunk().expect("samples of every row");
+                *lane = samples.map(|b| f64::from(<$t>::from_le_bytes(b)));
+            }
+        }};
     }
     for_type!(ty, run, bytes, out);
 }
@@ -106,15 +125,46 @@ pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
 }
 
 /// The range of some values; none if any of them is missing. For runs long enough to pay for vector code.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
-    let (mut lo, mut hi, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
-    for v in values {
-        lo = if *v < lo { *v } else { lo };
-        hi = if *v > hi { *v } else { hi };
-        whole &= v.abs() < f64::INFINITY && *v != declared;
+    let mut all = Range::<SIDE_BY_SIDE>::NOTHING;
+    let (many, rest) = values.as_chunks();
+    many.iter().for_each(|values| all.add(values, declared));
+    let mut last = Range::<1>::NOTHING;
+    rest.iter().for_each(|v| last.add(&[*v], declared));
+    let (a, b) = (all.whole()?, last.whole()?);
+    Some((a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Values that are looked at together: each comparison waits for the last one.
+const SIDE_BY_SIDE: usize = 16;
+
+/// Ranges of `N` runs of values.
+struct Range<const N: usize> {
+    lo: [f64; N],
+    hi: [f64; N],
+    /// Not a number where a value was missing.
+    missing: [f64; N],
+}
+
+impl<const N: usize> Range<N> {
+    const NOTHING: Self = Self { lo: [f64::INFINITY; N], hi: [f64::NEG_INFINITY; N], missing: [0.0; N] };
+
+    #[inline(always)]
+    fn add(&mut self, values: &[f64; N], declared: f64) {
+        for (i, &v) in values.iter().enumerate() {
+            self.lo[i] = if v < self.lo[i] { v } else { self.lo[i] };
+            self.hi[i] = if v > self.hi[i] { v } else { self.hi[i] };
+            self.missing[i] = if (v.abs() < f64::INFINITY) & (v != declared) { self.missing[i] } else { f64::NAN };
+        }
     }
-    whole.then_some((lo, hi))
+
+    fn whole(&self) -> Option<(f64, f64)> {
+        let range =
+            (self.lo.into_iter().fold(f64::INFINITY, f64::min), self.hi.into_iter().fold(f64::NEG_INFINITY, f64::max));
+        (!self.missing.iter().any(|m| m.is_nan())).then_some(range)
+    }
 }
 
 /// What storing a few values as `ty` leaves, as [`round_to`].
@@ -203,6 +253,40 @@ mod tests {
         assert_eq!(round_to(SampleType::F16, 1e-300), 0.0);
         assert_eq!(round_to(SampleType::F16, f64::MAX), f64::INFINITY);
         assert!(round_to(SampleType::F16, f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn rows_are_loaded_as_each_sample_is() {
+        let numbers: Vec<f64> = (0..60).map(f64::from).collect();
+        for ty in [SampleType::U8, SampleType::I16, SampleType::F16, SampleType::F32, SampleType::F64] {
+            let mut bytes = vec![0; numbers.len() * ty.size()];
+            store(ty, &numbers, &mut bytes);
+            let mut rows = [[0.0; 4]; 5];
+            load_strided(ty, &bytes[3 * ty.size()..], 13, &mut rows);
+            for (i, row) in rows.iter().enumerate() {
+                assert_eq!(row[..], numbers[3 + 13 * i..][..4], "{ty}");
+            }
+            let mut again = vec![0.0f32; numbers.len()];
+            load_as(ty, &bytes, &mut again, |v| v as f32);
+            assert!(again.iter().zip(&numbers).all(|(a, b)| f64::from(*a) == *b));
+        }
+    }
+
+    #[test]
+    fn ranges_are_those_of_all_values_whatever_their_number() {
+        let value = |i: usize| ((i * 7919) % 104_729) as f64 - 5e4;
+        for n in [0, 1, 15, 16, 17, 100] {
+            let mut values: Vec<f64> = (0..n).map(value).collect();
+            let slow = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (v.min(a), v.max(b)));
+            assert_eq!(range_unless_missing(&values, Some(0.5)), Some(slow));
+            for missing in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.5] {
+                for i in 0..n {
+                    let before = std::mem::replace(&mut values[i], missing);
+                    assert_eq!(range_unless_missing(&values, Some(0.5)), None, "{missing} at {i} of {n}");
+                    values[i] = before;
+                }
+            }
+        }
     }
 
     #[test]

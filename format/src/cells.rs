@@ -8,7 +8,7 @@ mod reference;
 mod tests;
 mod unpack;
 
-pub use pack::pack_cells;
+pub use pack::{estimate_cells, pack_cells};
 pub use unpack::unpack_cells;
 
 use crate::segments::max_segments;

@@ -32,7 +32,7 @@ mod tests;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
-pub use cells::{max_packed, pack_cells, unpack_cells};
+pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use geometry::BlockGeometry;

@@ -35,6 +35,12 @@ pub(crate) fn pack_segments(symbols: &[u8], lengths: &[usize], out: &mut Vec<u8>
     }
 }
 
+/// About how many bytes [`pack_segments`] appends.
+pub(crate) fn estimate_segments(symbols: &[u8], lengths: &[usize]) -> usize {
+    let cost: u64 = Segment::of(symbols, lengths).iter().map(|segment| segment.cost).sum();
+    (cost >> 19) as usize
+}
+
 /// Fills `symbols` from the segments at the front of `bytes` and takes those off.
 pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
     let mut rest = symbols;

@@ -1,8 +1,10 @@
 //! What the decoder gives, compared with the source: errors, range, and the samples that miss the bound.
 
 use super::WindowCodec;
-use crate::sample;
+use crate::bound::Bound;
+use crate::sample::{self, SampleType};
 use crate::wavelet::{LANES, Lane};
+use multiversion::multiversion;
 use wavesplat_format::Outliers;
 
 /// Samples that are compared, [`LANES`] series together; one lane for each frame.
@@ -50,42 +52,27 @@ impl Tally {
         whole: bool,
         place: impl Fn(usize, usize) -> Option<usize>,
     ) {
-        if count < LANES || !whole || !self.add_clearly_within(codec, compared) {
-            (0..count).for_each(|lane| self.add_one(codec, compared, lane, |t| place(t, lane)));
-        }
+        let clear = if whole { self.add_clearly_within(codec, compared, count) } else { [false; LANES] };
+        let unclear = (0..count).filter(|l| !clear[*l]);
+        unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| place(t, lane)));
     }
 
-    /// Adds a group of present samples whose errors are clearly within the bound, by vector code and with one
-    /// rounding up at the end. False if they are not, so that each must be looked at; nothing is added then.
-    fn add_clearly_within(&mut self, codec: &WindowCodec, compared: &Compared<'_>) -> bool {
-        let (mut all, mut largest, mut squares) = ((self.min, self.max), Lane::default(), Lane::default());
-        let mut sums = Lane::default();
-        for (decoded, source) in compared.decoded.iter().zip(compared.source) {
-            let (rounded, mut errors) = (sample::round_all(codec.sample, decoded), Lane::default());
-            for l in 0..LANES {
-                let (a, b) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs());
-                let e = if a > b { a } else { b };
-                largest[l] = if e > largest[l] { e } else { largest[l] };
-                squares[l] += e * e;
-                errors[l] = e;
+    /// Adds those of the first `count` series, without a missing sample, whose errors are clearly within the bound: by
+    /// vector code and with one rounding up at the end. Returns which they are; each sample of the others must be looked at.
+    fn add_clearly_within(&mut self, codec: &WindowCodec, compared: &Compared<'_>, count: usize) -> [bool; LANES] {
+        let seen = Seen::of(codec, compared);
+        std::array::from_fn(|l| {
+            let share = codec.promise.largest_share(&[seen.sums[l]], compared.source.len());
+            let clear = l < count && share <= 1.0 && !seen.missing[l].is_nan();
+            if clear {
+                let largest = if seen.largest[l] > 0.0 { seen.largest[l].next_up() } else { 0.0 };
+                self.reached = self.reached.max(largest);
+                self.share = self.share.max(share);
+                self.squared_error += seen.squares[l];
+                (self.min, self.max) = (self.min.min(seen.lo[l]), self.max.max(seen.hi[l]));
             }
-            codec.promise.add(&errors, source, &mut sums);
-            match sample::range_unless_missing(&rounded, codec.missing_value) {
-                Some(range) => all = (all.0.min(range.0), all.1.max(range.1)),
-                None => return false,
-            }
-        }
-        let share = codec.promise.largest_share(&sums, compared.source.len());
-        if share > 1.0 {
-            return false;
-        }
-        let largest = largest.into_iter().fold(0.0, f64::max);
-        let largest = if largest > 0.0 { largest.next_up() } else { largest };
-        self.reached = self.reached.max(largest);
-        self.share = self.share.max(share);
-        self.squared_error += squares.iter().sum::<f64>();
-        (self.min, self.max) = all;
-        true
+            clear
+        })
     }
 
     /// Adds one series, sample by sample, and notes the places of those that miss the bound.
@@ -126,5 +113,107 @@ impl Tally {
         let bytes = |p: &u32| &samples[*p as usize * size..(*p as usize + 1) * size];
         let samples = positions.iter().flat_map(bytes).copied().collect();
         Outliers { positions, samples }
+    }
+}
+
+/// What vector code sees of [`LANES`] series, each by itself.
+struct Seen {
+    /// Range of what is extracted.
+    lo: Lane,
+    hi: Lane,
+    /// Not a number where something would be taken for missing.
+    missing: Lane,
+    largest: Lane,
+    squares: Lane,
+    /// Of [`crate::bound::Promise::add`].
+    sums: Lane,
+}
+
+impl Seen {
+    fn of(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
+        let mut seen = Self::nothing();
+        let declared = codec.missing_value.unwrap_or(f64::NAN); // equal to nothing
+        match (codec.sample, codec.promise.bound) {
+            (SampleType::F32, Bound::Pointwise) => look_at_singles(&mut seen, compared, declared),
+            (SampleType::F64, Bound::Pointwise) => look_at_doubles(&mut seen, compared, declared),
+            _ => return Self::under_any_bound(codec, compared, declared),
+        }
+        seen.sums = seen.largest;
+        seen
+    }
+
+    /// The slow twin of vector code.
+    fn under_any_bound(codec: &WindowCodec, compared: &Compared<'_>, declared: f64) -> Self {
+        let mut seen = Self::nothing();
+        for (decoded, source) in compared.decoded.iter().zip(compared.source) {
+            let errors = seen.add(decoded, &sample::round_all(codec.sample, decoded), source, declared);
+            codec.promise.add(&errors, source, &mut seen.sums);
+        }
+        seen
+    }
+
+    fn nothing() -> Self {
+        let zero = Lane::default();
+        let (lo, hi) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        Self { lo, hi, missing: zero, largest: zero, squares: zero, sums: zero }
+    }
+
+    /// Adds a frame; returns its errors.
+    #[inline(always)]
+    fn add(&mut self, decoded: &Lane, rounded: &Lane, source: &Lane, declared: f64) -> Lane {
+        let mut errors = Lane::default();
+        for l in 0..LANES {
+            let (a, b, v) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs(), rounded[l]);
+            let e = if a > b { a } else { b };
+            self.largest[l] = if e > self.largest[l] { e } else { self.largest[l] };
+            self.squares[l] += e * e;
+            self.lo[l] = if v < self.lo[l] { v } else { self.lo[l] };
+            self.hi[l] = if v > self.hi[l] { v } else { self.hi[l] };
+            self.missing[l] = if (v.abs() < f64::INFINITY) & (v != declared) { self.missing[l] } else { f64::NAN };
+            errors[l] = e;
+        }
+        errors
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn look_at_singles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
+    for (decoded, source) in compared.decoded.iter().zip(compared.source) {
+        let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
+        seen.add(decoded, &rounded, source, declared);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn look_at_doubles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
+    for (decoded, source) in compared.decoded.iter().zip(compared.source) {
+        seen.add(decoded, decoded, source, declared);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bound::Promise;
+    use crate::codec::scheme::Scheme;
+    use crate::wavelet::Basis;
+
+    #[test]
+    fn vector_code_sees_what_its_slow_twin_does() {
+        let number = |i: usize| ((i * 7919) % 1013) as f64 / 7.0 - 50.0;
+        let lanes = |first: usize| (0..40).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
+        let (source, mut decoded): (Vec<Lane>, Vec<Lane>) = (lanes(0), lanes(5));
+        (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
+        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
+        for ty in [SampleType::F32, SampleType::F64] {
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), 40, ty, promise, 8);
+            codec.missing_value = Some(-9.5);
+            let compared = Compared { source: &source, decoded: &decoded };
+            let bit = |v: f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
+            let bits = |s: Seen| [s.lo, s.hi, s.missing, s.largest, s.squares, s.sums].map(|lane| lane.map(bit));
+            let (fast, slow) = (Seen::of(&codec, &compared), Seen::under_any_bound(&codec, &compared, -9.5));
+            assert!([1, 4, 6].into_iter().all(|l| fast.missing[l].is_nan()));
+            assert_eq!(bits(fast), bits(slow), "{ty}");
+        }
     }
 }

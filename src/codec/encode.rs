@@ -20,8 +20,6 @@ pub struct Encoder {
     /// The coefficients that a pyramid refines, in either precision, and room for as many.
     single: [Vec<f32>; 2],
     double: [Vec<f64>; 2],
-    /// Only the bytes matter: what the directory says of parts is left open.
-    trial: bool,
     raw: Vec<u8>,
 }
 
@@ -41,15 +39,10 @@ pub struct Encoded {
 }
 
 impl Encoder {
-    /// One whose blocks are measured and thrown away: it spares what takes no bytes.
-    pub(crate) fn for_trials(level: i32) -> wavesplat_format::Result<Self> {
-        Ok(Self { trial: true, ..Self::new(level)? })
-    }
-
     /// With a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
         let (codes, raw, single, double) = Default::default();
-        Ok(Self { compressor: Compressor::new(level)?, codes, single, double, trial: false, raw })
+        Ok(Self { compressor: Compressor::new(level)?, codes, single, double, raw })
     }
 
     /// Codes a block of `size` voxels from its little-endian samples, frame by frame: `frames * voxels * sample size` bytes.
@@ -64,8 +57,8 @@ impl Encoder {
         let block = Source { codec, size, samples, missing: &missing };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
-            Some(pyramid) if pyramid.single => block.refine(pyramid, self.trial, &mut self.single, &mut self.codes),
-            Some(pyramid) => block.refine(pyramid, self.trial, &mut self.double, &mut self.codes),
+            Some(pyramid) if pyramid.single => block.refine(pyramid, &mut self.single, &mut self.codes),
+            Some(pyramid) => block.refine(pyramid, &mut self.double, &mut self.codes),
         };
         let coded = match coded {
             Some(coded) => self.coded_parts(&block, &coded)?,

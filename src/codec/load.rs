@@ -4,7 +4,7 @@ use super::WindowCodec;
 use super::truncate::Group;
 use super::weigh::Weighing;
 use crate::sample;
-use crate::wavelet::Lane;
+use crate::wavelet::{LANES, Lane};
 
 /// Which samples of a block are missing, and the largest of the others.
 pub(super) struct Missing {
@@ -49,16 +49,28 @@ pub(super) fn load_group(
     group: &mut Group,
 ) {
     let voxels = missing.mask.len() / codec.frames();
-    let size = codec.sample.size();
-    for (frame, (source, weight)) in group.source.iter_mut().zip(&mut group.weight).enumerate() {
-        let at = frame * voxels + first;
-        *source = Lane::default();
-        sample::load(codec.sample, &samples[at * size..(at + count) * size], &mut source[..count]);
-        let weights = weighing.weights(source);
+    load_lanes(codec, samples, (first, count), voxels, &mut group.source);
+    if let (Some(weight), 0, LANES) = (weighing.common(), missing.count, count) {
+        return group.weight.fill([weight; LANES]);
+    }
+    for (frame, (source, weight)) in group.source.iter().zip(&mut group.weight).enumerate() {
+        let (at, weights) = (frame * voxels + first, weighing.weights(source));
         *weight = std::array::from_fn(|l| if l < count && !missing.mask[at + l] { weights[l] } else { 0.0 });
     }
     if missing.count > 0 {
         (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));
+    }
+}
+
+/// The samples of `count` of `voxels` voxels, frame by frame, and zeros.
+fn load_lanes(codec: &WindowCodec, samples: &[u8], (first, count): (usize, usize), voxels: usize, out: &mut [Lane]) {
+    let size = codec.sample.size();
+    if count == LANES {
+        return sample::load_strided(codec.sample, &samples[first * size..], voxels, out);
+    }
+    for (lane, frame) in out.iter_mut().zip(samples.chunks_exact(voxels * size)) {
+        *lane = Lane::default();
+        sample::load(codec.sample, &frame[first * size..][..count * size], &mut lane[..count]);
     }
 }
 

@@ -12,10 +12,11 @@ pub mod field;
 mod gain;
 mod load;
 pub(crate) mod pyramid;
-mod real;
+pub(crate) mod real;
 mod refine;
 mod rows;
 pub mod scheme;
+pub(crate) mod trial;
 mod truncate;
 mod weigh;
 

@@ -6,9 +6,13 @@
 
 use super::real::Real;
 use super::rows::{self, Change};
+use crate::wavelet;
 use multiversion::multiversion;
 use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
+
+/// Level parts of a block.
+const PARTS: usize = Pyramid::PARTS as usize;
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
@@ -77,16 +81,35 @@ impl<'a> Passes<'a> {
 
     /// What leaving out each level part and all finer ones changes in a decoded field; `rest` is scratch.
     pub(crate) fn changes<R: Real>(&self, field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
-        let mut changes = vec![Change::default(); usize::from(Pyramid::PARTS)];
+        self.changes_of(&[true; PARTS], field, rest)
+    }
+
+    /// As [`Self::changes`], for parts with a code that is not zero alone: the directory says nothing of the others.
+    pub(crate) fn changes_of_coded<R: Real>(&self, codes: &[i32], field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
+        let ranges = wavelet::ranges(&self.part_lengths());
+        let coded: Vec<bool> = ranges.into_iter().map(|range| !rows::all_zero(&codes[range])).collect();
+        self.changes_of(&coded, field, rest)
+    }
+
+    fn changes_of<R: Real>(&self, wanted: &[bool], field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
+        let mut changes = vec![Change::default(); PARTS];
         for nodes in field.chunks_exact(self.slice()).filter(|nodes| nodes.iter().any(|v| *v != R::default())) {
-            for (part, change) in (0..).zip(&mut changes) {
-                rest.clear();
-                rest.extend_from_slice(nodes);
-                let finer = self.of_slice(0).filter(|(refined, _)| refined.pass.part >= part);
-                finer.for_each(|(refined, _)| leave_out_pass(&refined, change, rest));
+            for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
+                self.leave_out(part, nodes, rest, change);
             }
         }
         changes
+    }
+
+    /// Adds what leaving out a level part and all finer ones changes in a slice.
+    fn leave_out<R: Real>(&self, part: usize, nodes: &[R], rest: &mut Vec<R>, change: &mut Change) {
+        if part == 0 {
+            return rows::add_changes_to_zero(change, nodes);
+        }
+        rest.clear();
+        rest.extend_from_slice(nodes);
+        let finer = self.of_slice(0).filter(|(refined, _)| usize::from(refined.pass.part) >= part);
+        finer.for_each(|(refined, _)| leave_out_pass(&refined, change, rest));
     }
 
     /// Nodes of a slice.
@@ -135,8 +158,7 @@ fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &mut [R]) {
     refined.for_each_row(field, |_, nodes, predicted| {
-        rows::add_changes(change, nodes, predicted);
-        nodes.copy_from_slice(predicted);
+        rows::replace(change, nodes, predicted);
     });
 }
 

@@ -17,7 +17,7 @@ use wavesplat_format::{Basis, Outliers, Pyramid};
 /// What is known about a block after its series have been coded.
 pub(super) struct Coded {
     pub(super) step: f64,
-    /// With a pyramid: what leaving out each level part and all finer ones changes.
+    /// With a pyramid: what leaving out each level part and all finer ones changes, where a part has codes.
     pub(super) changes: Option<Vec<Change>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
@@ -44,46 +44,52 @@ impl Source<'_> {
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
-        trial: bool,
         [field, rest]: &mut [Vec<R>; 2],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
-        let codec = self.codec;
-        let weighing = Weighing::of(codec, self.samples, self.missing.magnitude)?;
-        let rounding = if pyramid.single { self.missing.magnitude * SINGLE_ROUNDING } else { 0.0 };
-        let step = weighing.step * codec.scheme.coarseness - rounding;
-        if !step.is_normal() || step < 0.0 || self.missing.magnitude > R::LARGEST {
-            return None;
-        }
-        let nodes = codec.basis.coefficients() * self.voxels();
-        let plain = codec.scheme.basis == Basis::Samples && codec.promise.measure() == Measure::Largest;
-        clear(field).resize(nodes, R::default());
-        if plain {
-            self.load_samples(field);
-        } else {
-            self.load_series(&weighing, field);
-        }
-        clear(codes).resize(nodes, 0);
-        let passes = Passes::new(pyramid, codec.shape(self.size));
+        let weighing = Weighing::of(self.codec, self.samples, self.missing.magnitude)?;
+        let step = self.step::<R>(pyramid, &weighing)?;
+        self.load(&weighing, field);
+        codes.resize(field.len(), 0);
+        let passes = Passes::new(pyramid, self.codec.shape(self.size));
         if !passes.encode(step, field, codes) {
             return None;
         }
-        let mut tally = if plain { self.check_samples(field)? } else { self.check_series(&weighing, field)? };
-        let outliers = tally.take_outliers(codec, self.samples);
-        let changes = (!trial).then(|| passes.changes(field, rest));
+        let mut tally = if self.plain() { self.check_samples(field)? } else { self.check_series(&weighing, field)? };
+        let outliers = tally.take_outliers(self.codec, self.samples);
+        let changes = Some(passes.changes_of_coded(codes, field, rest));
         Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
+    }
+
+    /// The step of the finest codes. None if the block must be stored exactly.
+    pub(super) fn step<R: Real>(&self, pyramid: &Pyramid, weighing: &Weighing) -> Option<f64> {
+        let rounding = if pyramid.single { self.missing.magnitude * SINGLE_ROUNDING } else { 0.0 };
+        let step = weighing.step * self.codec.scheme.coarseness - rounding;
+        (step.is_normal() && step >= 0.0 && self.missing.magnitude <= R::LARGEST).then_some(step)
+    }
+
+    /// Whether nothing but the pyramid is between a sample and its code, and every sample is judged by itself.
+    fn plain(&self) -> bool {
+        self.codec.scheme.basis == Basis::Samples && self.codec.promise.measure() == Measure::Largest
+    }
+
+    /// The nodes that the pyramid refines.
+    pub(super) fn load<R: Real>(&self, weighing: &Weighing, field: &mut Vec<R>) {
+        field.resize(self.codec.basis.coefficients() * self.voxels(), R::default());
+        if self.plain() {
+            self.load_samples(field);
+        } else {
+            self.load_series(weighing, field);
+        }
     }
 
     /// The samples themselves; those that are missing as "not a number".
     fn load_samples<R: Real>(&self, field: &mut [R]) {
-        sample::for_each_run(self.codec.sample, self.samples, |first, values| {
-            let nodes = &mut field[first..][..values.len()];
-            nodes.iter_mut().zip(values).for_each(|(node, v)| *node = R::of(*v));
-            if self.missing.count > 0 {
-                let missing = nodes.iter_mut().zip(&self.missing.mask[first..]).filter(|(_, missing)| **missing);
-                missing.for_each(|(node, _)| *node = R::of(f64::NAN));
-            }
-        });
+        sample::load_as(self.codec.sample, self.samples, field, R::of);
+        if self.missing.count > 0 {
+            let missing = field.iter_mut().zip(&self.missing.mask).filter(|(_, missing)| **missing);
+            missing.for_each(|(node, _)| *node = R::of(f64::NAN));
+        }
     }
 
     /// The coefficients of all series.
@@ -95,7 +101,10 @@ impl Source<'_> {
             codec.basis.forward(&group.source, &mut group.coefficients);
             for (k, lane) in group.coefficients.iter().enumerate() {
                 let nodes = &mut field[k * voxels + first..][..count];
-                nodes.iter_mut().zip(lane).for_each(|(node, c)| *node = R::of(*c));
+                match nodes.first_chunk_mut::<LANES>() {
+                    Some(nodes) => *nodes = lane.map(R::of),
+                    None => nodes.iter_mut().zip(lane).for_each(|(node, c)| *node = R::of(*c)),
+                }
             }
         }
     }
@@ -117,31 +126,62 @@ impl Source<'_> {
                 tally.add_series(self.codec, &Compared { source, decoded }, last_source.len(), present, place(first));
             }
         });
-        self.few(&tally).then_some(tally)
+        self.few(tally.places.len()).then_some(tally)
     }
 
     /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
     fn check_series<R: Real>(&self, weighing: &Weighing, field: &[R]) -> Option<Tally> {
-        let (codec, voxels) = (self.codec, self.voxels());
-        let (mut tally, mut group) = (Tally::new(), Group::new(codec));
-        for (first, count) in lane_groups(voxels) {
-            load_group(codec, weighing, self.samples, self.missing, first, count, &mut group);
-            for (k, lane) in group.coefficients.iter_mut().enumerate() {
-                let nodes = &field[k * voxels + first..][..count];
-                lane.iter_mut().zip(nodes).for_each(|(c, node)| *c = node.to_f64());
-            }
-            codec.basis.inverse(&mut group.coefficients, &mut group.decoded);
+        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
+        for (first, count) in lane_groups(self.voxels()) {
+            self.decode_group(weighing, field, (first, count), &mut group);
             self.check(&group, (first, count), &mut tally)?;
         }
         Some(tally)
     }
 
+    /// A group of series, and what the decoder makes of the field there.
+    fn decode_group<R: Real>(
+        &self,
+        weighing: &Weighing,
+        field: &[R],
+        (first, count): (usize, usize),
+        group: &mut Group,
+    ) {
+        let (codec, voxels) = (self.codec, self.voxels());
+        load_group(codec, weighing, self.samples, self.missing, first, count, group);
+        for (k, lane) in group.coefficients.iter_mut().enumerate() {
+            let nodes = &field[k * voxels + first..][..count];
+            match nodes.first_chunk::<LANES>() {
+                Some(nodes) => *lane = nodes.map(R::to_f64),
+                None => lane.iter_mut().zip(nodes).for_each(|(c, node)| *c = node.to_f64()),
+            }
+        }
+        codec.basis.inverse(&mut group.coefficients, &mut group.decoded);
+    }
+
+    /// About how many samples miss the bound: a few of the series are looked at.
+    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> usize {
+        if self.plain() && self.codec.scheme.coarseness <= 1.0 {
+            return 0;
+        }
+        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
+        for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
+            self.decode_group(weighing, field, (first, count), &mut group);
+            self.add(&group, (first, count), &mut tally);
+        }
+        tally.places.len() * LOOKED_AT
+    }
+
     /// Compares a group's decoded series with the source. None if too many samples miss the bound by now.
     pub(super) fn check(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) -> Option<()> {
+        self.add(group, (first, count), tally);
+        self.few(tally.places.len()).then_some(())
+    }
+
+    fn add(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) {
         let compared = Compared { source: &group.source, decoded: &group.decoded };
         let place = |t: usize, lane: usize| self.place(t * self.voxels() + first + lane);
         tally.add_series(self.codec, &compared, count, self.missing.count == 0, place);
-        self.few(tally).then_some(())
     }
 
     /// A sample that is there.
@@ -150,10 +190,13 @@ impl Source<'_> {
     }
 
     /// Whether so few samples miss the bound that storing them is cheaper than storing all.
-    fn few(&self, tally: &Tally) -> bool {
-        tally.places.len() <= self.missing.mask.len() / MOST_OUTLIERS
+    pub(super) fn few(&self, outliers: usize) -> bool {
+        outliers <= self.missing.mask.len() / MOST_OUTLIERS
     }
 }
+
+/// One group of series in this many is looked at where outliers are only estimated; rows of usual lengths are no multiple.
+const LOOKED_AT: usize = 3;
 
 /// A block in which more than one sample in this many misses the bound is stored exactly: an outlier costs more bytes.
 const MOST_OUTLIERS: usize = 8;

@@ -2,6 +2,7 @@
 
 use super::real::Real;
 use crate::wavelet::{LANES, Lane};
+use multiversion::multiversion;
 
 /// p = w0 a + w1 b
 #[inline(always)]
@@ -99,13 +100,25 @@ impl Change {
     }
 }
 
-/// Adds the changes from `nodes` to `others`.
+/// Adds the changes from `nodes` to `others`, which take their place.
 #[inline(always)]
-pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
-    let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
+pub(super) fn replace<R: Real>(change: &mut Change, nodes: &mut [R], others: &[R]) {
+    let (nodes, last_nodes) = nodes.as_chunks_mut::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();
-    for (a, b) in nodes.iter().zip(others) {
+    for (a, b) in nodes.iter_mut().zip(others) {
         (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
+        *a = *b;
     }
-    last_nodes.iter().zip(last_others).enumerate().for_each(|(l, (a, b))| change.add(l, *a, *b));
+    last_nodes.iter_mut().zip(last_others).enumerate().for_each(|(l, (a, b))| {
+        change.add(l, *a, *b);
+        *a = *b;
+    });
+}
+
+/// Adds the changes from nodes to zeros.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(super) fn add_changes_to_zero<R: Real>(change: &mut Change, nodes: &[R]) {
+    let (nodes, last) = nodes.as_chunks::<LANES>();
+    nodes.iter().for_each(|a| (0..LANES).for_each(|l| change.add(l, a[l], R::default())));
+    last.iter().enumerate().for_each(|(l, a)| change.add(l, *a, R::default()));
 }

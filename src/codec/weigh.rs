@@ -50,6 +50,11 @@ impl Weighing {
         found // where all samples are 0, any step will do
     }
 
+    /// The weight of every error; none if each has its own.
+    pub(super) fn common(&self) -> Option<f64> {
+        self.common
+    }
+
     /// The weights of the errors of some samples.
     pub(super) fn weights(&self, samples: &Lane) -> Lane {
         self.common.map_or_else(|| samples.map(|v| reciprocal(self.error(v))), |w| [w; LANES])

@@ -1,17 +1,17 @@
 //! Which scheme a window is coded with: the one that makes some of its boxes smallest.
 
-use super::ConvertConfig;
 use super::learn::learned_functions;
+use super::{ConvertConfig, Idle};
 use crate::bound::{Measure, Promise};
 use crate::codec::WindowCodec;
-use crate::codec::encode::Encoder;
+use crate::codec::real::Real;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
+use crate::codec::trial::{Scratch, Trial};
 use crate::error::{Error, Result};
 use crate::source::{Archive, FrameWindow, read_frames};
 use crate::volume::Region;
 use crate::wavelet::Basis;
 use rayon::prelude::*;
-use wavesplat_format::BlockId;
 
 /// What of a scheme is fixed; the rest is chosen for each window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,12 +54,26 @@ pub(super) struct Chooser<'a> {
     pub(super) promise: Promise,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
+    /// What the window before was coded with, if the choice may begin there.
+    pub(super) before: Option<&'a Scheme>,
 }
 
 /// A box of samples, frame by frame.
 struct Sampled {
     size: [usize; 3],
     samples: Vec<u8>,
+}
+
+/// A transform along time, and the boxes as it leaves them.
+struct Transformed<'a, R> {
+    basis: Basis,
+    boxes: Vec<Trial<'a, R>>,
+}
+
+/// What schemes are tried on, and with.
+struct Trials<'a, R> {
+    boxes: Vec<Transformed<'a, R>>,
+    idle: Idle<Scratch<R>>,
 }
 
 impl Chooser<'_> {
@@ -73,36 +87,85 @@ impl Chooser<'_> {
         if self.promise.delta <= 0.0 {
             return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
         }
+        let families = self.families()?;
+        match &families[..] {
+            [alone] if alone.pyramid.is_none() => Ok(alone.clone()),
+            _ if self.single() => self.smallest::<f32>(families),
+            _ => self.smallest::<f64>(families),
+        }
+    }
+
+    /// The smallest of some families and their variants, all of which have a pyramid.
+    fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
         let boxes = self.boxes()?;
-        let families = self.tried(self.families()?, &boxes)?;
+        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Idle::default() };
+        let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
-        let promising = families.into_par_iter().filter(|f| f.0 <= least * PROMISING);
-        let tuned: Result<Vec<_>> = promising.map(|f| self.coarsest(f, &boxes)).collect();
-        let mut best =
-            tuned?.into_iter().reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
-        for variants in [Self::stencils, Self::growths] {
-            best = self.tried(variants(self, &best.1), &boxes)?.into_iter().fold(best, fewer);
+        let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
+        if let Some(before) = self.before {
+            let best = promising.clone().reduce(fewer);
+            if let Some((_, scheme)) = best.filter(|best| best.1.basis == before.basis) {
+                return Ok(scheme);
+            }
+        }
+        let tuned = promising.map(|f| self.coarsest(f, &trials));
+        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
+        for variants in [Self::orders, Self::stencils, Self::growths] {
+            let mut others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
+            best = others.find(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
         Ok(best.1)
     }
 
-    /// Schemes, and about how many bytes the window takes with each.
-    fn tried(&self, schemes: Vec<Scheme>, boxes: &[Sampled]) -> Result<Vec<(f64, Scheme)>> {
-        schemes.into_par_iter().map(|scheme| Ok((self.bytes(&scheme, boxes)?, scheme))).collect()
+    /// The boxes under each of the transforms along time of some schemes.
+    fn transformed<'a, R: Real + Send + Sync>(
+        &self,
+        schemes: &[Scheme],
+        boxes: &'a [Sampled],
+    ) -> Vec<Transformed<'a, R>> {
+        let mut found: Vec<Transformed<'a, R>> = Vec::new();
+        for scheme in schemes {
+            if found.iter().all(|f| f.basis != scheme.basis) {
+                let codec = self.codec(scheme);
+                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, &b.samples);
+                found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
+            }
+        }
+        found
     }
 
     /// A scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
-    fn coarsest(&self, mut best: (f64, Scheme), boxes: &[Sampled]) -> Result<(f64, Scheme)> {
-        let fixed = best.1.pyramid.is_none() || best.1.coarseness == 1.0;
-        for factor in FACTORS.into_iter().filter(|_| !fixed) {
-            let coarser = Scheme { coarseness: best.1.coarseness * factor, ..best.1.clone() };
-            let bytes = self.bytes(&coarser, boxes)?;
-            if bytes >= best.0 && factor > 1.0 {
-                break;
-            }
-            best = fewer(best, (bytes, coarser));
+    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &Trials<'_, R>) -> (f64, Scheme) {
+        if first.1.coarseness == 1.0 {
+            return first;
         }
-        Ok(best)
+        let coarser = self.while_smaller(&first, COARSER, trials);
+        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, trials) }
+    }
+
+    fn while_smaller<R: Real + Send + Sync>(
+        &self,
+        first: &(f64, Scheme),
+        factor: f64,
+        trials: &Trials<'_, R>,
+    ) -> (f64, Scheme) {
+        let mut best = first.clone();
+        loop {
+            let next = self.with_step(&best.1, factor, trials);
+            if next.0 >= best.0 {
+                return best;
+            }
+            best = next;
+        }
+    }
+
+    fn with_step<R: Real + Send + Sync>(&self, scheme: &Scheme, factor: f64, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        self.tried(Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() }, trials)
+    }
+
+    /// A scheme, and about how many bytes the window takes with it.
+    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        (self.bytes(&scheme, trials), scheme)
     }
 
     /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes.
@@ -140,15 +203,19 @@ impl Chooser<'_> {
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
             let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
-            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(2.0) });
+            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
             let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
-            let of_order = |order: [Axis; 4]| {
-                let pyramid = Some(self.pyramid(&order, stencil));
-                Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) }
+            let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
+            found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
+        }
+        if let Some(before) = self.before {
+            let begin = |scheme: &mut Scheme| {
+                scheme.pyramid = before.pyramid.as_ref().map(|p| Pyramid { single: self.single(), ..p.clone() });
+                scheme.coarseness = before.coarseness;
             };
-            found.extend(ORDERS.map(of_order));
+            found.iter_mut().filter(|scheme| scheme.basis == before.basis).for_each(begin);
         }
         Ok(found)
     }
@@ -164,9 +231,14 @@ impl Chooser<'_> {
     }
 
     fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
+        let (growth, most) = GROWTHS[0];
+        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single() }
+    }
+
+    /// Whether 32-bit floats are precise enough.
+    fn single(&self) -> bool {
         let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
-        let single = normal && self.promise.delta >= self.magnitude * SINGLE;
-        Pyramid { order: order.to_vec(), stencil, growth: GROWTHS[0].0, most: GROWTHS[0].1, single }
+        normal && self.promise.delta >= self.magnitude * SINGLE
     }
 
     /// Steps under a bound of means are chosen for dropping coefficients, too ([`Promise::step`]).
@@ -175,6 +247,11 @@ impl Chooser<'_> {
             Measure::Largest => coarseness,
             Measure::RootMeanSquare => 1.4 * coarseness,
         }
+    }
+
+    fn orders(&self, best: &Scheme) -> Vec<Scheme> {
+        let others = if best.basis == Basis::Samples { &ORDERS[1..] } else { &[] };
+        variants(best, |p| others.iter().map(|order| Pyramid { order: order.to_vec(), ..p.clone() }).collect())
     }
 
     fn stencils(&self, best: &Scheme) -> Vec<Scheme> {
@@ -190,20 +267,26 @@ impl Chooser<'_> {
     }
 
     /// About how many bytes the window takes.
-    fn bytes(&self, scheme: &Scheme, boxes: &[Sampled]) -> Result<f64> {
+    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
+        let codec = self.codec(scheme);
+        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
+        let bytes = |b: &Trial<'_, R>| {
+            let mut scratch = trials.idle.take().unwrap_or_default();
+            let bytes = b.bytes(&codec, pyramid, &mut scratch);
+            trials.idle.put(scratch);
+            (bytes, b.voxels())
+        };
+        let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let whole: usize = self.archive.grid.dims.iter().product();
+        bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
+    }
+
+    fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.window.frames();
         let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGE);
         codec.missing_value = self.config.missing_value;
-        let mut encoder = Encoder::for_trials(self.config.level).map_err(super::bug)?;
-        let (mut bytes, mut voxels) = (0, 0);
-        for Sampled { size, samples } in boxes {
-            let id = BlockId { window: 0, block: 0, channel: 0 };
-            let encoded = encoder.block(&codec, id, *size, samples).map_err(super::bug)?;
-            bytes += encoded.block.parts.iter().map(|p| p.stored.len()).sum::<usize>();
-            voxels += size.iter().product::<usize>();
-        }
-        let whole: usize = self.archive.grid.dims.iter().product();
-        Ok(bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64)
+        codec
     }
 }
 
@@ -224,7 +307,7 @@ const EDGE: usize = 30;
 const SHARE: usize = 50;
 
 /// Boxes that are tried.
-const LEAST_BOXES: usize = 3;
+const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
 /// Voxels of a volume that is not small: a few boxes are then a small part of it.
@@ -237,6 +320,9 @@ const LEARNING: usize = 1000;
 /// A scheme is worth tuning that is at most so many times as large as the smallest before.
 const PROMISING: f64 = 1.3;
 
+/// A variant must make boxes smaller by this to be taken: less says little about blocks, which are larger.
+const CLEARLY: f64 = 0.99;
+
 /// Fractions whose multiples spread evenly: powers of the inverse of the root of x^4 = x + 1.
 const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];
 
@@ -247,8 +333,11 @@ const ORDERS: [[Axis; 4]; 3] =
 /// How steps of coarser levels shrink, and by how much at most; the first is taken to begin with.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
 
-/// Factors of the step that are tried one after another, until a coarser one does not pay.
-const FACTORS: [f64; 5] = [0.7, 1.4, 1.4, 1.4, 1.4];
+/// The step of learned functions that is tried first, in units of the one for which rounding alone keeps the promise.
+const COARSE: f64 = 3.92;
+
+/// Steps grow, or shrink, by this as long as it pays.
+const COARSER: f64 = 1.4;
 
 /// The least bound, in units of the largest sample, for 32-bit floats: their rounding takes next to nothing of it.
 const SINGLE: f64 = 1.0 / (1 << 15) as f64;

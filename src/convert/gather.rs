@@ -2,13 +2,14 @@
 
 use super::choose::Chooser;
 use super::sampled::{self, Pixel};
-use super::{ConvertConfig, MissingPolicy, Plan, WindowJob};
+use super::{ConvertConfig, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
+use crate::codec::scheme::Scheme;
 use crate::error::{Error, Result};
 use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
-use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
+use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 use crate::volume::Grid;
 use crossbeam::channel::Sender;
 use std::sync::Arc;
@@ -28,6 +29,7 @@ pub(super) fn read(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
     plan: &Plan,
+    idle: &Idle<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
     let archive = source.archive().clone();
@@ -35,7 +37,7 @@ pub(super) fn read(
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
     };
-    let mut reader = WindowReader { config, plan, archive, pixels, range: None, id: None };
+    let mut reader = WindowReader { config, plan, idle, archive, pixels, range: None, id: None, scheme: None };
     let mut busy = Duration::ZERO;
     for index in 0.. {
         let started = Instant::now();
@@ -64,12 +66,16 @@ pub(super) fn read(
 struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan,
+    /// Room for the samples of blocks.
+    idle: &'a Idle<Vec<u8>>,
     archive: Archive,
     /// Where a sampled bound looks.
     pixels: Vec<Pixel>,
     /// Range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
+    /// Of the window before.
+    scheme: Option<Scheme>,
 }
 
 impl WindowReader<'_> {
@@ -83,7 +89,9 @@ impl WindowReader<'_> {
         let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(seen.range);
-        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude }.choose()?;
+        let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
+        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, before }.choose()?;
+        self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
@@ -146,10 +154,14 @@ impl WindowReader<'_> {
     /// The samples of one block, frame by frame.
     fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let region = self.plan.blocks.region(block);
-        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
+        let mut samples = self.idle.take().unwrap_or_default();
+        read_frames_into(window, 0..window.frames(), &region, self.archive.sample, &mut samples)?;
         Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
     }
 }
+
+/// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
+const ANEW: usize = 8;
 
 /// A name for the file that follows from settings and data: the same conversion has the same one everywhere.
 fn file_id(config: &ConvertConfig, archive: &Archive, plan: &Plan, digest: u64) -> FileId {

@@ -38,7 +38,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use wavesplat_format::{Basis, FileId};
+use wavesplat_format::{Basis, BlockId, FileId};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,11 +159,12 @@ pub fn convert<W: Write>(
     let mut recorder = Recorder::new(config, &archive, &plan, name, out);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
+    let idle = Idle::default();
     let (read_time, encode_time) = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
-        let plan = &plan;
-        let reader = scope.spawn(move || gather::read(source, config, plan, &to_workers));
-        let workers = scope.spawn(move || encode(config.level, plan.blocks, &from_reader, &to_writer));
+        let (plan, idle) = (&plan, &idle);
+        let reader = scope.spawn(move || gather::read(source, config, plan, idle, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, plan.blocks, idle, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -227,7 +228,8 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> R
     let field = if config.coding.space == Space::Alone { 0 } else { 2 * codes };
     let scratch = samples + 2 * codes + field + raw + ZSTD_SCRATCH;
     let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + memory::FIXED;
-    let fits = (1..=memory::MOST_BLOCKS).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
+    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
+    let fits = (1..=enough).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(config.reserved).max(1) as f64;
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
@@ -249,32 +251,55 @@ const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
 
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(level: i32, grid: BlockGrid, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
-    let idle = Mutex::new(Vec::new());
+fn encode(
+    level: i32,
+    grid: BlockGrid,
+    read: &Idle<Vec<u8>>,
+    batches: &Receiver<Batch>,
+    out: &Sender<EncodedBatch>,
+) -> Result<Duration> {
+    let idle = Idle::default();
     let mut busy = Duration::ZERO;
-    for batch in batches {
+    for Batch { window, blocks } in batches {
         let started = Instant::now();
-        let blocks: Result<Vec<Encoded>> = batch
-            .blocks
-            .par_iter()
-            .map(|(id, samples)| {
-                let reused = idle.lock().ok().and_then(|mut e| e.pop());
-                let mut encoder = reused.map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-                let size = grid.region(id.block as usize).dims();
-                let encoded = encoder.block(&batch.window.codec, *id, size, samples).map_err(bug);
-                if let Ok(mut idle) = idle.lock() {
-                    idle.push(encoder);
-                }
-                encoded
-            })
-            .collect();
+        let encode = |(id, samples): (BlockId, Vec<u8>)| {
+            let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+            let size = grid.region(id.block as usize).dims();
+            let encoded = encoder.block(&window.codec, id, size, &samples).map_err(bug);
+            idle.put(encoder);
+            read.put(samples);
+            encoded
+        };
+        let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
         busy += started.elapsed();
-        let encoded = EncodedBatch { window: batch.window, blocks: blocks? };
+        let encoded = EncodedBatch { window, blocks: blocks? };
         if out.send(encoded).is_err() {
             break; // the writer failed and says why
         }
     }
     Ok(busy)
+}
+
+/// Things to use again: new memory costs about as much as what is done with it.
+#[derive(Debug)]
+struct Idle<T>(Mutex<Vec<T>>);
+
+impl<T> Default for Idle<T> {
+    fn default() -> Self {
+        Self(Mutex::new(Vec::new()))
+    }
+}
+
+impl<T> Idle<T> {
+    fn take(&self) -> Option<T> {
+        self.0.lock().ok().and_then(|mut idle| idle.pop())
+    }
+
+    fn put(&self, thing: T) {
+        if let Ok(mut idle) = self.0.lock() {
+            idle.push(thing);
+        }
+    }
 }
 
 /// Compressing fails only where a size escaped our own limits.

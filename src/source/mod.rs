@@ -141,12 +141,25 @@ pub fn read_frames(
     region: &Region,
     ty: SampleType,
 ) -> Result<Vec<u8>> {
+    let mut samples = Vec::new();
+    read_frames_into(window, frames, region, ty, &mut samples)?;
+    Ok(samples)
+}
+
+/// As [`read_frames`], in the place of what is in `samples`.
+pub(crate) fn read_frames_into(
+    window: &dyn FrameWindow,
+    frames: impl ExactSizeIterator<Item = usize>,
+    region: &Region,
+    ty: SampleType,
+    samples: &mut Vec<u8>,
+) -> Result<()> {
     let frame_bytes = region.voxels() * ty.size();
-    let mut samples = vec![0; frame_bytes * frames.len()];
+    samples.resize(frame_bytes * frames.len(), 0);
     for (frame, bytes) in frames.zip(samples.chunks_exact_mut(frame_bytes)) {
         window.read_box(frame, region, bytes)?;
     }
-    Ok(samples)
+    Ok(())
 }
 
 /// Some consecutive frames, readable from several threads.

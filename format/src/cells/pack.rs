@@ -2,22 +2,22 @@
 
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, cells, volume};
 use crate::bits::{BitWriter, put_varint};
-use crate::segments::pack_segments;
+use crate::segments::{estimate_segments, pack_segments};
 
 /// Appends the packed codes of several boxes, which are in `codes` one after another, x fastest, then y, z, t.
 ///
 /// `boxes[i]` are the extents of a box along x, y, z, t. `FORMAT.md` specifies the bytes.
 pub fn pack_cells(codes: &[i32], boxes: &[[usize; 4]], out: &mut Vec<u8>) {
     let mut bits = Vec::new();
-    let mut streams = Streams::new(&mut bits, boxes);
-    let mut rest = codes;
-    for &extents in boxes {
-        let (codes, after) = rest.split_at(volume(&extents));
-        streams.add(codes, extents);
-        rest = after;
-    }
-    streams.finish(out);
+    Streams::of(codes, boxes, &mut bits).finish(out);
     out.append(&mut bits);
+}
+
+/// About how many bytes [`pack_cells`] appends.
+pub fn estimate_cells(codes: &[i32], boxes: &[[usize; 4]]) -> usize {
+    let mut bits = Vec::new();
+    let packed = Streams::of(codes, boxes, &mut bits).estimate();
+    packed + bits.len()
 }
 
 struct Streams<'a> {
@@ -33,12 +33,33 @@ impl<'a> Streams<'a> {
         Self { significance, values: [const { Vec::new() }; SCALES], bits: BitWriter::new(bits) }
     }
 
-    fn finish(self, out: &mut Vec<u8>) {
+    fn of(mut codes: &[i32], boxes: &[[usize; 4]], bits: &'a mut Vec<u8>) -> Self {
+        let mut streams = Self::new(bits, boxes);
+        for &extents in boxes {
+            let (here, after) = codes.split_at(volume(&extents));
+            streams.add(here, extents);
+            codes = after;
+        }
+        streams
+    }
+
+    /// All streams one after another, and the length of each; ends the bits.
+    fn joined(self) -> (Vec<u8>, Vec<usize>) {
         let streams: Vec<Vec<u8>> = self.significance.into_iter().chain(self.values).collect();
-        let lengths: Vec<usize> = streams.iter().map(Vec::len).collect();
-        lengths.iter().for_each(|&length| put_varint(length, out));
-        pack_segments(&streams.concat(), &lengths, out);
         self.bits.finish();
+        (streams.concat(), streams.iter().map(Vec::len).collect())
+    }
+
+    fn finish(self, out: &mut Vec<u8>) {
+        let (symbols, lengths) = self.joined();
+        lengths.iter().for_each(|&length| put_varint(length, out));
+        pack_segments(&symbols, &lengths, out);
+    }
+
+    /// About how many bytes they take.
+    fn estimate(self) -> usize {
+        let (symbols, lengths) = self.joined();
+        lengths.len() + estimate_segments(&symbols, &lengths)
     }
 
     /// A box.

@@ -127,3 +127,15 @@ fn boxes() -> impl Strategy<Value = (Vec<[usize; 4]>, Vec<i32>)> {
         (Just(boxes), prop::collection::vec(code, total))
     })
 }
+
+#[test]
+fn estimates_are_close_to_what_is_packed() {
+    let scramble = |i: usize| (i as u32).wrapping_mul(0x9E37_79B1) >> 12;
+    for rare in [2, 9, 60] {
+        let code = |i: usize| if scramble(i) % rare == 0 { (scramble(i + 7) % 9) as i32 - 4 } else { 0 };
+        let codes: Vec<i32> = (0..24 * 20 * 18 * 8).map(code).collect();
+        let boxes = [[24, 20, 18, 5], [24, 20, 18, 3]];
+        let (estimate, exact) = (estimate_cells(&codes, &boxes), packed(&codes, &boxes).len());
+        assert!(estimate.abs_diff(exact) < exact / 50 + 100, "{estimate} for {exact}");
+    }
+}

@@ -1,0 +1,118 @@
+//! About how many bytes a box of samples takes with a pyramid. No bytes are made, and few series compared.
+
+use super::WindowCodec;
+use super::encode::clear;
+use super::load::Missing;
+use super::pyramid::Passes;
+use super::real::Real;
+use super::refine::Source;
+use super::weigh::Weighing;
+use wavesplat_format::{Pyramid, estimate_cells};
+
+/// A box of samples, and the nodes that pyramids refine: the same for all schemes with one transform along time.
+pub(crate) struct Trial<'a, R> {
+    size: [usize; 3],
+    samples: &'a [u8],
+    missing: Missing,
+    weighing: Option<Weighing>,
+    nodes: Vec<R>,
+}
+
+/// What trials reuse.
+#[derive(Default)]
+pub(crate) struct Scratch<R> {
+    field: Vec<R>,
+    codes: Vec<i32>,
+}
+
+impl<'a, R: Real> Trial<'a, R> {
+    pub(crate) fn new(codec: &WindowCodec, size: [usize; 3], samples: &'a [u8]) -> Self {
+        let missing = Missing::find(codec, samples);
+        let weighing = Weighing::of(codec, samples, missing.magnitude);
+        let mut nodes = Vec::new();
+        if let Some(weighing) = &weighing {
+            Source { codec, size, samples, missing: &missing }.load(weighing, &mut nodes);
+        }
+        Self { size, samples, missing, weighing, nodes }
+    }
+
+    /// Voxels of the box.
+    pub(crate) fn voxels(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// About how many bytes the box takes; those of missing samples, which are always the same, are left out.
+    pub(crate) fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
+        self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
+    }
+
+    /// None if the box must be stored exactly.
+    fn coded(
+        &self,
+        codec: &WindowCodec,
+        pyramid: &Pyramid,
+        Scratch { field, codes }: &mut Scratch<R>,
+    ) -> Option<usize> {
+        let source = Source { codec, size: self.size, samples: self.samples, missing: &self.missing };
+        let weighing = self.weighing.as_ref()?;
+        let step = source.step::<R>(pyramid, weighing)?;
+        clear(field).extend_from_slice(&self.nodes);
+        codes.resize(field.len(), 0);
+        let passes = Passes::new(pyramid, codec.shape(self.size));
+        if !passes.encode(step, field, codes) {
+            return None;
+        }
+        let outliers = source.estimate_outliers(weighing, field);
+        let parts = (0..).zip(codec.part_ranges(self.size));
+        let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
+        // Where there are too many, all is stored exactly; the fewer, the nearer is a step that does.
+        let rest = if source.few(outliers) { packed } else { self.samples.len() };
+        Some(rest + outliers * (GAP + codec.sample.size()))
+    }
+}
+
+/// Bytes of the place of an outlier, and what packing its sample saves: about as many.
+const GAP: usize = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bound::{Bound, Promise};
+    use crate::codec::encode::Encoder;
+    use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
+    use crate::sample::{self, SampleType};
+    use wavesplat_format::BlockId;
+
+    const SIZE: [usize; 3] = [20, 18, 16];
+    const FRAMES: usize = 16;
+
+    /// Waves, and a little noise.
+    fn samples() -> Vec<u8> {
+        let noise = |i: usize| f64::from((i as u32).wrapping_mul(0x9E37_79B1) >> 16) / 65536.0 - 0.5;
+        let voxels: usize = SIZE.iter().product();
+        let value = |i: usize| ((i % 20) as f64 / 5.0 + (i / voxels) as f64 / 9.0).sin() + 0.02 * noise(i);
+        let values: Vec<f64> = (0..voxels * FRAMES).map(value).collect();
+        let mut bytes = vec![0; 4 * values.len()];
+        sample::store(SampleType::F32, &values, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn estimates_are_close_to_what_is_stored() {
+        let (samples, xyz) = (samples(), [Axis::X, Axis::Y, Axis::Z]);
+        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyz[..]), (Basis::Samples, 1.0, &xyz[..])] {
+            let (order, stencil) = (order.to_vec(), Stencil::Cubic);
+            let pyramid = Pyramid { order, stencil, growth: 1.5, most: 3.0, single: true };
+            let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
+            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, promise, 32);
+            let mut encoder = Encoder::new(3).expect("a usual level");
+            let id = BlockId { window: 0, block: 0, channel: 0 };
+            let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
+            let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
+            let trial = Trial::<f32>::new(&codec, SIZE, &samples);
+            let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
+            assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
+        }
+    }
+}
