@@ -85,10 +85,9 @@ impl<'a> Field<'a> {
     /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients
     /// give.
     pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
-        let only = basis.only(&self.marked);
-        let basis = only.as_deref().unwrap_or(basis);
-        let ks = (0..self.marked.len()).filter(|k| only.is_none() || self.marked[*k]).collect();
-        let mut run = Run::new(basis, ks);
+        let used = Used::of(basis, &self.marked);
+        let basis = used.basis(basis);
+        let mut run = Run::new(basis, &used.ks);
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
             run.load(self, voxels, (first, count));
@@ -117,13 +116,32 @@ impl<'a> Field<'a> {
     }
 }
 
+/// The coefficients that a block uses, and what gives series from them.
+pub(super) struct Used {
+    pub(super) ks: Vec<usize>,
+    basis: Option<Box<dyn TimeBasis>>,
+}
+
+impl Used {
+    /// All coefficients of unmarked k are zero.
+    pub(super) fn of(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
+        let basis = basis.only(marked);
+        let ks = (0..marked.len()).filter(|k| basis.is_none() || marked[*k]).collect();
+        Self { ks, basis }
+    }
+
+    pub(super) fn basis<'a>(&'a self, all: &'a dyn TimeBasis) -> &'a dyn TimeBasis {
+        self.basis.as_deref().unwrap_or(all)
+    }
+}
+
 /// Voxels whose series are decoded together: so many that what they need of each plane are whole cache lines.
 const RUN: usize = 128;
 
 /// The series of a run of voxels, [`LANES`] by [`LANES`].
-struct Run {
+struct Run<'a> {
     /// Which coefficients.
-    ks: Vec<usize>,
+    ks: &'a [usize],
     /// `[voxels / LANES][of ks]`
     coefficients: Vec<Lane>,
     /// `[voxels / LANES][frame]`
@@ -132,8 +150,8 @@ struct Run {
     row: [f64; RUN],
 }
 
-impl Run {
-    fn new(basis: &dyn TimeBasis, ks: Vec<usize>) -> Self {
+impl<'a> Run<'a> {
+    fn new(basis: &dyn TimeBasis, ks: &'a [usize]) -> Self {
         let lanes = |each: usize| vec![Lane::default(); RUN / LANES * each];
         Self { coefficients: lanes(ks.len()), series: lanes(basis.frames()), row: [0.0; RUN], ks }
     }

@@ -2,6 +2,7 @@
 
 use super::check::{Compared, Tally};
 use super::encode::clear;
+use super::field::Used;
 use super::load::{Missing, load_group};
 use super::pyramid::Passes;
 use super::real::Real;
@@ -131,9 +132,9 @@ impl Source<'_> {
 
     /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
     fn check_series<R: Real>(&self, weighing: &Weighing, field: &[R]) -> Option<Tally> {
-        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
+        let (mut tally, mut group, used) = (Tally::new(), Group::new(self.codec), self.used(field));
         for (first, count) in lane_groups(self.voxels()) {
-            self.decode_group(weighing, field, (first, count), &mut group);
+            self.decode_group(weighing, (field, &used), (first, count), &mut group);
             self.check(&group, (first, count), &mut tally)?;
         }
         Some(tally)
@@ -143,20 +144,28 @@ impl Source<'_> {
     fn decode_group<R: Real>(
         &self,
         weighing: &Weighing,
-        field: &[R],
+        (field, used): (&[R], &Used),
         (first, count): (usize, usize),
         group: &mut Group,
     ) {
         let (codec, voxels) = (self.codec, self.voxels());
         load_group(codec, weighing, self.samples, self.missing, first, count, group);
-        for (k, lane) in group.coefficients.iter_mut().enumerate() {
+        let coefficients = &mut group.coefficients[..used.ks.len()];
+        for (k, lane) in used.ks.iter().zip(&mut *coefficients) {
             let nodes = &field[k * voxels + first..][..count];
             match nodes.first_chunk::<LANES>() {
                 Some(nodes) => *lane = nodes.map(R::to_f64),
                 None => lane.iter_mut().zip(nodes).for_each(|(c, node)| *c = node.to_f64()),
             }
         }
-        codec.basis.inverse(&mut group.coefficients, &mut group.decoded);
+        used.basis(codec.basis.as_ref()).inverse(coefficients, &mut group.decoded);
+    }
+
+    /// The coefficients along time that the field has.
+    fn used<R: Real>(&self, field: &[R]) -> Used {
+        let of_k = field.chunks_exact(self.voxels());
+        let marked: Vec<bool> = of_k.map(|nodes| nodes.iter().any(|node| *node != R::default())).collect();
+        Used::of(self.codec.basis.as_ref(), &marked)
     }
 
     /// About how many samples miss the bound: a few of the series are looked at.
@@ -164,9 +173,9 @@ impl Source<'_> {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
             return 0;
         }
-        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
+        let (mut tally, mut group, used) = (Tally::new(), Group::new(self.codec), self.used(field));
         for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
-            self.decode_group(weighing, field, (first, count), &mut group);
+            self.decode_group(weighing, (field, &used), (first, count), &mut group);
             self.add(&group, (first, count), &mut tally);
         }
         tally.places.len() * LOOKED_AT
