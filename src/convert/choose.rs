@@ -206,7 +206,7 @@ impl Chooser<'_> {
             found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
-            let coarseness = if self.promise.measure() == Measure::Largest { 1.0 } else { self.coarseness(2.0) };
+            let coarseness = self.coarseness(1.0);
             let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
             found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
         }
@@ -241,11 +241,11 @@ impl Chooser<'_> {
         normal && self.promise.delta >= self.magnitude * SINGLE
     }
 
-    /// Steps under a bound of means are chosen for dropping coefficients, too ([`Promise::step`]).
-    fn coarseness(&self, coarseness: f64) -> f64 {
+    /// Steps under a bound of means leave room for dropping coefficients, too ([`Promise::step`]).
+    fn coarseness(&self, of_largest: f64) -> f64 {
         match self.promise.measure() {
-            Measure::Largest => coarseness,
-            Measure::RootMeanSquare => 1.4 * coarseness,
+            Measure::Largest => of_largest,
+            Measure::RootMeanSquare => COARSE_OF_MEANS,
         }
     }
 
@@ -335,6 +335,9 @@ const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
 
 /// The step of learned functions that is tried first, in units of the one for which rounding alone keeps the promise.
 const COARSE: f64 = 3.92;
+
+/// The same under a bound of means, of any basis: begun further from the best, a family is given up that would win.
+const COARSE_OF_MEANS: f64 = 2.8;
 
 /// Steps grow, or shrink, by this as long as it pays.
 const COARSER: f64 = 1.4;
