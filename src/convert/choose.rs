@@ -111,8 +111,8 @@ impl Chooser<'_> {
         let tuned = promising.map(|f| self.coarsest(f, &trials));
         let mut best = tuned.reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
         for variants in [Self::orders, Self::stencils, Self::growths] {
-            let mut others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
-            best = others.find(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
+            let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
+            best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
         Ok(best.1)
     }
