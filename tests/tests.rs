@@ -7,6 +7,7 @@ mod adversary;
 mod bounds;
 mod catalogue;
 mod certificates;
+mod choice;
 mod cli;
 mod coefficients;
 mod common;

@@ -1,0 +1,75 @@
+//! What `--basis pyramid` chooses, against every scheme there is to choose from.
+
+use crate::common::memory::Memory;
+use crate::common::random::Random;
+use crate::common::samples::bytes;
+use crate::common::{settings, stored};
+use wavesplat::codec::WindowCodec;
+use wavesplat::codec::encode::Encoder;
+use wavesplat::codec::scheme::{Axis, Basis, Pyramid, Scheme, Stencil};
+use wavesplat::sample::SampleType;
+use wavesplat::volume::Grid;
+use wavesplat_format::{BlockId, EncodedPart};
+
+const EDGE: usize = 24;
+const FRAMES: usize = 16;
+
+/// Waves that are long along one axis of x, y, z, t and short along the others.
+fn long_along(axis: usize) -> Vec<f64> {
+    let mut random = Random(axis as u64);
+    let wave = |random: &mut Random| {
+        let along: [f64; 4] = std::array::from_fn(|a| random.signed() * if a == axis { 0.05 } else { 0.5 });
+        (along, 6.0 * random.unit(), random.signed())
+    };
+    let waves: Vec<_> = (0..6).map(|_| wave(&mut random)).collect();
+    let value = |place: [usize; 4]| {
+        let of = |(along, phase, amount): &([f64; 4], f64, f64)| {
+            amount * (phase + (0..4).map(|a| along[a] * place[a] as f64).sum::<f64>()).sin()
+        };
+        waves.iter().map(of).sum()
+    };
+    let grid = Grid::unit([EDGE; 3]);
+    (0..FRAMES).flat_map(|t| grid.whole().iter().map(|[x, y, z]| value([x, y, z, t])).collect::<Vec<_>>()).collect()
+}
+
+/// Bytes of all level parts.
+fn size<'a>(parts: impl IntoIterator<Item = &'a EncodedPart>) -> usize {
+    parts.into_iter().map(|part| part.stored.len()).sum()
+}
+
+fn schemes(like: &Pyramid) -> Vec<Scheme> {
+    use Axis::{T, X, Y, Z};
+    let scheme = |order: [Axis; 4], stencil, growth, most| {
+        let pyramid = Pyramid { order: order.to_vec(), stencil, growth, most, ..like.clone() };
+        Scheme { pyramid: Some(pyramid), ..Scheme::along_time(Basis::Samples) }
+    };
+    let mut found = Vec::new();
+    for order in [[X, Y, Z, T], [Z, Y, X, T], [T, Z, Y, X]] {
+        for stencil in [Stencil::Linear, Stencil::Cubic] {
+            found.extend([(1.0, 1.0), (1.5, 3.0), (2.0, 4.0)].map(|(g, m)| scheme(order, stencil, g, m)));
+        }
+    }
+    found
+}
+
+#[test]
+fn what_is_chosen_is_nearly_the_smallest_that_there_is() {
+    for axis in 0..4 {
+        for tolerance in [1e-2, 1e-3] {
+            let samples = bytes(SampleType::F32, &long_along(axis));
+            let grid = Grid::unit([EDGE; 3]);
+            let mut memory = Memory::new(grid, SampleType::F32, samples.clone());
+            let file = stored(&mut memory, &settings(Basis::Samples, FRAMES, tolerance)).open();
+            let (window, codec) = (&file.metadata().windows[0], file.codec(0).unwrap());
+            let mut encoder = Encoder::new(3).unwrap();
+            let mut coded = |scheme: Scheme| {
+                let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.promise, EDGE);
+                let id = BlockId { window: 0, block: 0, channel: 0 };
+                size(&encoder.block(&codec, id, [EDGE; 3], &samples).unwrap().block.parts)
+            };
+            let chosen = coded(Scheme::of_window(window));
+            let least = schemes(window.pyramid.as_ref().unwrap()).into_iter().map(&mut coded).min().unwrap();
+            assert!(chosen * 100 <= least * 105, "long along {axis}, {tolerance}: {chosen} for {least} bytes");
+        }
+    }
+}
