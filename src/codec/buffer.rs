@@ -52,6 +52,12 @@ fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Vec<T>>> {
     T::spare().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Without what it held.
+pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
+    buffer.clear();
+    buffer
+}
+
 /// A type of which there are buffers.
 pub trait Pooled: Copy + Default + 'static {
     /// The buffers that nobody uses.

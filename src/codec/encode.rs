@@ -1,5 +1,6 @@
 //! Samples of one block to a coded block that keeps its promise.
 
+use super::buffer::clear;
 use super::check::Tally;
 use super::load::{Missing, load_group};
 use super::pyramid::Passes;
@@ -195,11 +196,6 @@ impl Encoded {
         let outliers = count(|kind| kind == PartKind::Outliers);
         Self { block, share, coded, outliers, missing }
     }
-}
-
-pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
-    buffer.clear();
-    buffer
 }
 
 /// The count, energy and largest of coefficients.

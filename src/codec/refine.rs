@@ -1,7 +1,7 @@
 //! The samples of a block coded by a pyramid: to a field of coefficients, through the passes, and compared.
 
+use super::buffer::clear;
 use super::check::{Compared, Tally};
-use super::encode::clear;
 use super::field::Used;
 use super::load::{Missing, load_group};
 use super::pyramid::Passes;

@@ -1,7 +1,7 @@
 //! About how many bytes a box of samples takes with a pyramid. No bytes are made, and few series compared.
 
 use super::WindowCodec;
-use super::encode::clear;
+use super::buffer::clear;
 use super::load::Missing;
 use super::pyramid::Passes;
 use super::real::Real;
