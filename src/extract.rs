@@ -1,7 +1,6 @@
 //! A coefficient file back to samples: any frames, any region, without reading the rest.
 
 use crate::codec::WindowCodec;
-use crate::codec::buffer::Buffer;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
 use crate::memory;
@@ -52,8 +51,9 @@ pub fn extract(
     progress.start(Some(config.frames.len() as u64));
     let mut report = ExtractReport::default();
     let pieces = Pieces::new(file, config)?;
+    let mut bytes = Vec::new();
     for piece in pieces.list(file, config) {
-        let bytes = read_piece(file, &piece, pieces.blocks, &mut report)?;
+        read_piece(file, &piece, pieces.blocks, &mut bytes, &mut report)?;
         out.write_all(&bytes).map_err(|e| Error::io(name, "writing", e))?;
         report.bytes += bytes.len() as u64;
         if piece.region.end[2] == config.region.end[2] {
@@ -111,18 +111,25 @@ impl Pieces {
     }
 }
 
-/// Bytes that decoding one block takes.
+/// Bytes that decoding one block takes: as it is read and refined, and its samples.
 fn block_bytes(file: &CoefficientFile) -> usize {
-    file.largest_block() * (4 + 5 + 2 * file.sample().size())
+    file.block_bytes() + file.largest_block() * file.sample().size()
 }
 
-fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mut ExtractReport) -> Result<Buffer<u8>> {
+/// Fills `out` with the samples of a piece.
+fn read_piece(
+    file: &CoefficientFile,
+    piece: &Piece,
+    at_once: usize,
+    out: &mut Vec<u8>,
+    report: &mut ExtractReport,
+) -> Result<()> {
     let codec = file.codec(piece.window)?;
     let first = file.window_range(piece.window).start;
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
-    let mut out = Buffer::of(frames.len() * piece.region.voxels() * size);
+    out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
     for entries in file.entries(piece.window, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let decode =
@@ -130,13 +137,13 @@ fn read_piece(file: &CoefficientFile, piece: &Piece, at_once: usize, report: &mu
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);
-                copy_block(&codec, &frames, &region, &samples, &piece.region, &mut out);
+                copy_block(&codec, &frames, &region, &samples, &piece.region, out);
                 report.blocks_read += 1;
                 report.bytes_read += bytes_read;
             }
         }
     }
-    Ok(out)
+    Ok(())
 }
 
 /// Copies the rows that a block and the piece share.

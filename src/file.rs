@@ -82,6 +82,13 @@ impl CoefficientFile {
         self.blocks.region(0).voxels() * longest
     }
 
+    /// Bytes that the largest block takes as it is read and refined: payload, codes, coefficients, what is missing, and
+    /// what is stored exactly.
+    pub fn block_bytes(&self) -> usize {
+        let payload = 5;
+        self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
+    }
+
     /// The window that holds a frame.
     pub fn window_of(&self, frame: usize) -> u32 {
         self.metadata().windows.partition_point(|w| w.first_frame as usize <= frame) as u32 - 1

@@ -47,9 +47,10 @@
 //!
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
-//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions over slices: no
-//!    I/O, no threads, no clocks. Threads live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`,
-//!    `extract.rs` and `verify.rs`.
+//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions
+//!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
+//!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`, `extract.rs` and
+//!    `verify.rs`.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and

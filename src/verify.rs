@@ -105,8 +105,8 @@ pub fn verify(
     if let Some(source) = &source {
         same_shape(file, *source)?;
     }
-    // Codes and payload; source and decoded, as samples in their type and as numbers.
-    let block_bytes = file.largest_block() * (4 + 5 + 2 * (file.sample().size() + 8));
+    // The source's, those that are extracted and those that are splatted, as samples in their type and as numbers.
+    let block_bytes = file.block_bytes() + file.largest_block() * (2 * file.sample().size() + 3 * size_of::<f64>());
     let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
     file.check_structure()?;
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };

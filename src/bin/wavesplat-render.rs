@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use wavesplat::bound::range_bound;
 use wavesplat::camera::View;
-use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole};
+use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
@@ -132,7 +132,7 @@ enum QuantityName {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ErrorName {
-    /// The largest of any pixel, for sure
+    /// The largest of any sample, for sure
     Certified,
     /// The root mean square over the pixels, as it is estimated
     Expected,
@@ -192,6 +192,8 @@ impl Cli {
     /// Where pictures go, and where those of their errors go.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Sink, Option<Sink>)> {
         let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
+        let outputs = [Some(&self.output), self.error_image.as_ref()].into_iter().flatten();
+        outputs.into_iter().try_for_each(|output| spare_inputs(&self.inputs, output))?;
         let of_errors = self.error_image.as_deref().map(|path| Ok((path, format_of(path)?))).transpose()?;
         let own = |path: &Path| path != self.output && path != Path::new(STANDARD);
         if !self.error_image.as_deref().is_none_or(own) {

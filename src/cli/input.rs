@@ -6,7 +6,7 @@ use crate::mapped::Access;
 use crate::sample::SampleType;
 use crate::source::{self, FrameSource, OpenOptions, Selection};
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The order of a sample's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -107,4 +107,29 @@ pub fn narrow(
     let (first, step, count) = frames.unwrap_or_else(all).resolve(archive.frames)?;
     let region = region.map_or(Ok(archive.grid.whole()), |r| r.resolve(&archive.grid))?;
     source::select(source, Selection { first, step, frames: count, region })
+}
+
+/// An error if writing `output`, which may be a numbered name, would replace what is read: one of the inputs, or a frame
+/// beside them. `--force` is not for that.
+pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
+    let real = |path: &Path| path.canonicalize().ok();
+    let folder = |path: &Path| real(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+    let numbered = output.to_string_lossy().contains('%');
+    let may_be_frame = !matches!(output.extension().and_then(|e| e.to_str()), Some("wspl" | "png" | "y4m"));
+    let beside = |input: &Path| {
+        let inputs = if input.is_dir() { real(input) } else { folder(input) };
+        let several = input.is_dir() || !input.exists();
+        may_be_frame && several && inputs.is_some() && inputs == folder(output)
+    };
+    let replaces = |input: &PathBuf| {
+        let same = real(input).is_some_and(|input| Some(input) == real(output));
+        same && output.is_file() || (numbered || output.is_file()) && beside(input)
+    };
+    match inputs.iter().find(|input| replaces(input)) {
+        Some(input) => {
+            let (output, input) = (output.display(), input.display());
+            Err(Error::usage(format!("{output}: would replace what is read from {input}; name another output")))
+        }
+        None => Ok(()),
+    }
 }

@@ -142,7 +142,7 @@ impl Seen {
         seen
     }
 
-    /// The slow twin of vector code.
+    /// Any type under any bound; the slow twin of the vector code for floats.
     fn under_any_bound(codec: &WindowCodec, compared: &Compared<'_>, declared: f64) -> Self {
         let mut seen = Self::nothing();
         for (decoded, source) in compared.decoded.iter().zip(compared.source) {

@@ -58,8 +58,14 @@ impl Encoder {
         let block = Source { codec, size, samples, missing: &missing };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
-            Some(pyramid) if pyramid.single => block.refine(pyramid, &mut self.single, &mut self.codes),
-            Some(pyramid) => block.refine(pyramid, &mut self.double, &mut self.codes),
+            Some(pyramid) if pyramid.single => {
+                self.double = Default::default(); // of a window before, if any
+                block.refine(pyramid, &mut self.single, &mut self.codes)
+            }
+            Some(pyramid) => {
+                self.single = Default::default();
+                block.refine(pyramid, &mut self.double, &mut self.codes)
+            }
         };
         let coded = match coded {
             Some(coded) => self.coded_parts(&block, &coded)?,

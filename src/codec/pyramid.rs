@@ -47,16 +47,21 @@ impl<'a> Passes<'a> {
     /// Codes to the field; `codes` are all of the block's, pass after pass. Returns of which k some node is not zero, or
     /// true for all of them where k is refined.
     pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) -> Vec<bool> {
-        let each = self.slices(field).enumerate().map(|(slice, nodes)| {
-            let some = self.of_slice(slice).any(|(_, range)| !rows::all_zero(&codes[range]));
-            if some {
+        let marked = self.marked(codes);
+        for (slice, nodes) in self.slices(field).enumerate() {
+            if marked[slice] {
                 self.decode_slice(slice, step, codes, nodes);
             } else {
                 nodes.fill(R::default());
             }
-            std::iter::repeat_n(some, self.shape[3])
-        });
-        each.flatten().collect()
+        }
+        marked
+    }
+
+    /// Of which k some code is not zero, or of all of them where k is refined.
+    pub(crate) fn marked(&self, codes: &[i32]) -> Vec<bool> {
+        let some = |slice| self.of_slice(slice).any(|(_, range)| !rows::all_zero(&codes[range]));
+        (0..self.slices).flat_map(|slice| std::iter::repeat_n(some(slice), self.shape[3])).collect()
     }
 
     fn decode_slice<R: Real>(&self, slice: usize, step: f64, codes: &[i32], nodes: &mut [R]) {

@@ -56,7 +56,11 @@ impl Source<'_> {
         if !passes.encode(step, field, codes) {
             return None;
         }
-        let mut tally = if self.plain() { self.check_samples(field)? } else { self.check_series(&weighing, field)? };
+        let mut tally = if self.plain() {
+            self.check_samples(field)?
+        } else {
+            self.check_series(&weighing, field, &passes.marked(codes))?
+        };
         let outliers = tally.take_outliers(self.codec, self.samples);
         let changes = Some(passes.changes_of_coded(codes, field, rest));
         Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
@@ -114,6 +118,9 @@ impl Source<'_> {
     fn check_samples<R: Real>(&self, field: &[R]) -> Option<Tally> {
         let (mut tally, mut decoded) = (Tally::new(), Vec::new());
         sample::for_each_run(self.codec.sample, self.samples, |first, values| {
+            if !self.few(tally.places.len()) {
+                return;
+            }
             clear(&mut decoded).extend(field[first..][..values.len()].iter().map(|node| node.to_f64()));
             let (source, last_source) = values.as_chunks::<LANES>();
             let (whole, last_whole) = decoded.as_chunks::<LANES>();
@@ -131,8 +138,9 @@ impl Source<'_> {
     }
 
     /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
-    fn check_series<R: Real>(&self, weighing: &Weighing, field: &[R]) -> Option<Tally> {
-        let (mut tally, mut group, used) = (Tally::new(), Group::new(self.codec), self.used(field));
+    fn check_series<R: Real>(&self, weighing: &Weighing, field: &[R], marked: &[bool]) -> Option<Tally> {
+        let used = Used::of(self.codec.basis.as_ref(), marked);
+        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()) {
             self.decode_group(weighing, (field, &used), (first, count), &mut group);
             self.check(&group, (first, count), &mut tally)?;
@@ -161,19 +169,13 @@ impl Source<'_> {
         used.basis(codec.basis.as_ref()).inverse(coefficients, &mut group.decoded);
     }
 
-    /// The coefficients along time that the field has.
-    fn used<R: Real>(&self, field: &[R]) -> Used {
-        let of_k = field.chunks_exact(self.voxels());
-        let marked: Vec<bool> = of_k.map(|nodes| nodes.iter().any(|node| *node != R::default())).collect();
-        Used::of(self.codec.basis.as_ref(), &marked)
-    }
-
     /// About how many samples miss the bound: a few of the series are looked at.
-    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R]) -> usize {
+    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R], marked: &[bool]) -> usize {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
             return 0;
         }
-        let (mut tally, mut group, used) = (Tally::new(), Group::new(self.codec), self.used(field));
+        let used = Used::of(self.codec.basis.as_ref(), marked);
+        let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
             self.decode_group(weighing, (field, &used), (first, count), &mut group);
             self.add(&group, (first, count), &mut tally);

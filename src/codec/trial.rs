@@ -62,7 +62,7 @@ impl<'a, R: Real> Trial<'a, R> {
         if !passes.encode(step, field, codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field);
+        let outliers = source.estimate_outliers(weighing, field, &passes.marked(codes));
         let parts = (0..).zip(codec.part_ranges(self.size));
         let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
         // Where there are too many, all is stored exactly; the fewer, the nearer is a step that does.
@@ -99,9 +99,9 @@ mod tests {
 
     #[test]
     fn estimates_are_close_to_what_is_stored() {
-        let (samples, xyz) = (samples(), [Axis::X, Axis::Y, Axis::Z]);
+        let (samples, xyzt) = (samples(), [Axis::X, Axis::Y, Axis::Z, Axis::T]);
         let promise = Promise { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
-        for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyz[..]), (Basis::Samples, 1.0, &xyz[..])] {
+        for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
             let (order, stencil) = (order.to_vec(), Stencil::Cubic);
             let pyramid = Pyramid { order, stencil, growth: 1.5, most: 3.0, single: true };
             let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };

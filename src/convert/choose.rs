@@ -8,6 +8,7 @@ use crate::codec::real::Real;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use crate::codec::trial::{Scratch, Trial};
 use crate::error::{Error, Result};
+use crate::sample::SampleType;
 use crate::source::{Archive, FrameWindow, read_frames};
 use crate::volume::Region;
 use crate::wavelet::Basis;
@@ -46,6 +47,17 @@ impl From<Basis> for Coding {
     }
 }
 
+/// Samples that are looked at together: as many as a block of `block` samples has, and more where it is small.
+pub(super) fn most_samples(block: usize) -> usize {
+    block.max(FEW_SAMPLES)
+}
+
+/// Bytes that a choice takes: the samples, and for each of two transforms the nodes and which are missing; and what a
+/// trial of them takes.
+pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
+    most_samples(block) * (sample.size() + 2 * (size_of::<f64>() + 1) + size_of::<f64>() + size_of::<i32>())
+}
+
 /// What a choice rests on.
 pub(super) struct Chooser<'a> {
     pub(super) config: &'a ConvertConfig,
@@ -54,6 +66,8 @@ pub(super) struct Chooser<'a> {
     pub(super) promise: Promise,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
+    /// [`most_samples`]
+    pub(super) most: usize,
     /// What the window before was coded with, if the choice may begin there.
     pub(super) before: Option<&'a Scheme>,
 }
@@ -168,13 +182,16 @@ impl Chooser<'_> {
         (self.bytes(&scheme, trials), scheme)
     }
 
-    /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes.
+    /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes; together at most as much as a block.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
         let whole: usize = dims.iter().product();
-        let edge = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
-        let size = dims.map(|n| n.min(edge));
-        let count = (whole / SHARE / size.iter().product::<usize>()).clamp(LEAST_BOXES, MOST_BOXES);
+        let largest = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
+        let samples = |size: [usize; 3]| size.iter().product::<usize>() * self.window.frames();
+        let sizes = (1..=largest).rev().map(|edge| dims.map(|n| n.min(edge)));
+        let size = sizes.into_iter().find(|size| LEAST_BOXES * samples(*size) <= self.most).unwrap_or([1; 3]);
+        let count = whole / SHARE / size.iter().product::<usize>();
+        let count = count.clamp(LEAST_BOXES, MOST_BOXES).min(self.most / samples(size)).max(1);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
@@ -223,7 +240,8 @@ impl Chooser<'_> {
     /// Learned from rows all over the volume, not from the boxes that they are then tried on.
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
-        let rows: Result<Vec<Sampled>> = (0..ROWS).map(|i| self.sampled(LEARNING + i, size)).collect();
+        let rows = ROWS.min(self.most / (size[0] * self.window.frames())).max(1);
+        let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.sampled(LEARNING + i, size)).collect();
         let (ty, frames) = (self.archive.sample, self.window.frames());
         let samples = rows?;
         let samples = samples.iter().map(|row| &row.samples[..]);
@@ -299,6 +317,9 @@ fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme>
     let pyramids = best.pyramid.as_ref().map(of).unwrap_or_default();
     pyramids.into_iter().map(|pyramid| Scheme { pyramid: Some(pyramid), ..best.clone() }).collect()
 }
+
+/// Samples that can always be looked at.
+const FEW_SAMPLES: usize = 1 << 17;
 
 /// Voxels along the edge of a box that schemes are tried on.
 const EDGE: usize = 30;

@@ -1,6 +1,6 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
-use super::choose::Chooser;
+use super::choose::{Chooser, most_samples};
 use super::sampled::{self, Pixel};
 use super::{ConvertConfig, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
@@ -90,7 +90,8 @@ impl WindowReader<'_> {
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(seen.range);
         let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
-        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, before }.choose()?;
+        let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
+        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, most, before }.choose()?;
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;

@@ -219,15 +219,19 @@ impl Plan {
     }
 }
 
-/// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, and a worker's scratch.
+/// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, a worker's scratch, and what
+/// choosing the next window's scheme takes.
 fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> Result<usize> {
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
     let raw = samples * sample.size();
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
-    let field = if config.coding.space == Space::Alone { 0 } else { 2 * codes };
+    let alone = config.coding.space == Space::Alone || config.tolerance == 0.0; // then no pyramid is tried
+    let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
+    let choice = if alone { 0 } else { choose::bytes(samples, sample) };
     let scratch = samples + 2 * codes + field + raw + ZSTD_SCRATCH;
-    let needs = |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + memory::FIXED;
+    let needs =
+        |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
     let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
     let fits = (1..=enough).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
     fits.ok_or_else(|| {

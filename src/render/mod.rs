@@ -90,7 +90,7 @@ pub struct RenderConfig {
 /// An error that can be limited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Limit {
-    /// The largest of any sample, and so of any pixel.
+    /// The largest of any sample, and so of any pixel of a mean.
     #[default]
     Certified,
     /// The root mean square over the pixels of a window's pictures, as it is estimated.

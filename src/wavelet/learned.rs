@@ -90,6 +90,9 @@ impl TimeBasis for Learned {
     }
 
     fn only(&self, marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
+        if !marked.contains(&false) {
+            return None;
+        }
         let rows = self.rows.iter().zip(marked).filter(|(_, marked)| **marked).map(|(row, _)| row.clone());
         Some(Box::new(Self::of_rows(rows.collect(), self.frames)))
     }

@@ -57,7 +57,7 @@ fn the_file_does_not_depend_on_how_frames_are_stored() {
 
 #[test]
 fn a_pipe_that_spools_to_disk_gives_the_same_file() {
-    let (work, archive) = (Work::new(), Archive::smooth([40, 32, 32], 40));
+    let (work, archive) = (Work::new(), Archive::smooth([48, 40, 40], 40));
     work.write("a.npy", archive.npy());
     work.wavesplat("convert a.npy -o file.wspl --block 8").ok();
     let asked = work.piped("convert - -o pipe.wspl --block 8 --memory 1MiB", &archive.npy());

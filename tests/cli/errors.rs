@@ -49,6 +49,28 @@ fn frames_that_do_not_belong_together_give_code_3() {
 }
 
 #[test]
+fn nothing_replaces_what_is_read() {
+    let (work, archive) = (Work::with_file(""), Archive::smooth([9, 8, 7], 6));
+    archive.write_frames(&work, "frames");
+    let before = |name: &str| std::fs::read(work.path(name)).unwrap();
+    let (frame, whole, file) = (before("frames/f_3.npy"), before("a.npy"), before("a.wspl"));
+    for command in [
+        "convert a.npy -o a.npy --force",
+        "convert a.npy -o frames/../a.npy --force",
+        "convert frames -o frames/f_3.npy --force",
+        "convert frames/f_*.npy -o frames/f_3.npy --force",
+        "extract a.wspl -o a.wspl --format raw --force",
+    ] {
+        work.wavesplat(command).fails(2, &["would replace what is read"]);
+    }
+    for command in ["a.wspl -o a.wspl --format npy --force", "frames --method direct -o frames/f_%d.npy --force"] {
+        work.render(command).fails(2, &["would replace what is read"]);
+    }
+    work.wavesplat("convert frames -o frames/out.wspl --force").ok();
+    assert!(before("frames/f_3.npy") == frame && before("a.npy") == whole && before("a.wspl") == file);
+}
+
+#[test]
 fn files_that_are_not_there_give_code_1() {
     let work = Work::with_file("");
     work.wavesplat("convert absent.npy -o out.wspl").fails(1, &["absent.npy", "No such file"]);

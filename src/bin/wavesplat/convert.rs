@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, spare_inputs};
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::convert::{Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, convert};
 use wavesplat::error::{Error, Result};
@@ -138,6 +138,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;
     let config = args.config()?;
     let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
+    spare_inputs(&args.inputs, &args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
     let progress = args.common.progress("blocks");
     let report = convert(source.as_mut(), &config, &args.output, &mut out, &progress)?;

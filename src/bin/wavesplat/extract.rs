@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use wavesplat::cli::{CommonArgs, FrameList, RegionSpec};
+use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
 use wavesplat::error::{Error, Result};
 use wavesplat::extract::{ExtractConfig, check_memory, extract};
 use wavesplat::file::CoefficientFile;
@@ -62,6 +62,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
         memory: args.common.memory.0,
     };
     check_memory(&file, &config)?;
+    spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
     if format == Format::Npy {
         let [x, y, z] = config.region.dims();

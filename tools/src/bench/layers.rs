@@ -190,7 +190,8 @@ fn row(
 ) -> Row {
     let shown = || found.iter().zip(truth).filter(|(_, truth)| !truth.is_nan());
     let brightest = shown().map(|(_, truth)| f64::from(truth.abs())).fold(0.0, f64::max);
-    let off = || shown().map(|(a, b)| f64::from(a - b) / brightest);
+    let lost = |off: f64| if off.is_nan() { f64::MAX } else { off };
+    let off = || shown().map(|(a, b)| lost(f64::from(a - b) / brightest));
     Row {
         data: task.name.clone(),
         limit,
