@@ -61,7 +61,7 @@ impl Subject {
     }
 
     /// Writes the archive into a folder.
-    pub(super) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
+    pub(in crate::bench) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
         let path = folder.join(format!("{}.npy", self.name()));
         match (self.synth(), peers) {
             (Some(kind), _) => synthetic(kind, small, &path)?,
