@@ -124,6 +124,8 @@ pub struct Results {
     pub size: usize,
     /// Everything that was measured.
     pub archives: Vec<Archive>,
+    /// The names of archives that are still to be measured: of a run that was interrupted.
+    pub left: Vec<String>,
     /// Every target, and what stands beside.
     pub rows: Vec<Row>,
 }
@@ -148,40 +150,56 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
     }
     let work = config.output.join("speed-work");
     fs::create_dir_all(&work).map_err(|e| Error::io(&work, "creating the folder", e))?;
-    let bench = Bench { config, work: &work };
-    let (mut archives, mut rows) = (Vec::new(), Vec::new());
-    for subject in bench.subjects() {
+    let (bench, mut results) = (Bench { config, work: &work }, Results::new(config));
+    let subjects = bench.subjects();
+    results.left = subjects.iter().map(|s| s.path(&work)).map(|p| Data::name_of(&p)).collect();
+    results.rows = [bench.paper(say)?, bench.heap(say)?].concat();
+    for subject in subjects {
         let data = subject.data(&work, say)?;
-        let (archive, more) = bench.archive(&data, say)?;
-        rows.extend(more);
-        archives.push(archive);
+        let (archive, rows) = bench.archive(&data, say)?;
+        results.add(archive, rows);
         subject.remove(&work)?;
+        results.write(&config.output)?; // an interrupted run leaves what it has
     }
-    rows.extend(bench.paper(say)?);
-    rows.extend(bench.heap(say)?);
     fs::remove_dir_all(&work).map_err(|e| Error::io(&work, "removing", e))?;
-    let results = Results {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION").into(),
-        machine: Machine::this(),
-        date: config.date.clone().unwrap_or_else(machine::today),
-        rounds: config.repeats,
-        size: config.size,
-        archives,
-        rows,
-    };
-    let text = tables::markdown(&results);
-    write(&results, &text, &config.output)?;
+    let text = results.write(&config.output)?;
     Ok((results, text))
 }
 
-fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {
-    let json = folder.join("speed.json");
-    let text = serde_json::to_string_pretty(results).map_err(|e| super::bad_json(&json, &e))?;
-    for (path, text) in [(json, text.as_str()), (folder.join("speed.md"), tables)] {
-        fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
+impl Results {
+    /// Nothing yet.
+    fn new(config: &Config) -> Self {
+        Self {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION").into(),
+            machine: Machine::this(),
+            date: config.date.clone().unwrap_or_else(machine::today),
+            rounds: config.repeats,
+            size: config.size,
+            archives: Vec::new(),
+            left: Vec::new(),
+            rows: Vec::new(),
+        }
     }
-    Ok(())
+
+    /// Puts the rows of an archive after those of the archives before.
+    fn add(&mut self, archive: Archive, rows: Vec<Row>) {
+        let known: Vec<&String> = self.archives.iter().map(|a| &a.data.name).collect();
+        let at = self.rows.iter().rposition(|r| known.contains(&&r.data)).map_or(0, |last| last + 1);
+        self.rows.splice(at..at, rows);
+        self.left.retain(|name| *name != archive.data.name);
+        self.archives.push(archive);
+    }
+
+    /// Returns the tables.
+    fn write(&self, folder: &Path) -> Result<String> {
+        let (json, tables) = (folder.join("speed.json"), tables::markdown(self));
+        let text = serde_json::to_string_pretty(self).map_err(|e| super::bad_json(&json, &e))?;
+        for (path, text) in [(json, &text), (folder.join("speed.md"), &tables)] {
+            fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
+        }
+        Ok(tables)
+    }
 }
 
 /// An archive of the user, or one to make.

@@ -249,7 +249,7 @@ impl Judge<'_> {
         let converted = self.at(&key("convert", Some(case.file), None, case.threads))?;
         let codes = 100.0 * converted.codes_per_sample.ok_or("not reported")?;
         let note = format!("best: {name}; {codes:.1} % of codes are nonzero");
-        if own > 0.0 { Ok((best / own, note)) } else { Err("lost in the noise".into()) }
+        if own.min(best) > 0.0 { Ok((best / own, note)) } else { Err("lost in the noise".into()) }
     }
 
     /// Wall time with nothing cached of the input, if most of it did come from the storage.

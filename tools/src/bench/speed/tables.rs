@@ -40,6 +40,9 @@ fn made(results: &Results) -> String {
         let [x, y, z] = data.dims;
         let _ = write!(text, "\n- *{}*: {x}x{y}x{z} voxels, {} frames, {}", data.name, data.frames, data.samples);
     }
+    for name in &results.left {
+        let _ = write!(text, "\n- *{name}*: not measured, since the run was interrupted");
+    }
     let _ = writeln!(text, "\n\n{}", noise(results));
     text
 }
