@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
-use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity};
+use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
@@ -24,6 +24,7 @@ Examples:
   wavesplat-tools bench size --peers python3 -o sizes
   wavesplat-tools bench size mine.npy --tolerances 1e-2,1e-3
   wavesplat-tools bench layers mine.npy -o layers
+  wavesplat-tools bench speed -o speed
 
 wavesplat's own instruments: the demo, synthetic archives and the benchmark.";
 
@@ -121,6 +122,77 @@ enum OtherBench {
     Size(SizeArgs),
     /// Print what looser tolerances of pictures leave unread, and the errors: certified, expected, true
     Layers(LayersArgs),
+    /// Print how much faster views are than by the conventional method, beside what they are to reach
+    Speed(SpeedArgs),
+}
+
+#[derive(Args)]
+struct SpeedArgs {
+    /// Archives (t, z, y, x), each one .npy
+    #[arg(value_name = "INPUT.npy")]
+    inputs: Vec<PathBuf>,
+    /// What archives that are made show, with commas between them [default: smooth,moving,sparse where there are no inputs]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    kinds: Option<Vec<Kind>>,
+    /// Their sizes, with commas between them [default: 128x128x128x32,256x256x256x32,128x128x128x64]
+    #[arg(long, value_name = "NXxNYxNZxNT", value_delimiter = ',', value_parser = parse_dims)]
+    dims: Option<Vec<[usize; 4]>>,
+    /// Pixels from a voxel to the next, with commas between them
+    #[arg(long, value_name = "PX", value_delimiter = ',', default_value = "2.3,1", value_parser = parse_tolerance)]
+    spacings: Vec<f64>,
+    /// Pixels a side of the pictures [default: 512]
+    #[arg(long, value_name = "N")]
+    size: Option<usize>,
+    /// Shares of the value range, with commas between them; targets are about the first
+    #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3", value_parser = parse_tolerance)]
+    tolerances: Vec<f64>,
+    /// Numbers of threads, with commas between them
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2")]
+    threads: Vec<usize>,
+    /// Rounds through all measurements; the least time of all is taken [default: 3]
+    #[arg(long, value_name = "N")]
+    repeats: Option<usize>,
+    /// Small archives and pictures: whether everything works, in seconds
+    #[arg(long)]
+    small: bool,
+    /// Also look at the memory of converting 4 GiB and 20 GiB, which are written to the folder of results
+    #[arg(long)]
+    large: bool,
+    /// Also measure other programs: the Python that has what tools/peers/requirements.txt names
+    #[arg(long, value_name = "PYTHON")]
+    peers: Option<PathBuf>,
+    /// What Python is to run; views.py is taken from beside it [default: tools/peers/peers.py of the sources]
+    #[arg(long, value_name = "FILE", requires = "peers")]
+    script: Option<PathBuf>,
+    /// The folder of speed.json and speed.md
+    #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
+    output: PathBuf,
+    /// The day to write into the results [default: the clock's]
+    #[arg(long, value_name = "YYYY-MM-DD")]
+    date: Option<String>,
+}
+
+impl SpeedArgs {
+    fn config(&self) -> Result<speed::Config> {
+        let script = || self.script.clone().unwrap_or_else(Peers::usual_script);
+        let usual = if self.inputs.is_empty() { speed::KINDS.to_vec() } else { Vec::new() };
+        let sizes = if self.small { &speed::SMALL } else { &speed::USUAL };
+        Ok(speed::Config {
+            inputs: self.inputs.clone(),
+            kinds: self.kinds.clone().unwrap_or(usual),
+            dims: self.dims.clone().unwrap_or(sizes.dims.to_vec()),
+            spacings: self.spacings.clone(),
+            size: self.size.unwrap_or(sizes.size),
+            tolerances: self.tolerances.clone(),
+            threads: self.threads.clone(),
+            repeats: self.repeats.unwrap_or(sizes.repeats),
+            large: if self.large { sizes.large.to_vec() } else { Vec::new() },
+            peers: self.peers.clone().map(|python| Peers { python, script: script() }),
+            output: self.output.clone(),
+            program: this_program()?,
+            date: self.date.clone(),
+        })
+    }
 }
 
 #[derive(Args)]
@@ -270,6 +342,11 @@ fn bench_layers(args: &LayersArgs) -> Result<()> {
     Err(Error::BoundMissed { path: args.output.clone(), what: wrong.join("\n") })
 }
 
+fn bench_speed(args: &SpeedArgs) -> Result<()> {
+    let (_, tables) = speed::run(&args.config()?, &mut say)?;
+    wavesplat::cli::print(&tables)
+}
+
 fn bench(args: &BenchArgs) -> Result<()> {
     let program = this_program()?;
     let (output, date) = (args.output.clone(), args.date.clone());
@@ -295,6 +372,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => match &args.other {
             Some(OtherBench::Size(args)) => bench_size(args),
             Some(OtherBench::Layers(args)) => bench_layers(args),
+            Some(OtherBench::Speed(args)) => bench_speed(args),
             None => bench(&args),
         },
         Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),

@@ -15,6 +15,7 @@
 //! report    results.json and results.md;  plot, chart: the figures
 //! size      another benchmark: sizes under a hard bound, and times, beside other coders
 //! layers    another: what a looser tolerance of a picture leaves unread, and the errors
+//! speed     another: views from files beside the conventional method, and what they are to reach
 //! ```
 //!
 //! Errors are shares of the archive's value range throughout.
@@ -31,6 +32,7 @@ pub mod point;
 mod report;
 pub mod sanity;
 pub mod size;
+pub mod speed;
 mod stages;
 mod step;
 mod textbook;

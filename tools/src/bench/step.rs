@@ -4,6 +4,7 @@
 use super::layers;
 use super::look::Look;
 use super::size::own;
+use super::speed::work;
 use super::stages;
 use super::truth::ImageError;
 use serde::de::DeserializeOwned;
@@ -19,6 +20,7 @@ pub(super) enum Step {
     Render(Render),
     Size(own::Task),
     Layers(layers::Task),
+    Speed(work::Task),
 }
 
 /// Frames to a coefficient file.
@@ -111,6 +113,7 @@ pub fn run_step(text: &str) -> Result<String> {
         Step::Render(step) => answer(stages::render(&step)?),
         Step::Size(task) => answer(own::measure(&task)?),
         Step::Layers(task) => answer(layers::measure(&task)?),
+        Step::Speed(task) => answer(work::measure(&task)?),
     }
     .map_err(wrong)
 }

@@ -1,6 +1,6 @@
 //! The conventional method as textbooks have it (Westover, Footprint Evaluation for Volume Rendering, 1990): the
 //! projected kernel is computed once into a table of 32 x 32 positions within a pixel; then every frame adds, for
-//! each of its voxels, value times table to the picture.
+//! each of its voxels in the picture, value times table to the picture.
 //!
 //! Where voxels are in the picture is computed once a view. Voxels of value 0 add nothing and are passed over. All
 //! is f32. Frames are rendered in parallel, each by one thread. There is no attenuation: weights do not depend on depth.
@@ -46,6 +46,9 @@ fn samples(bytes: &[u8]) -> Vec<f32> {
     bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
 }
 
+/// The start of a voxel that is outside of the picture, and so is passed over.
+const OUTSIDE: u32 = u32::MAX;
+
 /// All that is the same for every frame of a view.
 struct Splatter {
     table: Table,
@@ -70,7 +73,9 @@ impl Splatter {
             let part = |c: f64| ((c - c.floor()) * POSITIONS as f64) as usize;
             // The margin is as wide as a footprint reaches, so that column 0 is where that of pixel 0 begins.
             let start = y.floor() as usize * width + x.floor() as usize;
-            Place { start: start as u32, footprint: (part(y) * POSITIONS + part(x)) as u32 }
+            let inside = [x, y].iter().all(|c| (0.0..look.size as f64).contains(c));
+            let footprint = (part(y) * POSITIONS + part(x)) as u32;
+            Place { start: if inside { start as u32 } else { OUTSIDE }, footprint }
         };
         Ok(Self { places: grid.whole().iter().map(place).collect(), table, size: look.size })
     }
@@ -79,7 +84,7 @@ impl Splatter {
     fn splat(&self, values: &[f32]) -> Vec<f32> {
         let (side, width) = (self.table.side, self.size + self.table.side);
         let mut picture = vec![0.0; width * width];
-        for (place, value) in self.places.iter().zip(values).filter(|(_, value)| **value != 0.0) {
+        for (place, value) in self.places.iter().zip(values).filter(|(p, v)| **v != 0.0 && p.start != OUTSIDE) {
             let footprint = self.table.footprint(place.footprint as usize);
             for (row, weights) in footprint.chunks_exact(side).enumerate() {
                 let line = &mut picture[place.start as usize + row * width..][..side];

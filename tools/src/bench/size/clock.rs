@@ -1,9 +1,8 @@
 //! Processor time of this process on one core, all its threads together: what a busy neighbour disturbs least.
 
 /// Keeps this process, and the workers of the library, to one core. To be called before any thread is started.
-pub(super) fn stay_on_one_core() {
-    // A pool that exists already is one of the tests'; times are not judged there.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).build_global();
+pub(in crate::bench) fn stay_on_one_core() {
+    work_with(1);
     #[cfg(target_os = "linux")]
     if let Ok(allowed) = rustix::thread::sched_getaffinity(None)
         && let Some(first) = (0..rustix::thread::CpuSet::MAX_CPU).find(|core| allowed.is_set(*core))
@@ -14,16 +13,22 @@ pub(super) fn stay_on_one_core() {
     }
 }
 
+/// Gives the library so many workers. To be called before any thread is started.
+pub(in crate::bench) fn work_with(threads: usize) {
+    // A pool that exists already is one of the tests'; times are not judged there.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+}
+
 /// Seconds of processor time so far.
 #[cfg(target_os = "linux")]
-fn seconds() -> f64 {
+pub(in crate::bench) fn seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
 /// Seconds of the clock: elsewhere the processor's are not asked for.
 #[cfg(not(target_os = "linux"))]
-fn seconds() -> f64 {
+pub(in crate::bench) fn seconds() -> f64 {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }

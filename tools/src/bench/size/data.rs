@@ -61,7 +61,7 @@ impl Subject {
     }
 
     /// Writes the archive into a folder.
-    pub(super) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
+    pub(in crate::bench) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
         let path = folder.join(format!("{}.npy", self.name()));
         match (self.synth(), peers) {
             (Some(kind), _) => synthetic(kind, small, &path)?,
@@ -112,6 +112,11 @@ pub struct Data {
 }
 
 impl Data {
+    /// The name of what is in a file.
+    pub(in crate::bench) fn name_of(path: &Path) -> String {
+        path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// Of a file; every sample is read.
     pub(in crate::bench) fn of(path: PathBuf) -> Result<Self> {
         let mut source = source::open(std::slice::from_ref(&path), &OpenOptions::default())?;
@@ -123,7 +128,7 @@ impl Data {
             sample::load(ty, &read_frames(window.as_ref(), std::iter::once(frame), &whole, ty)?, &mut values);
             range = values.iter().fold(range, |(low, high), v| (low.min(*v), high.max(*v)));
         }
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = Self::name_of(&path);
         let bytes = (frames * whole.voxels() * ty.size()) as u64;
         Ok(Self { name, path, dims: archive.grid.dims, frames, samples: ty.to_string(), bytes, range })
     }

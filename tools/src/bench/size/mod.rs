@@ -9,10 +9,10 @@
 //! tables    size.md for people
 //! ```
 
-mod clock;
+pub(super) mod clock;
 mod data;
 pub(super) mod own;
-mod peers;
+pub(super) mod peers;
 mod row;
 mod schemes;
 mod tables;
@@ -148,8 +148,9 @@ fn by_scheme(config: &Config, data: &Data, scheme: &Scheme, tolerance: f64, file
 }
 
 fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a> {
+    let only = (!all).then_some(peers::TIMED);
     let (path, tolerances) = (data.path.as_path(), config.tolerances.as_slice());
-    PeersTask { data: &data.name, data_bytes: data.bytes, path, tolerances, repeats: IN_A_ROW, all }
+    PeersTask { data: &data.name, data_bytes: data.bytes, path, tolerances, repeats: IN_A_ROW, only }
 }
 
 fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {

@@ -29,50 +29,56 @@ impl Peers {
     pub(super) fn generate(&self, kind: &str, folder: &Path, small: bool) -> Result<()> {
         let size: &[&str] = if small { &["--frames", "8", "--edge", "16"] } else { &[] };
         let fixed = [OsStr::new("generate"), OsStr::new(kind), OsStr::new("--out"), folder.as_os_str()];
-        self.run(fixed.into_iter().chain(size.iter().map(OsStr::new))).map(|_| ())
+        self.run(&self.script, fixed.into_iter().chain(size.iter().map(OsStr::new))).map(|_| ())
     }
 
     /// Measures peers on a file: all of them, or the timed one alone.
-    pub(super) fn measure(&self, task: &PeersTask) -> Result<Vec<Row>> {
+    pub(in crate::bench) fn measure(&self, task: &PeersTask) -> Result<Vec<Row>> {
         let tolerances: Vec<String> = task.tolerances.iter().map(|t| format!("{t:e}")).collect();
         let (tolerances, repeats) = (tolerances.join(","), task.repeats.to_string());
         let mut args = vec![OsStr::new("measure"), task.path.as_os_str()];
         args.extend(["--tolerances", &tolerances, "--repeats", &repeats].map(OsStr::new));
-        if !task.all {
-            args.extend(["--peers", TIMED].map(OsStr::new));
+        if let Some(only) = task.only {
+            args.extend(["--peers", only].map(OsStr::new));
         }
-        let text = self.run(args)?;
+        let text = self.run(&self.script, args)?;
         let lines = String::from_utf8_lossy(&text);
         lines.lines().map(|line| self.line(line)?.row(task)).collect()
+    }
+
+    /// What the script `views.py` beside the other prints of an archive, a line for each renderer.
+    pub(in crate::bench) fn views(&self, archive: &Path, args: &[String]) -> Result<Vec<u8>> {
+        let (script, fixed) = (self.script.with_file_name("views.py"), [archive.as_os_str()]);
+        self.run(&script, fixed.into_iter().chain(args.iter().map(OsStr::new)))
     }
 
     fn line(&self, text: &str) -> Result<Line> {
         serde_json::from_str(text).map_err(|e| crate::bench::bad_json(&self.script, &e))
     }
 
-    /// What the script prints.
-    fn run<'a>(&self, args: impl IntoIterator<Item = &'a OsStr>) -> Result<Vec<u8>> {
+    /// What a script prints.
+    fn run<'a>(&self, script: &Path, args: impl IntoIterator<Item = &'a OsStr>) -> Result<Vec<u8>> {
         let mut command = Command::new(&self.python);
-        command.arg(&self.script).args(args).stderr(Stdio::inherit());
+        command.arg(script).args(args).stderr(Stdio::inherit());
         let output = command.output().map_err(|e| Error::io(&self.python, "running", e))?;
         if output.status.success() {
             return Ok(output.stdout);
         }
-        Err(Error::input(&self.script, format!("failed under {} ({})", self.python.display(), output.status)))
+        Err(Error::input(script, format!("failed under {} ({})", self.python.display(), output.status)))
     }
 }
 
 /// What the script is to measure.
-pub(super) struct PeersTask<'a> {
+pub(in crate::bench) struct PeersTask<'a> {
     /// The name of the data.
-    pub(super) data: &'a str,
+    pub(in crate::bench) data: &'a str,
     /// Bytes of its samples.
-    pub(super) data_bytes: u64,
-    pub(super) path: &'a Path,
-    pub(super) tolerances: &'a [f64],
-    pub(super) repeats: usize,
-    /// All peers, or the timed one.
-    pub(super) all: bool,
+    pub(in crate::bench) data_bytes: u64,
+    pub(in crate::bench) path: &'a Path,
+    pub(in crate::bench) tolerances: &'a [f64],
+    pub(in crate::bench) repeats: usize,
+    /// One of the peers; none: all.
+    pub(in crate::bench) only: Option<&'a str>,
 }
 
 /// A line of the script; `peers.py --help` says what it means.

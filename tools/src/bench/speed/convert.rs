@@ -1,0 +1,67 @@
+//! Conversion, as it is measured.
+
+use super::measured::{Measured, Stopwatch};
+use crate::bench::stages::MEMORY;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::PathBuf;
+use wavesplat::convert::{Coding, ConvertConfig, convert};
+use wavesplat::error::{Error, Result};
+use wavesplat::progress::Silent;
+use wavesplat::source::{self, OpenOptions};
+use wavesplat::wavelet::Basis;
+
+/// What to convert, and how.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Conversion {
+    pub(super) source: PathBuf,
+    pub(super) scheme: Scheme,
+    /// Frames of a window.
+    pub(super) window: usize,
+    pub(super) tolerance: f64,
+    /// Lowest and highest sample of the archive.
+    pub(super) range: (f64, f64),
+    pub(super) output: PathBuf,
+}
+
+/// The ways of converting that are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Scheme {
+    /// What the program does unless told otherwise.
+    Auto,
+    Haar,
+    Multi,
+}
+
+impl Scheme {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Haar => "haar",
+            Self::Multi => "multi",
+        }
+    }
+
+    fn coding(self) -> Coding {
+        match self {
+            Self::Auto => Coding::AUTO,
+            Self::Haar => Basis::Haar.into(),
+            Self::Multi => Basis::Multi.into(),
+        }
+    }
+}
+
+/// Converts to a file, which need not have reached the disk.
+pub(super) fn run(conversion: &Conversion) -> Result<Measured> {
+    let Conversion { source, scheme, window, tolerance, range, output } = conversion;
+    let plain = ConvertConfig::new(scheme.coding(), *window, *tolerance, MEMORY);
+    let config = ConvertConfig { range: Some(*range), ..plain };
+    let out = File::create(output).map_err(|e| Error::io(output, "creating", e))?;
+    let (report, time) = Stopwatch::time(|| {
+        let mut frames = source::open(std::slice::from_ref(source), &OpenOptions::default())?;
+        convert(frames.as_mut(), &config, output, BufWriter::new(out), &Silent)
+    })?;
+    let bytes = fs::metadata(output).map_err(|e| Error::io(output, "looking at", e))?.len();
+    Ok(Measured { time, bytes, codes_per_sample: Some(report.coefficients_per_sample), ..Measured::default() })
+}

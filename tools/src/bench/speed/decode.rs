@@ -1,0 +1,47 @@
+//! Bare decoding: what no picture can do without.
+
+use rayon::prelude::*;
+use std::hint::black_box;
+use std::path::Path;
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::mapped::{Access, FileBytes};
+use wavesplat_format::{BlockEntry, Reader};
+
+/// From opening a file to the codes of all of its blocks, which are not kept; returns the bytes that were read of blocks.
+pub(super) fn codes(path: &Path) -> Result<u64> {
+    let file = CoefficientFile::open(path, Access::Map)?;
+    let whole = file.grid.whole();
+    let mut bytes = 0;
+    for window in 0..file.metadata().windows.len() as u32 {
+        let codec = &file.codec(window)?;
+        let wanted = vec![true; codec.basis.coefficients()];
+        let leaves = file.entries(window, &whole).collect::<Result<Vec<_>>>()?;
+        let read = |entry: &BlockEntry| {
+            let block = file.block(codec, entry, &wanted)?;
+            black_box(&block.codes);
+            Ok(block.bytes_read)
+        };
+        bytes += leaves.par_iter().flatten().map(read).sum::<Result<u64>>()?;
+    }
+    Ok(bytes)
+}
+
+/// From opening a file to all of its parts as zstd gives them, copied out and checked before, and not kept; returns
+/// their bytes.
+pub(super) fn payloads(path: &Path) -> Result<u64> {
+    let failed = |source| Error::CoefficientFile { path: path.into(), source };
+    let reader = Reader::open(FileBytes::open(path, Access::Map)?).map_err(failed)?;
+    let mut bytes = 0;
+    for window in 0..reader.metadata().windows.len() as u32 {
+        let leaves =
+            reader.leaves(window).iter().map(|leaf| reader.leaf(leaf).map_err(failed)).collect::<Result<Vec<_>>>()?;
+        let read = |block: &BlockEntry| parts(&reader, block).map_err(failed);
+        bytes += leaves.par_iter().flatten().map(read).sum::<Result<u64>>()?;
+    }
+    Ok(bytes)
+}
+
+fn parts(reader: &Reader<FileBytes>, block: &BlockEntry) -> wavesplat_format::Result<u64> {
+    block.parts.iter().map(|part| Ok(black_box(reader.part(block, part)?).len() as u64)).sum()
+}
