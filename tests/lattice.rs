@@ -1,11 +1,11 @@
-//! Deep volumes, whose coefficients are splatted on the lattice of the view, against footprints.
+//! What is splatted on the lattice of the view, against footprints: coefficients of deep volumes, and frames.
 
 use crate::common::views::{archive, field, largest, rounding, truth, view};
-use crate::common::{looking, pictures, settings, stored};
+use crate::common::{direct, looking, pictures, settings, stored};
 use crate::images::under_less_memory;
 use wavesplat::camera::View;
 use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, Scene, What};
 use wavesplat::sample::SampleType;
 use wavesplat::volume::{Grid, Region};
 use wavesplat::wavelet::Basis;
@@ -48,20 +48,80 @@ fn a_lattice_keeps_the_error_that_it_states() {
                 let region = (i == 1).then_some(region);
                 let exact = RenderConfig { region, splat_error: 0.0, ..plain.clone() };
                 let quick = RenderConfig { region, splat_error, ..plain };
-                let ((expected, _), (pictures, report)) = (pictures(&mut scene, &exact), pictures(&mut scene, &quick));
-                found += usize::from(report.method == "lattice");
                 let (magnitude, range) = (1.01 * largest(&samples), 1.02 * span(&samples));
                 let unit = if quantity == Quantity::Mean { range } else { magnitude * brightest };
-                for (found, expected) in pictures.iter().zip(&expected) {
-                    assert_eq!(found.is_nan(), expected.is_nan());
-                    let most = (report.stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
-                    let off = f64::from(*found) - f64::from(*expected);
-                    assert!(found.is_nan() || off.abs() <= most, "scene {n}, {i}: {found} for {expected}");
-                }
+                found += keeps_its_error(&mut scene, [&exact, &quick], unit, &format!("scene {n}, {i}"));
             }
         }
     }
     assert!(found >= 4, "{found} were splatted on a lattice");
+}
+
+/// Whether it was on a lattice.
+fn keeps_its_error(scene: &mut dyn Scene, [exact, quick]: [&RenderConfig; 2], unit: f64, what: &str) -> usize {
+    let ((expected, _), (pictures, report)) = (pictures(scene, exact), pictures(scene, quick));
+    for (found, expected) in pictures.iter().zip(&expected) {
+        assert_eq!(found.is_nan(), expected.is_nan(), "{what}");
+        let most = (report.stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
+        let off = f64::from(*found) - f64::from(*expected);
+        assert!(found.is_nan() || off.abs() <= most, "{what}: {found} for {expected}");
+    }
+    usize::from(report.method == "lattice")
+}
+
+/// Along an axis, nearly so, along a diagonal, and where two axes are as much along the view.
+const DIRECTIONS: [(f64, f64); 8] = [
+    (0.0, 0.0),
+    (90.0, 0.0),
+    (0.0, 90.0),
+    (0.001, -0.002),
+    (45.0, 0.0),
+    (44.999, 35.26),
+    (120.0, 45.0),
+    (-30.0, -75.0),
+];
+
+#[test]
+fn frames_on_a_lattice_keep_the_error_that_they_state() {
+    let mut found = 0;
+    let grid = Grid { dims: [33, 37, 35], spacing: [1.0, 1.0, 0.8], origin: [5.0, 0.0, -3.0] };
+    let mut samples = field(&grid, 2, 3);
+    samples.iter_mut().for_each(|v| *v += 20.0);
+    let (magnitude, range) = (largest(&samples), span(&samples));
+    for (n, (azimuth, elevation)) in DIRECTIONS.into_iter().enumerate() {
+        let view = View { scale: Some(3.0), roll: 15.0 * (n % 3) as f64, ..view(azimuth, elevation, [70, 65]) };
+        let tau = [0.0, 0.03][n % 2];
+        let mut memory = archive(grid, SampleType::F64, &samples);
+        let region = (n == 5).then_some(Region { start: [0, 2, 1], ..grid.whole() });
+        let plain = RenderConfig { region, ..looking(view, tau, Quantity::Emission, &grid, 2) };
+        let brightest = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None).largest_weight;
+        for splat_error in [2e-2, 1e-3, 3e-5] {
+            for (quantity, unit, factor) in
+                [(Quantity::Emission, magnitude * brightest, 1.0), (Quantity::Mean, range, 100.0)]
+            {
+                let exact = RenderConfig { quantity, ..plain.clone() };
+                let quick = RenderConfig { splat_error: factor * splat_error, ..exact.clone() };
+                let what = format!("view {n}, {quantity:?}, {splat_error}");
+                found += keeps_its_error(&mut direct(&memory, None), [&exact, &quick], unit, &what);
+            }
+        }
+        // What is missing is missing in both sums.
+        let missing = |i: usize| i % 7 == 3 || i % 35 < 12;
+        memory = archive(grid, SampleType::F64, &masked(&samples, missing));
+        let emission = RenderConfig { splat_error: 1e-3, ..plain };
+        let exact = RenderConfig { splat_error: 0.0, ..emission.clone() };
+        keeps_its_error(&mut direct(&memory, None), [&exact, &emission], magnitude * brightest, "masked");
+        let constant = masked(&vec![3.0; samples.len()], missing);
+        let mean = RenderConfig { quantity: Quantity::Mean, splat_error: 0.1, ..emission };
+        let (means, report) = pictures(&mut direct(&archive(grid, SampleType::F64, &constant), None), &mean);
+        found += usize::from(report.method == "lattice");
+        assert!(means.iter().all(|v| v.is_nan() || (v - 3.0).abs() < 1e-5), "means of a constant");
+    }
+    assert!(found >= 36, "{found} were splatted on a lattice");
+}
+
+fn masked(samples: &[f64], missing: impl Fn(usize) -> bool) -> Vec<f64> {
+    samples.iter().enumerate().map(|(i, v)| if missing(i) { f64::NAN } else { *v }).collect()
 }
 
 fn span(samples: &[f64]) -> f64 {
@@ -78,4 +138,7 @@ fn memory_changes_no_bit_of_a_lattice() {
     let config = RenderConfig { splat_error: 5e-3, ..looking(view, tau, Quantity::Emission, &grid, FRAMES) };
     assert_eq!(pictures(&mut scene, &config).1.method, "lattice");
     assert!(under_less_memory(&mut scene, &config) > 2);
+    let mut frames = direct(&memory, None);
+    assert_eq!(pictures(&mut frames, &config).1.method, "lattice");
+    assert!(under_less_memory(&mut frames, &config) > 2);
 }

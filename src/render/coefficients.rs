@@ -76,7 +76,7 @@ impl Scene for CoefficientScene {
     fn on_lattice(&self) -> bool {
         // Measured: few coefficients of series by themselves are splatted faster one by one.
         let refined = self.file.metadata().windows.iter().any(|w| w.pyramid.is_some());
-        self.what == What::Coefficients && refined
+        self.what == What::Samples || refined
     }
 
     fn group<'a>(
@@ -235,13 +235,29 @@ impl<'a> CoefficientGroup<'a> {
 
     fn terms_of_samples(&self, block: &Block, samples: &[u8], errors: &[f64]) -> Terms {
         let ty: SampleType = self.codec.sample;
-        let is_missing = |i: usize, value: f64| {
-            let at = self.frames[i / block.voxels] * block.voxels + i % block.voxels;
-            block.is_missing(at) || self.codec.is_missing(value) // an exact block may do without a mask
-        };
+        let is_missing = |i: usize, value| self.misses(block, i / block.voxels, i % block.voxels, value);
         let mut terms = Terms::of_samples(&self.layout, ty, &self.of_frames(samples), errors, is_missing);
         terms.bytes_read = block.bytes_read;
         terms
+    }
+
+    /// Whether a sample of a frame of the group is missing.
+    fn misses(&self, block: &Block, frame: usize, voxel: usize, value: f64) -> bool {
+        let at = self.frames[frame] * block.voxels + voxel;
+        block.is_missing(at) || self.codec.is_missing(value) // an exact block may do without a mask
+    }
+
+    fn sums_of_samples(&self, block: &Block, samples: &[u8], region: &Region, lattice: &Lattice) -> Sums {
+        let mut dense = lattice.dense(region, self.layout.planes());
+        let mut values = vec![0.0; block.voxels];
+        for (i, samples) in self.of_frames(samples).chunks_exact(samples.len() / self.codec.frames()).enumerate() {
+            crate::sample::load(self.codec.sample, samples, &mut values);
+            let is_missing = |voxel: usize, value| self.misses(block, i, voxel, value);
+            dense.add_samples(&self.layout, i, &mut values, is_missing);
+        }
+        let mut sums = Sums::from(dense);
+        sums.bytes_read = block.bytes_read;
+        sums
     }
 
     /// Terms of the coefficients, and of what overrides them; without the former, of the latter alone.
@@ -314,12 +330,22 @@ impl Group for CoefficientGroup<'_> {
         })
     }
 
-    fn sums(&self, block: usize, region: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        let region = &self.file.blocks.region(block);
+        if !clip.contains(region) {
+            return Ok(None);
+        }
         let leaf = self.leaf_of(block as u32)?;
         let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
         let block = self.file.block(&self.codec, &entry, &self.wanted)?;
+        if let Some(exact) = &block.exact {
+            return Ok(Some(self.sums_of_samples(&block, exact, region, lattice)));
+        }
+        if self.what == What::Samples {
+            return Ok(Some(self.sums_of_samples(&block, &block.samples(&self.codec), region, lattice)));
+        }
         let field = block.field(&self.codec);
-        if block.exact.is_some() || field.is_zero() {
+        if field.is_zero() {
             return Ok(None);
         }
         let (shape, pyramid) = (self.codec.shape(block.size), self.codec.scheme.pyramid.as_ref());

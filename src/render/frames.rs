@@ -2,6 +2,7 @@
 
 use super::RenderConfig;
 use super::expectation::Expectation;
+use super::lattice::{Lattice, Sums};
 use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::error::Result;
@@ -56,6 +57,10 @@ impl Scene for FrameScene {
     fn block_bytes(&self, _config: &RenderConfig) -> usize {
         // Samples in their type and as f64, and a term of ten bytes for each.
         self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
+    }
+
+    fn on_lattice(&self) -> bool {
+        true
     }
 
     fn group<'a>(
@@ -119,6 +124,18 @@ impl Group for FrameGroup<'_> {
         let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
         let declared = self.missing_value;
         Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
+    }
+
+    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        let (region, ty) = (self.blocks.region(block).intersect(clip), self.archive.sample);
+        let mut dense = lattice.dense(&region, self.layout.planes());
+        let (mut bytes, mut values) = (vec![0; region.voxels() * ty.size()], vec![0.0; region.voxels()]);
+        for (i, frame) in self.frames.iter().enumerate() {
+            self.window.read_box(*frame, &region, &mut bytes)?;
+            sample::load(ty, &bytes, &mut values);
+            dense.add_samples(&self.layout, i, &mut values, |_, v| is_missing(v, self.missing_value));
+        }
+        Ok(Some(dense.into()))
     }
 
     fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {

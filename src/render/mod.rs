@@ -9,8 +9,8 @@
 //!   give the finished frames to the sink
 //! ```
 //!
-//! Where that is less work, the codes of a file go to cells of the view's sheared lattice instead, and from there to pixels
-//! (`lattice`); all planes then do, weights and what is missing included, so that means stay means.
+//! Where that is less work, the codes of a file and the samples of frames go to cells of the view's sheared lattice instead,
+//! and from there to pixels (`lattice`); all planes then do, weights and what is missing included, so that means stay means.
 
 mod certificate;
 mod coefficients;
@@ -339,8 +339,7 @@ impl Eye {
         let mut cells: Vec<Cells> = tiles.iter().map(|tile| lattice.cells_of(tile)).collect();
         let sums_of = |block: &usize| {
             let region = self.blocks.region(*block);
-            let coded = if self.clip.contains(&region) { source.sums(*block, &region, lattice)? } else { None };
-            Ok(match coded {
+            Ok(match source.sums(*block, &self.clip, lattice)? {
                 Some(sums) => sums,
                 None => lattice.of_terms(&source.terms(*block)?, &region, &self.clip, planes),
             })
@@ -363,7 +362,7 @@ impl Eye {
 trait Blocks: Sync {
     fn terms(&self, block: usize) -> Result<Terms>;
 
-    fn sums(&self, _block: usize, _region: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
+    fn sums(&self, _block: usize, _clip: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
         Ok(None)
     }
 }
@@ -373,8 +372,8 @@ impl Blocks for &dyn Group {
         Group::terms(*self, block)
     }
 
-    fn sums(&self, block: usize, region: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
-        Group::sums(*self, block, region, lattice)
+    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        Group::sums(*self, block, clip, lattice)
     }
 }
 

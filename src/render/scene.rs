@@ -57,8 +57,8 @@ pub trait Group: Sync {
     /// The terms of a block.
     fn terms(&self, block: usize) -> Result<Terms>;
 
-    /// The sums of a block on a lattice, all of its voxels and planes; none: its terms are splatted.
-    fn sums(&self, _block: usize, _region: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
+    /// The sums of a block on a lattice, of its voxels within `clip` and all planes; none: its terms are splatted.
+    fn sums(&self, _block: usize, _clip: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
         Ok(None)
     }
 

@@ -1,13 +1,14 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
 use super::certificate;
+use super::lattice::{Lattice, Sums};
 use super::plan::Budget;
 use super::splat::{Order, Tile};
 use super::terms::{Layout, Terms};
 use super::{Blocks, Eye, Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
 use crate::footprint::{Footprint, Method};
-use crate::volume::BlockGrid;
+use crate::volume::{BlockGrid, Region};
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
 pub(super) const BACKGROUND: f64 = 0.01;
@@ -115,5 +116,12 @@ struct Ones<'a>(&'a BlockGrid);
 impl Blocks for Ones<'_> {
     fn terms(&self, block: usize) -> Result<Terms> {
         Ok(Terms::ones(self.0.region(block).voxels()))
+    }
+
+    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
+        let region = self.0.region(block).intersect(clip);
+        let mut dense = lattice.dense(&region, 1);
+        dense.add(0, &vec![1.0; region.voxels()]);
+        Ok(Some(dense.into()))
     }
 }

@@ -53,7 +53,9 @@ fn arrays_hold_values_with_nan_for_background() {
     assert_eq!(colours.len(), 3 * 40 * 48 * 3);
     work.render(&format!("a.wspl {SIZE} --frames 1:4 --quantity emission -o e.npy")).ok();
     let emission = floats(&read_npy(&work.read("e.npy")).1);
-    assert!(emission.iter().all(|v| !v.is_nan()) && emission[0] == 0.0, "emission is 0 in the background");
+    let brightest = emission.iter().fold(0.0, |m: f32, v| m.max(v.abs()));
+    assert!(emission.iter().all(|v| !v.is_nan()));
+    assert!(emission[0].abs() <= 1e-3 * brightest, "emission is nothing but what splatting errs by in the background");
 }
 
 #[test]

@@ -15,24 +15,28 @@ use multiversion::multiversion;
 use std::ops::Range;
 
 /// The kernel of a view.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Kernel {
     degree: usize,
     /// The inverse of its Gaussian's covariance: uu, uv, vv.
     inverse: [f64; 3],
     /// Of its Gaussian.
     peak: f64,
-    /// exp(-uu): the second quotient of Gaussians at neighbouring cells.
-    bend: f64,
-    /// From its centre to its cut, squared and in units of that covariance.
-    cut: f64,
-    /// Half the cells along u and v that it reaches.
-    pub(super) half: [f64; 2],
+    /// From the cell nearest to a pixel, the first cell along u and v that counts.
+    first: [isize; 2],
+    /// What its Gaussian is at whole cells, in units of its peak: rows of as many runs, of cells that count or not.
+    table: Vec<Run>,
+    /// For each row the cells that count.
+    pub(super) spans: Vec<Range<usize>>,
 }
+
+/// Weights of neighbouring cells.
+pub(super) type Run = [f64; RUN];
+pub(super) const RUN: usize = 8;
 
 impl Kernel {
     /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline is
-    /// too wide for it.
+    /// too wide for it, or cells too small.
     pub(super) fn new(shear: &Shear, sigma: f64, degree: usize, radius: f64) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
@@ -42,53 +46,70 @@ impl Kernel {
         let spline = (degree + 1) as f64 / 12.0;
         let [suu, suv, svv] = [vv / det - spline, -uv / det, uu / det - spline];
         let left = suu * svv - suv * suv;
-        let usable = suu > 0.0 && svv > 0.0 && left > LEAST_LEFT / det;
-        let half = [radius * suu.sqrt(), radius * svv.sqrt()];
+        let half = [suu, svv].map(|s| (radius * s.sqrt() + NEARER).floor());
+        let usable = suu > 0.0 && svv > 0.0 && left > LEAST_LEFT / det && half.iter().all(|n| *n <= MOST_HALF);
         let (peak, inverse) = ((1.0 / (det * left)).sqrt(), [svv / left, -suv / left, suu / left]);
-        usable.then(|| Self { degree, inverse, peak, bend: libm::exp(-inverse[0]), cut: radius * radius, half })
+        let kernel = Self { degree, inverse, peak, first: [0; 2], table: Vec::new(), spans: Vec::new() };
+        usable.then(|| kernel.with_table(half.map(|n| n as isize), radius))
     }
 
-    /// The rows of cells that a pixel at `v` reaches.
-    pub(super) fn rows(&self, v: f64) -> Range<isize> {
-        (v - self.half[1]).ceil() as isize..(v + self.half[1]).floor() as isize + 1
-    }
-
-    /// The cells of row `row` that a pixel at `place` reaches, and their weights.
-    pub(super) fn row(&self, place: [f64; 2], row: isize, weights: &mut Vec<f64>) -> isize {
-        weights.clear();
-        let [uu, uv, vv] = self.inverse;
-        let dv = place[1] - row as f64;
-        // uu du^2 + 2 uv du dv + vv dv^2 <= cut
-        let middle = -uv / uu * dv;
-        let room = (self.cut - (vv - uv * uv / uu) * dv * dv) / uu;
-        if room < 0.0 {
-            return 0;
+    fn with_table(mut self, half: [isize; 2], radius: f64) -> Self {
+        self.first = half.map(|n| -n);
+        let runs = (2 * half[0] as usize + 1).div_ceil(RUN);
+        for j in -half[1]..=half[1] {
+            let at = |i: usize| [(i as isize - half[0]) as f64, j as f64];
+            let run = |r: usize| std::array::from_fn(|i| libm::exp(-0.5 * self.square(at(r * RUN + i))));
+            let row: Vec<Run> = (0..runs).map(run).collect();
+            let counts = |i: &usize| {
+                let [u, v] = at(*i);
+                let near = [[-NEARER, -NEARER], [-NEARER, NEARER], [NEARER, -NEARER], [NEARER, NEARER]];
+                near.iter().any(|n| self.square([u + n[0], v + n[1]]) <= radius * radius)
+            };
+            let seen: Vec<usize> = (0..2 * half[0] as usize + 1).filter(counts).collect();
+            self.table.extend(row);
+            self.spans.push(seen.first().map_or(0..0, |first| *first..first + seen.len()));
         }
-        let reach = room.sqrt();
-        let (first, last) = (place[0] - middle - reach, place[0] - middle + reach);
-        let first = first.ceil() as isize;
-        self.gaussians(place[0] - first as f64, dv, first..last.floor() as isize + 1, weights);
-        correct(self, weights, place[0] - first as f64, dv);
-        first
+        self
     }
 
-    /// The Gaussian at places one cell apart: each is the one before times a quotient that changes by a constant factor.
-    fn gaussians(&self, du: f64, dv: f64, cells: Range<isize>, out: &mut Vec<f64>) {
+    /// Runs of a row of weights.
+    pub(super) fn runs(&self) -> usize {
+        self.table.len() / self.spans.len()
+    }
+
+    /// From a pixel to the furthest cell along u and v that counts, at most.
+    pub(super) fn half(&self) -> [f64; 2] {
+        self.first.map(|n| 0.5 - n as f64)
+    }
+
+    /// A squared distance in units of the covariance.
+    fn square(&self, [u, v]: [f64; 2]) -> f64 {
         let [uu, uv, vv] = self.inverse;
-        let mut weight = self.peak * libm::exp(-0.5 * ((uu * du + 2.0 * uv * dv) * du + vv * dv * dv));
-        let mut quotient = libm::exp(uu * (du - 0.5) + uv * dv);
-        for _ in cells {
-            out.push(weight);
-            weight *= quotient;
-            quotient *= self.bend;
-        }
+        (uu * u + 2.0 * uv * v) * u + vv * v * v
+    }
+
+    /// The weights of a pixel at `place`, row by row, and the first cell of the first row.
+    ///
+    /// With du, dv from the nearest cell to the pixel, and i, j from that to another one, the Gaussian is
+    ///
+    /// ```text
+    /// G(du - i, dv - j) = G(du, dv) exp(uu du + uv dv)^i exp(uv du + vv dv)^j G(i, j)        G(0, 0) = 1
+    /// ```
+    pub(super) fn weights(&self, place: [f64; 2], out: &mut Weights) -> [isize; 2] {
+        let near = place.map(|p| (p + 0.5).floor());
+        let [du, dv] = [place[0] - near[0], place[1] - near[1]];
+        let [uu, uv, vv] = self.inverse;
+        powers(uu * du + uv * dv, self.first[0], self.runs() * RUN, out.along.as_flattened_mut());
+        powers(uv * du + vv * dv, self.first[1], self.spans.len(), &mut out.across);
+        let peak = self.peak * libm::exp(-0.5 * self.square([du, dv]));
+        weigh(self, peak, [du - self.first[0] as f64, dv - self.first[1] as f64], out);
+        std::array::from_fn(|i| near[i] as isize + self.first[i])
     }
 
     /// The kernel at a place.
+    #[cfg(test)]
     fn at(&self, du: f64, dv: f64) -> f64 {
-        let [uu, uv, vv] = self.inverse;
-        let gaussian = self.peak * libm::exp(-0.5 * ((uu * du + 2.0 * uv * dv) * du + vv * dv * dv));
-        gaussian * self.correction(du, dv)
+        self.peak * libm::exp(-0.5 * self.square([du, dv])) * self.correction(du, dv)
     }
 
     /// What the kernel is in units of its Gaussian.
@@ -109,17 +130,31 @@ impl Kernel {
     /// The weight at `to` of an amount at `from`, both in cells.
     fn weight(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         let [(u, along), (v, across)] = from.map(|place| spread(self.degree, place));
+        let near = to.map(|p| (p + 0.5).floor());
+        let [i, j] = [u - near[0] as isize - self.first[0], v - near[1] as isize - self.first[1]];
         let mut sum = 0.0;
-        for (row, w) in (v..).zip(&across[..=self.degree]) {
-            let dv = to[1] - row as f64;
-            for (cell, x) in (u..).zip(&along[..=self.degree]) {
-                let du = to[0] - cell as f64;
-                let [uu, uv, vv] = self.inverse;
-                let within = uu * du * du + 2.0 * uv * du * dv + vv * dv * dv <= self.cut;
-                sum += if within { w * x * self.at(du, dv) } else { 0.0 };
+        for (n, w) in (0..).zip(&across[..=self.degree]) {
+            let Some(span) = usize::try_from(j + n).ok().and_then(|j| self.spans.get(j)) else { continue };
+            let (mut du, dv) = (to[0] - u as f64, to[1] - (v + n) as f64);
+            let mut last = None;
+            for (n, x) in (0..).zip(&along[..=self.degree]) {
+                if usize::try_from(i + n).is_ok_and(|i| span.contains(&i)) {
+                    let next = |[gaussian, quotient, bend]: [f64; 3]| [gaussian * quotient, quotient * bend, bend];
+                    let here = last.map_or_else(|| self.gaussian(du, dv), next);
+                    sum += w * x * here[0] * self.correction(du, dv);
+                    last = Some(here);
+                }
+                du -= 1.0;
             }
         }
         sum
+    }
+
+    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring quotients.
+    fn gaussian(&self, du: f64, dv: f64) -> [f64; 3] {
+        let [uu, uv, _] = self.inverse;
+        let weight = self.peak * libm::exp(-0.5 * self.square([du, dv]));
+        [weight, libm::exp(uu * (du - 0.5) + uv * dv), libm::exp(-uu)]
     }
 
     /// How far weights w~ are from those of the footprint, w = exp(-d^2 / (2 sigma^2)): for any voxels and any place,
@@ -127,9 +162,18 @@ impl Kernel {
     ///
     /// For if |w~ - w| <= sum over j of c_j w(d - t_j) for all places d, then all voxels are off by at most the sum of c_j
     /// times what they weigh at places moved by t_j.
-    pub(super) fn error(&self, shear: &Shear, sigma: f64) -> f64 {
-        let off: Vec<f64> =
-            (0..SIDE * SIDE).map(|i| self.off(shear, sigma, [i % SIDE, i / SIDE].map(offset))).collect();
+    ///
+    /// Infinite as soon as it is known to be more than `most`.
+    pub(super) fn error(&self, shear: &Shear, sigma: f64, most: f64) -> f64 {
+        let mut off = vec![0.0; SIDE * SIDE];
+        // From the middle outwards, and the same on the other side.
+        for i in (0..=SIDE * SIDE / 2).rev() {
+            let here = self.off(shear, sigma, [i % SIDE, i / SIDE].map(offset));
+            if MARGIN * here > most {
+                return f64::INFINITY; // the c_j sum to no less
+            }
+            (off[i], off[SIDE * SIDE - 1 - i]) = (here, here);
+        }
         let least = LEAST * off.iter().copied().fold(0.0, f64::max);
         let off: Vec<f64> = off.into_iter().map(|off| off.max(least)).collect();
         let mut c = off.clone();
@@ -151,21 +195,58 @@ impl Kernel {
         phases.map(|[u, v]| (self.weight([u, v], [u + du, v + dv]) - exact).abs()).fold(0.0, f64::max)
     }
 
-    /// Cells that a pixel reaches, about.
-    pub(super) fn cells(&self) -> f64 {
-        let [uu, uv, vv] = self.inverse;
-        std::f64::consts::PI * self.cut / (uu * vv - uv * uv).sqrt()
+    /// Cells that a pixel reaches.
+    pub(super) fn cells(&self) -> usize {
+        self.spans.iter().map(Range::len).sum()
     }
 }
 
-/// Turns Gaussians at places one cell apart into the kernel.
+/// The weights of the cells that a pixel reaches.
+#[derive(Debug)]
+pub(super) struct Weights {
+    /// Row by row, as many runs in each.
+    pub(super) rows: Vec<Run>,
+    /// What the Gaussian changes by along u and along v.
+    along: Vec<Run>,
+    across: Vec<f64>,
+}
+
+impl Weights {
+    /// Room for those of a kernel.
+    pub(super) fn of(kernel: &Kernel) -> Self {
+        let (along, across) = (vec![[0.0; RUN]; kernel.runs()], vec![0.0; kernel.spans.len()]);
+        Self { rows: kernel.table.clone(), along, across }
+    }
+}
+
+/// exp(x n) for `count` whole n from `first` on, where first <= 0 <= first + count.
+fn powers(x: f64, first: isize, count: usize, out: &mut [f64]) {
+    let (before, after) = out[..count].split_at_mut(-first as usize);
+    let (up, down) = (libm::exp(x), libm::exp(-x));
+    let mut power = down;
+    before.iter_mut().rev().for_each(|p| (*p, power) = (power, power * down));
+    power = 1.0;
+    after.iter_mut().for_each(|p| (*p, power) = (power, power * up));
+}
+
+/// The weights of all rows; the first cell of the first one is `[du, dv]` before the pixel.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn correct(kernel: &Kernel, weights: &mut [f64], du: f64, dv: f64) {
-    for (w, n) in weights.iter_mut().zip(0_i32..) {
-        *w *= kernel.correction(du - f64::from(n), dv);
+fn weigh(kernel: &Kernel, peak: f64, [du, dv]: [f64; 2], out: &mut Weights) {
+    let runs = out.along.len();
+    let rows = out.rows.chunks_exact_mut(runs).zip(kernel.table.chunks_exact(runs));
+    for (n, ((row, table), across)) in rows.zip(&out.across).enumerate() {
+        let (scale, dv) = (peak * across, dv - n as f64);
+        let factors = table.as_flattened().iter().zip(out.along.as_flattened());
+        for ((weight, (table, along)), i) in row.as_flattened_mut().iter_mut().zip(factors).zip(0_i32..) {
+            *weight = table * along * scale * kernel.correction(du - f64::from(i), dv);
+        }
     }
 }
 
+/// Cells count that are within the cut, or would be if the pixel were nearer by so much of a cell along both axes.
+const NEARER: f64 = 0.25;
+/// Cells to one side that a kernel may have.
+const MOST_HALF: f64 = 100.0;
 /// The share of the covariance's determinant that a spline must leave.
 const LEAST_LEFT: f64 = 0.02;
 /// Places along an axis at which differences are looked at, centred, and the distance of neighbours in sigma.
@@ -209,15 +290,37 @@ mod tests {
     use crate::volume::Grid;
 
     #[test]
+    fn weights_are_the_kernel_at_every_cell() {
+        let grid = Grid::unit([9, 9, 9]);
+        for (azimuth, elevation, sigma, degree) in [(0.0, 0.0, 3.0, 3), (31.0, 40.0, 9.0, 7), (45.0, 0.0, 3.0, 5)] {
+            let view = View { azimuth, elevation, roll: 7.0, size: [50, 50], scale: Some(4.0), center: None };
+            let camera = Camera::new(&view, &grid).expect("a valid view");
+            let kernel = Kernel::new(&Shear::new(&camera, &grid, 2), sigma, degree, 5.0).expect("a wide kernel");
+            let mut weights = Weights::of(&kernel);
+            for place in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
+                let [u, v] = kernel.weights(place, &mut weights);
+                let runs = kernel.runs();
+                for (j, row) in weights.rows.chunks_exact(runs).enumerate() {
+                    for (i, weight) in row.as_flattened().iter().enumerate() {
+                        let [du, dv] = [place[0] - (u + i as isize) as f64, place[1] - (v + j as isize) as f64];
+                        let expected = kernel.at(du, dv);
+                        assert!((weight - expected).abs() < 1e-12 * kernel.peak, "{place:?}: {weight} for {expected}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn finer_cells_and_higher_degrees_are_nearer() {
         let grid = Grid::unit([20, 20, 20]);
         for (azimuth, elevation) in [(0.0, 0.0), (30.0, 30.0), (45.0, 35.26)] {
             let view = View { azimuth, elevation, roll: 0.0, size: [100, 100], scale: Some(4.0), center: None };
             let camera = Camera::new(&view, &grid).expect("a valid view");
-            for (fineness, degree, most) in [(2, 3, 1.4e-2), (2, 5, 2.1e-3), (3, 5, 1.1e-4), (4, 5, 4e-5)] {
+            for (fineness, degree, most) in [(2, 3, 1.4e-2), (2, 5, 2.1e-3), (3, 5, 1.2e-4), (4, 5, 6e-5)] {
                 let shear = Shear::new(&camera, &grid, fineness);
                 let kernel = Kernel::new(&shear, 3.0, degree, 5.0).expect("a wide kernel");
-                let error = kernel.error(&shear, 3.0);
+                let error = kernel.error(&shear, 3.0, 1.0);
                 assert!(error < most && error > most / 10.0, "{fineness} {degree} at {azimuth}: {error:e}");
             }
         }
@@ -229,11 +332,11 @@ mod tests {
         for (n, (azimuth, elevation)) in [(0.0, 0.0), (30.0, 30.0), (100.0, -70.0)].into_iter().enumerate() {
             let view = View { azimuth, elevation, roll: 20.0, size: [60, 60], scale: Some(4.0), center: None };
             let camera = Camera::new(&view, &grid).expect("a valid view");
-            let shear = Shear::new(&camera, &grid, 2 + n % 2);
-            let sigma = 3.6;
+            let shear = Shear::new(&camera, &grid, 1 + n);
+            let sigma = if n == 0 { 8.0 } else { 3.6 };
             for (degree, radius) in [(3, 4.0), (5, 5.0)] {
                 let kernel = Kernel::new(&shear, sigma, degree, radius).expect("a wide kernel");
-                let stated = kernel.error(&shear, sigma);
+                let stated = kernel.error(&shear, sigma, 1.0);
                 for size in [[1, 1, 1], [7, 1, 1], [1, 6, 5], [7, 6, 5]] {
                     let (off, most) = sums(&shear, &kernel, sigma, size);
                     assert!(off <= stated * most, "{size:?}: {off} of {most}, stated {stated}");

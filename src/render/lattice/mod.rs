@@ -12,8 +12,11 @@
 //! by slice, as the decoder would with no more codes. Passes along time act on whole planes. Operators along different axes
 //! commute, so that in the end the sums are those of the decoded values, each spread over the cells around it by B-splines
 //! and weighted by its depth: equal but for rounding, faces included ([`layer`]).
+//!
+//! Samples of frames, one for every voxel, are spread as they are, row by row ([`dense`]).
 
 mod cells;
+mod dense;
 mod kernel;
 mod layer;
 mod picture;
@@ -26,10 +29,12 @@ use crate::codec::field::Field;
 use crate::codec::pyramid::taps;
 pub(super) use cells::Cells;
 use cells::Row;
+pub(super) use dense::Dense;
 use layer::{Codes, Layer, Nodes, interior, slices};
 pub(super) use picture::{Lattice, Sums};
 use shear::Shear;
 use spline::{Spread, spread};
+use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
 /// A decoded block and its codes.
@@ -56,7 +61,28 @@ struct Spreading {
     tau: f64,
 }
 
+impl Spreading {
+    /// The cells that slices of `count` nodes along b and c reach, and of `pad` nodes around them: the first ones, and how
+    /// many.
+    fn reached(&self, slices: &[Slice], count: [usize; 2], pad: usize) -> ([isize; 2], [usize; 2]) {
+        let q = self.shear.fineness;
+        let range = |i: usize| {
+            let cells = || slices.iter().map(|s| s.cell[i]);
+            let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
+            (low - (q * pad) as isize, (high - low) as usize + q * (count[i] - 1 + 2 * pad) + self.degree + 1)
+        };
+        let (u, v) = (range(0), range(1));
+        ([u.0, v.0], [u.1, v.1])
+    }
+
+    /// exp(-tau z) from a node to some others along b (0) or c (1).
+    fn fading(&self, i: usize, nodes: Range<isize>) -> Vec<f64> {
+        nodes.map(|n| libm::exp(-self.tau * self.shear.depths[i] * n as f64)).collect()
+    }
+}
+
 /// A slice of a block across the principal axis.
+#[derive(Debug)]
 struct Slice {
     /// The first cell that the block's first node reaches.
     cell: [isize; 2],
@@ -95,24 +121,15 @@ struct BlockSplat<'a> {
 
 impl<'a> BlockSplat<'a> {
     fn new(block: &'a Coded<'a>, spreading: &'a Spreading, ks: &'a [usize]) -> Self {
-        let &Spreading { shear, degree, tau } = spreading;
+        let shear = &spreading.shear;
         let nodes = Nodes { shape: block.shape, axes: shear.axes, field: block.field };
         let pad = block.pyramid.map_or(0, |p| reach(p.stencil) << (LEVELS - 1));
-        let slices: Vec<Slice> = (0..block.shape[shear.axes[2]]).map(|k| Slice::new(block, spreading, k)).collect();
-        let [b, c, _] = shear.axes.map(|axis| block.shape[axis]);
-        let q = shear.fineness;
-        let range = |i: usize, length: usize| {
-            let cells = || slices.iter().map(|s| s.cell[i]);
-            let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
-            (low - (q * pad) as isize, (high - low) as usize + q * (length - 1 + 2 * pad) + degree + 1)
-        };
-        let ((first_u, size_u), (first_v, size_v)) = (range(0, b), range(1, c));
-        let cells = Cells::new([first_u, first_v], [size_u, size_v], ks.len());
-        let fade = |i: usize, length: usize| {
-            let from_first = (0..length + 2 * pad).map(|n| n as f64 - pad as f64);
-            from_first.map(|n| libm::exp(-tau * shear.depths[i] * n)).collect()
-        };
-        let fading = [fade(0, b), fade(1, c)];
+        let count = shear.axes.map(|axis| block.shape[axis]);
+        let slices: Vec<Slice> = (0..count[2]).map(|k| Slice::new(block.start, spreading, k)).collect();
+        let (first, size) = spreading.reached(&slices, [count[0], count[1]], pad);
+        let cells = Cells::new(first, size, ks.len());
+        let outside = pad as isize;
+        let fading = [0, 1].map(|i| spreading.fading(i, -outside..count[i] as isize + outside));
         let (layer, work) = (Layer::default(), [Vec::new(), Vec::new()]);
         Self { block, spreading, ks, nodes, cells, slices, fading, pad, layer, work }
     }
@@ -222,8 +239,9 @@ impl<'a> BlockSplat<'a> {
 }
 
 impl Slice {
-    fn new(block: &Coded<'_>, spreading: &Spreading, k: usize) -> Self {
-        let mut voxel = block.start;
+    /// Of the `k`-th slice of a block that begins at voxel `start`.
+    fn new(start: [usize; 3], spreading: &Spreading, k: usize) -> Self {
+        let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
         let [u, v] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
         let fading = libm::exp(-spreading.tau * spreading.shear.depth(voxel));

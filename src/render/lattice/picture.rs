@@ -1,10 +1,10 @@
 //! The lattice of one view as a way of splatting: when it is used, the sums of blocks, and from sums to pixels.
 
 use super::cells::Cells;
-use super::kernel::Kernel;
+use super::kernel::{Kernel, Run, Weights};
 use super::shear::Shear;
 use super::spline::spread;
-use super::{Coded, Spreading, block_cells};
+use super::{Coded, Dense, Spreading, block_cells};
 use crate::camera::Camera;
 use crate::footprint::{Footprint, Kernel as Gaussian, Method};
 use crate::render::splat::{TILE, Tile};
@@ -14,7 +14,7 @@ use multiversion::multiversion;
 use std::ops::Range;
 
 /// The lattice of a view.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Lattice {
     spreading: Spreading,
     kernel: Kernel,
@@ -35,7 +35,7 @@ pub struct Sums {
 }
 
 /// Cells per voxel and degrees of splines, from the cheapest.
-const CHOICES: [(usize, usize); 6] = [(2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
+const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
 /// What amounts grow by from one voxel to the next, at most, as an exponent: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
 /// Nodes that a block may have outside.
@@ -64,7 +64,7 @@ impl Lattice {
             if !lattice.suits(blocks) || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
                 return None; // nor do finer ones
             }
-            let stated_error = kernel.error(&shear, sigma);
+            let stated_error = lattice.kernel.error(&shear, sigma, error);
             if stated_error <= error {
                 return Some((lattice, Method { name: "lattice", radius, stated_error }));
             }
@@ -89,7 +89,7 @@ impl Lattice {
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let places = [self.place([0.0; 2]), self.kernel.half];
+        let places = [self.place([0.0; 2]), self.kernel.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
         per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64)) && places.iter().all(|n| within(n, 1e9))
     }
@@ -98,7 +98,7 @@ impl Lattice {
     fn work(&self, camera: &Camera, clip: &Region) -> f64 {
         let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
         let voxels = clip.voxels() as f64;
-        GATHERING * self.kernel.cells() * (camera.size[0] * camera.size[1]) as f64
+        GATHERING * self.kernel.cells() as f64 * (camera.size[0] * camera.size[1]) as f64
             + 2.0 * voxels * (degree + 1.0) * (q + 1.0)
     }
 
@@ -137,7 +137,7 @@ impl Lattice {
         for place in corners.map(|pixel| self.place(pixel)) {
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
         }
-        let half = self.kernel.half;
+        let half = self.kernel.half();
         let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
         (first, [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize))
     }
@@ -177,6 +177,11 @@ impl Lattice {
         Sums { cells, coefficients: 0, bytes_read: 0 }
     }
 
+    /// The sums in the making of a block with an amount for each voxel.
+    pub(in crate::render) fn dense(&self, region: &Region, planes: usize) -> Dense {
+        Dense::new(&self.spreading, region, planes)
+    }
+
     /// The sums of terms of the voxels of `region` that lie in `clip`.
     pub(in crate::render) fn of_terms(&self, terms: &Terms, region: &Region, clip: &Region, planes: usize) -> Sums {
         let (first, size) = self.rectangle(region, 0);
@@ -213,39 +218,30 @@ impl Lattice {
     /// The pixels of a tile from its cells.
     pub(in crate::render) fn gather(&self, cells: &Cells, tile: &mut Tile) {
         let (count, width) = (tile.count(), tile.x.len());
-        let (mut row, mut seen) = (Vec::new(), Seen::default());
+        let mut weights = Weights::of(&self.kernel);
         let (left, top) = (tile.x.start, tile.y.start);
         for (n, pixel) in tile.sums_mut().chunks_exact_mut(count).enumerate() {
             let place = self.place([(left + n % width) as f64 + 0.5, (top + n / width) as f64 + 0.5]);
-            seen.clear();
-            for v in self.kernel.rows(place[1]) {
-                let first = self.kernel.row(place, v, &mut row);
-                if !row.is_empty() {
-                    let at = (v - cells.first[1]) as usize * cells.size[0] + (first - cells.first[0]) as usize;
-                    seen.add(at, &row);
-                }
-            }
-            sum_cells(pixel, self.peak, &seen, &cells.sums);
+            let first = self.kernel.weights(place, &mut weights);
+            let [u, v] = [0, 1].map(|i| (first[i] - cells.first[i]) as usize);
+            let rows = Rows { runs: &weights.rows, spans: &self.kernel.spans, first: v * cells.size[0] + u };
+            sum_cells(pixel, self.peak, &rows, cells);
         }
     }
 }
 
-/// The cells that a pixel sees: for each row the first one, and where its weights end.
-#[derive(Default)]
-struct Seen {
-    rows: Vec<(usize, usize)>,
-    weights: Vec<f64>,
+/// The cells that a pixel sees.
+struct Rows<'a> {
+    /// The weights of rows, as many in each; those in its span count.
+    runs: &'a [Run],
+    spans: &'a [Range<usize>],
+    /// The first cell of the first row.
+    first: usize,
 }
 
-impl Seen {
-    fn clear(&mut self) {
-        self.rows.clear();
-        self.weights.clear();
-    }
-
-    fn add(&mut self, first: usize, row: &[f64]) {
-        self.weights.extend_from_slice(row);
-        self.rows.push((first, self.weights.len()));
+impl From<Dense> for Sums {
+    fn from(dense: Dense) -> Self {
+        Self { cells: dense.cells, coefficients: 0, bytes_read: 0 }
     }
 }
 
@@ -269,43 +265,45 @@ impl Sums {
 
 /// The planes of a pixel: the weighted sums of cells, each with all planes side by side, times `peak`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn sum_cells(pixel: &mut [f64], peak: f64, seen: &Seen, cells: &[f64]) {
+fn sum_cells(pixel: &mut [f64], peak: f64, rows: &Rows<'_>, cells: &Cells) {
     let mut plane = 0;
     while plane < pixel.len() {
         match pixel.len() - plane {
-            32.. => sum_planes::<32>(pixel, &mut plane, peak, seen, cells),
-            8.. => sum_planes::<8>(pixel, &mut plane, peak, seen, cells),
-            _ => sum_planes::<1>(pixel, &mut plane, peak, seen, cells),
+            32.. => sum_planes::<32>(pixel, &mut plane, peak, rows, cells),
+            8.. => sum_planes::<8>(pixel, &mut plane, peak, rows, cells),
+            4.. => sum_planes::<4>(pixel, &mut plane, peak, rows, cells),
+            2.. => sum_planes::<2>(pixel, &mut plane, peak, rows, cells),
+            _ => sum_planes::<1>(pixel, &mut plane, peak, rows, cells),
         }
     }
 }
 
 /// The same of `N` planes, whose sums stay in registers.
 #[inline(always)]
-fn sum_planes<const N: usize>(pixel: &mut [f64], plane: &mut usize, peak: f64, seen: &Seen, cells: &[f64]) {
+fn sum_planes<const N: usize>(pixel: &mut [f64], plane: &mut usize, peak: f64, rows: &Rows<'_>, cells: &Cells) {
     let mut sums = [0.0; N];
-    let mut start = 0;
-    for (first, end) in &seen.rows {
-        let row = cells[first * pixel.len() + *plane..].chunks(pixel.len());
-        for (weight, cell) in seen.weights[start..*end].iter().zip(row) {
+    let weights = rows.runs.chunks_exact(rows.runs.len() / rows.spans.len());
+    for (n, (span, weights)) in rows.spans.iter().zip(weights).enumerate().filter(|(_, (span, _))| !span.is_empty()) {
+        let first = rows.first + n * cells.size[0] + span.start;
+        let row = cells.sums[first * pixel.len() + *plane..].chunks(pixel.len());
+        for (weight, cell) in weights.as_flattened()[span.clone()].iter().zip(row) {
             let Some(cell) = cell.first_chunk::<N>() else { continue };
             for (sum, value) in sums.iter_mut().zip(cell) {
                 *sum += weight * value;
             }
         }
-        start = *end;
     }
     pixel[*plane..*plane + N].iter_mut().zip(sums).for_each(|(pixel, sum)| *pixel = sum * peak);
     *plane += N;
 }
 
 /// What a product takes from cells to pixels in units of one of a footprint, as measured, weights included.
-const GATHERING: f64 = 3.0;
+const GATHERING: f64 = 1.0;
 
 /// Nothing cheaper has larger errors.
 const LARGEST: f64 = 0.05;
 /// Errors that no lattice reaches.
-const SMALLEST: f64 = 1e-6;
+const SMALLEST: f64 = 1e-7;
 
 fn area([width, height]: [usize; 2]) -> usize {
     width * height

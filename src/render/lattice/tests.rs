@@ -139,3 +139,34 @@ fn large_blocks_too() {
         assert!(off < 1e-12, "{size:?}: {off:e}");
     }
 }
+
+#[test]
+fn an_amount_for_every_voxel_is_as_each_by_itself() {
+    for seed in 0..300 {
+        let mut random = Random(seed);
+        let start: [usize; 3] = std::array::from_fn(|_| random.below(30));
+        let region = Region { start, end: start.map(|s| s + 1 + random.below(9)) };
+        let spacing = std::array::from_fn(|_| random.pick(&[1.0, 1.0, 0.4, 1.7]));
+        let grid = Grid { dims: region.end, spacing, origin: [3.0, -7.0, 40.0] };
+        let camera = Camera::new(&random_view(&mut random), &grid).expect("a valid view");
+        let shear = Shear::new(&camera, &grid, random.pick(&[1, 2, 3]));
+        let spreading = Spreading { shear, degree: random.pick(&[1, 3, 5]), tau: random.pick(&[0.0, 0.2]) };
+        let mut dense = Dense::new(&spreading, &region, 2);
+        let mut slow = Cells::new(dense.cells.first.map(|n| n - 1), dense.cells.size.map(|n| n + 2), 2);
+        for plane in 0..2 {
+            let amounts: Vec<f64> = (0..region.voxels()).map(|_| random.between(-1.0, 1.0)).collect();
+            dense.add(plane, &amounts);
+            for (voxel, amount) in region.iter().zip(amounts) {
+                let fading = (-spreading.tau * shear.depth(voxel)).exp();
+                let places = shear.place(voxel).map(|place| spread(spreading.degree, place));
+                slow.add(plane, amount * fading, places, spreading.degree);
+            }
+        }
+        let [width, height] = dense.cells.size;
+        for (n, sum) in dense.cells.sums.iter().enumerate() {
+            let (plane, v, u) = (n / (width * height), n / width % height, n % width);
+            let expected = slow.plane(plane)[(v + 1) * (width + 2) + u + 1];
+            assert!((sum - expected).abs() < 1e-10 * (1.0 + expected.abs()), "{seed}: {sum} for {expected}");
+        }
+    }
+}
