@@ -192,8 +192,8 @@ impl Cli {
     /// Where pictures go, and where those of their errors go.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Sink, Option<Sink>)> {
         let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
-        let outputs = [Some(&self.output), self.error_image.as_ref()].into_iter().flatten();
-        outputs.into_iter().try_for_each(|output| spare_inputs(&self.inputs, output))?;
+        let mut outputs = [Some(&self.output), self.error_image.as_ref()].into_iter().flatten();
+        outputs.try_for_each(|output| spare_inputs(&self.inputs, output))?;
         let of_errors = self.error_image.as_deref().map(|path| Ok((path, format_of(path)?))).transpose()?;
         let own = |path: &Path| path != self.output && path != Path::new(STANDARD);
         if !self.error_image.as_deref().is_none_or(own) {

@@ -307,21 +307,15 @@ impl Eye {
         if let Some(lattice) = &self.lattice {
             return self.splat_on(lattice, tiles, blocks, batch, source, report);
         }
-        let mut clock = Instant::now();
-        for blocks in blocks.chunks(batch) {
-            let project = |block: &usize| {
-                let region = self.blocks.region(*block);
-                let terms = source.terms(*block)?;
-                Ok(Splats::new(terms, &region, &self.clip, &self.grid, &self.camera, &self.footprint))
-            };
-            let splats = blocks.par_iter().map(project).collect::<Result<Vec<Splats>>>()?;
-            lap(&mut clock, &mut report.decode_seconds);
-            tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|s| tile.splat(s, &self.footprint)));
-            report.coefficients += splats.iter().map(Splats::coefficients).sum::<u64>();
-            report.bytes_read += splats.iter().map(Splats::bytes_read).sum::<u64>();
-            lap(&mut clock, &mut report.splat_seconds);
-        }
-        Ok(())
+        let project = |block: usize| {
+            let terms = source.terms(block)?;
+            let held = [terms.coefficients, terms.bytes_read];
+            let region = self.blocks.region(block);
+            Ok((Splats::new(terms, &region, &self.clip, &self.grid, &self.camera, &self.footprint), held))
+        };
+        in_batches(blocks, batch, report, project, |splats| {
+            tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, &self.footprint)));
+        })
     }
 
     /// The same by way of a lattice.
@@ -334,28 +328,47 @@ impl Eye {
         source: &dyn Blocks,
         report: &mut RenderReport,
     ) -> Result<()> {
-        let mut clock = Instant::now();
         let planes = tiles.first().map_or(0, Tile::count);
         let mut cells: Vec<Cells> = tiles.iter().map(|tile| lattice.cells_of(tile)).collect();
-        let sums_of = |block: &usize| {
-            let region = self.blocks.region(*block);
-            Ok(match source.sums(*block, &self.clip, lattice)? {
+        let sums_of = |block: usize| {
+            let sums: Sums = match source.sums(block, &self.clip, lattice)? {
                 Some(sums) => sums,
-                None => lattice.of_terms(&source.terms(*block)?, &region, &self.clip, planes),
-            })
+                None => lattice.of_terms(&source.terms(block)?, &self.blocks.region(block), &self.clip, planes),
+            };
+            let held = [sums.coefficients, sums.bytes_read];
+            Ok((sums, held))
         };
-        for blocks in blocks.chunks(batch) {
-            let sums = blocks.par_iter().map(sums_of).collect::<Result<Vec<Sums>>>()?;
-            lap(&mut clock, &mut report.decode_seconds);
-            cells.par_iter_mut().for_each(|cells| sums.iter().for_each(|s| s.add_to(cells, planes)));
-            report.coefficients += sums.iter().map(|s| s.coefficients).sum::<u64>();
-            report.bytes_read += sums.iter().map(|s| s.bytes_read).sum::<u64>();
-            lap(&mut clock, &mut report.splat_seconds);
-        }
+        in_batches(blocks, batch, report, sums_of, |sums| {
+            cells.par_iter_mut().for_each(|cells| sums.iter().for_each(|(s, _)| s.add_to(cells, planes)));
+        })?;
+        let mut clock = Instant::now();
         tiles.par_iter_mut().zip(&cells).for_each(|(tile, cells)| lattice.gather(cells, tile));
         lap(&mut clock, &mut report.splat_seconds);
         Ok(())
     }
+}
+
+/// Makes something of every block, in order and `batch` at a time, each with its coefficients and the bytes read for them,
+/// and adds it.
+fn in_batches<T: Send>(
+    blocks: &[usize],
+    batch: usize,
+    report: &mut RenderReport,
+    make: impl Fn(usize) -> Result<(T, [u64; 2])> + Sync,
+    mut add: impl FnMut(&[(T, [u64; 2])]),
+) -> Result<()> {
+    let mut clock = Instant::now();
+    for blocks in blocks.chunks(batch) {
+        let made = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
+        lap(&mut clock, &mut report.decode_seconds);
+        add(&made);
+        for (_, [coefficients, bytes_read]) in &made {
+            report.coefficients += coefficients;
+            report.bytes_read += bytes_read;
+        }
+        lap(&mut clock, &mut report.splat_seconds);
+    }
+    Ok(())
 }
 
 /// Where the terms of blocks come from, and for a lattice their sums, if there is a shorter way to these.

@@ -202,16 +202,6 @@ impl Splats {
         let y = reach(voxels.iter().map(|v| footprint.span(v.y, size[1])));
         Self { voxels, terms, size, x, y }
     }
-
-    /// Nonzero coefficients among the terms.
-    pub(super) fn coefficients(&self) -> u64 {
-        self.terms.coefficients
-    }
-
-    /// Stored bytes that were read.
-    pub(super) fn bytes_read(&self) -> u64 {
-        self.terms.bytes_read
-    }
 }
 
 /// The smallest range that holds all that are not empty.

@@ -126,6 +126,24 @@ enum OtherBench {
     Speed(SpeedArgs),
 }
 
+/// Other coders and renderers.
+#[derive(Args)]
+struct PeerArgs {
+    /// Also measure other programs: the Python that has what tools/peers/requirements.txt names
+    #[arg(long, value_name = "PYTHON")]
+    peers: Option<PathBuf>,
+    /// What Python is to run; views.py is taken from beside it [default: tools/peers/peers.py of the sources]
+    #[arg(long, value_name = "FILE", requires = "peers")]
+    script: Option<PathBuf>,
+}
+
+impl PeerArgs {
+    fn given(&self) -> Option<Peers> {
+        let script = || self.script.clone().unwrap_or_else(Peers::usual_script);
+        self.peers.clone().map(|python| Peers { python, script: script() })
+    }
+}
+
 #[derive(Args)]
 struct SpeedArgs {
     /// Archives (t, z, y, x), each one .npy
@@ -158,12 +176,8 @@ struct SpeedArgs {
     /// Also look at the memory of converting 4 GiB and 20 GiB, which are written to the folder of results
     #[arg(long)]
     large: bool,
-    /// Also measure other programs: the Python that has what tools/peers/requirements.txt names
-    #[arg(long, value_name = "PYTHON")]
-    peers: Option<PathBuf>,
-    /// What Python is to run; views.py is taken from beside it [default: tools/peers/peers.py of the sources]
-    #[arg(long, value_name = "FILE", requires = "peers")]
-    script: Option<PathBuf>,
+    #[command(flatten)]
+    peers: PeerArgs,
     /// The folder of speed.json and speed.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
@@ -174,7 +188,6 @@ struct SpeedArgs {
 
 impl SpeedArgs {
     fn config(&self) -> Result<speed::Config> {
-        let script = || self.script.clone().unwrap_or_else(Peers::usual_script);
         let usual = if self.inputs.is_empty() { speed::KINDS.to_vec() } else { Vec::new() };
         let sizes = if self.small { &speed::SMALL } else { &speed::USUAL };
         Ok(speed::Config {
@@ -187,7 +200,7 @@ impl SpeedArgs {
             threads: self.threads.clone(),
             repeats: self.repeats.unwrap_or(sizes.repeats),
             large: if self.large { sizes.large.to_vec() } else { Vec::new() },
-            peers: self.peers.clone().map(|python| Peers { python, script: script() }),
+            peers: self.peers.given(),
             output: self.output.clone(),
             program: this_program()?,
             date: self.date.clone(),
@@ -219,12 +232,8 @@ struct SizeArgs {
     /// Archives to make [default: the usual ones where there are no inputs]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Subject>>,
-    /// Also measure other coders: the Python that has what tools/peers/requirements.txt names
-    #[arg(long, value_name = "PYTHON")]
-    peers: Option<PathBuf>,
-    /// What Python is to run [default: tools/peers/peers.py of the sources]
-    #[arg(long, value_name = "FILE", requires = "peers")]
-    script: Option<PathBuf>,
+    #[command(flatten)]
+    peers: PeerArgs,
     /// The folder of size.json and size.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
@@ -244,14 +253,13 @@ struct SizeArgs {
 
 impl SizeArgs {
     fn config(&self) -> Result<size::Config> {
-        let script = || self.script.clone().unwrap_or_else(Peers::usual_script);
         Ok(size::Config {
             inputs: self.inputs.clone(),
             subjects: self.kinds.clone(),
             small: self.small,
             tolerances: self.tolerances.clone(),
             repeats: self.repeats,
-            peers: self.peers.clone().map(|python| Peers { python, script: script() }),
+            peers: self.peers.given(),
             output: self.output.clone(),
             program: this_program()?,
             date: self.date.clone(),

@@ -1,7 +1,7 @@
 //! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
 
 use super::look::{Look, SIGMA};
-use super::machine::{self, Machine};
+use super::machine::Made;
 use super::size::Data;
 use super::stages::MEMORY;
 use super::step::{Outcome, Step, in_process};
@@ -49,14 +49,9 @@ pub struct Config {
 /// All results of a run: `layers.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Results {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// The version of the tools.
-    pub version: String,
-    /// Where it ran.
-    pub machine: Machine,
-    /// The day it was written.
-    pub date: String,
+    /// By what, where and when.
+    #[serde(flatten)]
+    pub made: Made,
     /// What was measured.
     pub data: Vec<Data>,
     /// Every archive at every tolerance by both measures, after the whole file.
@@ -113,9 +108,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
         let outcome: Outcome<Vec<Row>> = in_process(&config.program, &Step::Layers(task))?;
         rows.extend(outcome.did);
     }
-    let date = config.date.clone().unwrap_or_else(machine::today);
-    let version = env!("CARGO_PKG_VERSION").into();
-    let results = Results { schema: SCHEMA, version, machine: Machine::this(), date, data, rows };
+    let results = Results { made: Made::here(SCHEMA, config.date.as_ref()), data, rows };
     let text = markdown(&results);
     let json = config.output.join("layers.json");
     let numbers = serde_json::to_string_pretty(&results).map_err(|e| super::bad_json(&json, &e))?;
@@ -218,7 +211,7 @@ const TITLES: &str = "\
 ";
 
 fn markdown(results: &Results) -> String {
-    let Results { machine, version, date, .. } = results;
+    let Made { machine, version, date, .. } = &results.made;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let made = format!("wavesplat {version}, {} threads of {cpu}, {}, {date}", machine.cores, machine.system);
     let mut text = format!("# What a looser tolerance leaves unread\n\n{made}.\n\n{HEAD}\n{TITLES}");

@@ -23,6 +23,27 @@ impl Machine {
     }
 }
 
+/// What stands first in every file of results.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Made {
+    /// The number of the file's layout.
+    pub schema: u32,
+    /// The version of the tools.
+    pub version: String,
+    /// Where it ran.
+    pub machine: Machine,
+    /// The day it was written.
+    pub date: String,
+}
+
+impl Made {
+    /// Here; by default today.
+    pub(super) fn here(schema: u32, date: Option<&String>) -> Self {
+        let date = date.cloned().unwrap_or_else(today);
+        Self { schema, version: env!("CARGO_PKG_VERSION").into(), machine: Machine::this(), date }
+    }
+}
+
 fn cpu() -> Option<String> {
     let info = fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = info.lines().find(|line| line.starts_with("model name"))?;

@@ -117,6 +117,12 @@ impl Data {
         path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
+    /// Its name and its size, for people.
+    pub(in crate::bench) fn in_words(&self) -> String {
+        let [x, y, z] = self.dims;
+        format!("*{}*: {x}x{y}x{z} voxels, {} frames, {}", self.name, self.frames, self.samples)
+    }
+
     /// Of a file; every sample is read.
     pub(in crate::bench) fn of(path: PathBuf) -> Result<Self> {
         let mut source = source::open(std::slice::from_ref(&path), &OpenOptions::default())?;

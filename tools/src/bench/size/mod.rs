@@ -24,7 +24,7 @@ pub use row::{Own, Results, Row};
 pub use schemes::{BASELINE, SCHEMES, Scheme};
 pub use targets::Verdict;
 
-use super::machine::{self, Machine};
+use super::machine::Made;
 use super::step::{Outcome, Step, in_process};
 use own::{Measured, Task};
 use peers::PeersTask;
@@ -76,10 +76,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
     }
     fs::remove_dir_all(&work).map_err(|e| Error::io(&work, "removing", e))?;
     let results = Results {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION").into(),
-        machine: Machine::this(),
-        date: config.date.clone().unwrap_or_else(machine::today),
+        made: Made::here(SCHEMA, config.date.as_ref()),
         rounds: config.repeats,
         data,
         verdicts: targets::judge(&rows),

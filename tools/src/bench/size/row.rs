@@ -3,20 +3,15 @@
 use super::data::Data;
 use super::own::Measured;
 use super::targets::Verdict;
-use crate::bench::machine::Machine;
+use crate::bench::machine::Made;
 use serde::{Deserialize, Serialize};
 
 /// All results of a run: `size.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Results {
-    /// [`super::SCHEMA`].
-    pub schema: u32,
-    /// The version of the tools.
-    pub version: String,
-    /// Where it ran.
-    pub machine: Machine,
-    /// The day it was written.
-    pub date: String,
+    /// By what, where and when.
+    #[serde(flatten)]
+    pub made: Made,
     /// How many rounds were run, in each of which every time is taken [`super::IN_A_ROW`] times.
     pub rounds: usize,
     /// What was measured.

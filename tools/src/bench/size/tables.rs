@@ -3,6 +3,7 @@
 use super::row::{Results, Row};
 use super::schemes::{BASELINE, SCHEMES};
 use super::targets::{TARGETS, Verdict};
+use crate::bench::machine::Made;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
@@ -28,15 +29,12 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let machine = &results.machine;
+    let Results { made: Made { machine, version, date, .. }, rounds, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
-    let mut text = format!(
-        "wavesplat {} on one core of {cpu}, {}, {}; {} round(s).\n",
-        results.version, machine.system, results.date, results.rounds
-    );
+    let mut text =
+        format!("wavesplat {version} on one core of {cpu}, {}, {date}; {rounds} round(s).\n", machine.system);
     for data in &results.data {
-        let [x, y, z] = data.dims;
-        let _ = write!(text, "\n- *{}*: {x}x{y}x{z} voxels, {} frames, {}", data.name, data.frames, data.samples);
+        let _ = write!(text, "\n- {}", data.in_words());
     }
     text
 }

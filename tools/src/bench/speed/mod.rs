@@ -30,7 +30,7 @@ pub(super) mod work;
 pub use measured::{Measured, Time};
 pub use rows::Row;
 
-use super::machine::{self, Machine};
+use super::machine::Made;
 use super::size::{Data, Peers};
 use super::step::{Outcome, Step, in_process};
 use crate::output::{Format, Shape, Target};
@@ -110,14 +110,9 @@ pub struct Config {
 /// All results of a run: `speed.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Results {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// The version of the tools.
-    pub version: String,
-    /// Where it ran.
-    pub machine: Machine,
-    /// The day it was written.
-    pub date: String,
+    /// By what, where and when.
+    #[serde(flatten)]
+    pub made: Made,
     /// How many rounds were run.
     pub rounds: usize,
     /// Pixels a side of a picture.
@@ -170,10 +165,7 @@ impl Results {
     /// Nothing yet.
     fn new(config: &Config) -> Self {
         Self {
-            schema: SCHEMA,
-            version: env!("CARGO_PKG_VERSION").into(),
-            machine: Machine::this(),
-            date: config.date.clone().unwrap_or_else(machine::today),
+            made: Made::here(SCHEMA, config.date.as_ref()),
             rounds: config.repeats,
             size: config.size,
             archives: Vec::new(),

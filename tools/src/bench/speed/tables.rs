@@ -4,6 +4,7 @@ use super::measured::Measured;
 use super::plan::{FINEST, LOOSER, WHOLE};
 use super::rows::{Row, further};
 use super::{Archive, Results};
+use crate::bench::machine::Made;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
@@ -32,13 +33,12 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { machine, version, date, rounds, size, .. } = results;
+    let Results { made: Made { machine, version, date, .. }, rounds, size, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let mut text =
         format!("wavesplat {version} on {cpu}, {}, {date}; {rounds} round(s), {size}x{size} pixels.\n", machine.system);
     for Archive { data, .. } in &results.archives {
-        let [x, y, z] = data.dims;
-        let _ = write!(text, "\n- *{}*: {x}x{y}x{z} voxels, {} frames, {}", data.name, data.frames, data.samples);
+        let _ = write!(text, "\n- {}", data.in_words());
     }
     for name in &results.left {
         let _ = write!(text, "\n- *{name}*: not measured, since the run was interrupted");
