@@ -99,6 +99,32 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
+    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at depth `z`,
+    /// and each next one a `step` in pixels and in depth from the one before. They should not be much further than reach.
+    pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
+        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
+        if self.decay > NARROW {
+            let at = |n: f64| libm::exp(-exponent([off[0] + n * step[0], off[1] + n * step[1]], z + n * deeper));
+            return self.peak * (0..count).map(|n| at(n as f64)).sum::<f64>();
+        }
+        let mut weight = self.peak * libm::exp(-exponent(off, z));
+        let mut quotient = libm::exp(-self.tau * deeper - self.decay * (2.0 * dot(off, step) + dot(step, step)));
+        let bend = libm::exp(-2.0 * self.decay * dot(step, step));
+        let mut sum = 0.0;
+        for _ in 0..count {
+            sum += weight;
+            weight *= quotient;
+            quotient *= bend;
+        }
+        sum
+    }
+
+    /// What a weight so many pixels from a voxel is of the one at its centre.
+    pub fn share(&self, [x, y]: [f64; 2]) -> f64 {
+        libm::exp(-self.decay * (x * x + y * y))
+    }
+
     /// The standard deviation of its Gaussian, in pixels.
     pub fn deviation(&self) -> f64 {
         (0.5 / self.decay).sqrt()
@@ -151,6 +177,9 @@ const RUN: usize = 64;
 /// More than the exponentials of both axes and of the peak, and the quotients of a run, can be off together.
 const EXPONENTIALS: f64 = 2e-12;
 
+/// Up to this decay quotients of voxels that are both within reach are numbers.
+const NARROW: f64 = 30.0;
+
 /// Beyond this decay a weight may underflow where its quotient overflows. A span is then two pixels: each is computed.
 const STEEP: f64 = 100.0;
 
@@ -174,6 +203,21 @@ mod tests {
             for (pixel, w) in span.zip(&weights) {
                 let d = pixel as f64 + 0.5 - centre;
                 assert!((w - (-f.decay * d * d).exp()).abs() < 1e-11, "scale {scale} offset {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_voxels_sum_up_to_their_weights() {
+        for scale in [1e-3, 0.03, 0.1, 0.2, 1.0, 7.3] {
+            let f = footprint(scale);
+            for step in [0.01, 0.3, 1.0, 2.0, 13.0].map(|voxels| voxels * f.reach) {
+                let (off, step) = ([-f.reach, 0.3 * f.reach], [step, -0.1 * step]);
+                let count = (2.5 * f.reach / step[0]).ceil() as usize;
+                let at = |n: usize| [0, 1].map(|i| off[i] + n as f64 * step[i]);
+                let expected: f64 = (0..count).map(|n| f.at_depth(3.0 + 0.5 * n as f64) * f.share(at(n))).sum();
+                let found = f.sum_of_row(off, 3.0, (step, 0.5), count);
+                assert!((found - expected).abs() <= 1e-9 * expected, "{scale} {step:?}: {found} for {expected}");
             }
         }
     }

@@ -17,10 +17,10 @@
 //!    v
 //!  blocks that the picture needs            render/     plan: what fits in memory; reading: what the error allows to
 //!    |                                                  leave out; scene: what is splatted
-//!    |  terms: (plane, amount) per voxel    codec/      the same decoder
+//!    |  amounts of voxels, plane by plane   codec/      the same decoder
 //!    v
-//!  planes of tiles                          camera.rs, footprint.rs, render/splat.rs (eq 4 and 9); or pass by pass on
-//!    |                                      the sheared lattice of the view: render/lattice/
+//!  planes of cells, then of tiles           render/lattice/ spread and gather on the sheared lattice of the view; or
+//!    |                                      footprint.rs, render/splat.rs (eq 4 and 9); camera.rs, render/canvas.rs
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
 //!  pictures, and what is known of errors    render/finish.rs, weights.rs (eq 12), certificate.rs, expectation.rs,

@@ -75,7 +75,7 @@ impl<'a> Truth<'a> {
     /// What is missing is splatted with the cut, so that the border of the background moves by what lies beyond.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let share = self.images.weight[at] / self.images.largest_weight;
-        self.masked && (share - BACKGROUND).abs() < report.stated_splat_error * BACKGROUND
+        self.masked && (share - BACKGROUND).abs() < report.stated_splat_error
     }
 }
 

@@ -67,9 +67,8 @@ fn every_footprint_keeps_the_error_that_it_states() {
         let mut background: Option<Vec<bool>> = None;
         for error in [5e-2, 1e-2, 2e-3, 2e-4, 2e-5, 0.0] {
             for quantity in [Quantity::Emission, Quantity::Mean] {
-                let factor = if quantity == Quantity::Mean { 100.0 } else { 1.0 };
                 let plain = looking(view, tau, quantity, &grid, 2);
-                let config = RenderConfig { splat_error: error * factor, ..plain };
+                let config = RenderConfig { splat_error: error, ..plain };
                 let (found, report) = pictures(&mut scene, &config);
                 assert!(report.stated_splat_error <= config.splat_error || error == 0.0);
                 let truth = truth(&grid, &config, report.scale, &samples, None);
@@ -77,9 +76,11 @@ fn every_footprint_keeps_the_error_that_it_states() {
                     Quantity::Emission => (&truth.emission, largest(&samples) * truth.largest_weight),
                     Quantity::Mean => (&truth.mean, hi - lo),
                 };
-                for (found, expected) in found.iter().zip(expected) {
+                for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
                     let off = (f64::from(*found) - expected).abs();
-                    let most = report.stated_splat_error * unit + rounding(*found);
+                    let share = truth.weight[at] / truth.largest_weight;
+                    let less = if quantity == Quantity::Mean { 1.0 / share } else { 1.0 };
+                    let most = report.stated_splat_error * unit * less + rounding(*found);
                     assert!(found.is_nan() || off <= most, "scene {n}, {}: {found} for {expected}", report.method);
                 }
                 if quantity == Quantity::Mean {

@@ -3,6 +3,7 @@
 use crate::common::views::{archive, field, largest, rounding, truth, view};
 use crate::common::{direct, looking, pictures, settings, stored};
 use crate::images::under_less_memory;
+use crate::reference::splat::Images;
 use wavesplat::camera::View;
 use wavesplat::convert::{Coding, ConvertConfig};
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, Scene, What};
@@ -34,23 +35,20 @@ fn a_lattice_keeps_the_error_that_it_states() {
     for (n, (grid, view, tau)) in scenes().into_iter().enumerate() {
         let mut samples = field(&grid, FRAMES, n as u64);
         samples.iter_mut().for_each(|v| *v += 20.0); // means must not suffer from an offset
-        let config = looking(view, tau, Quantity::Emission, &grid, FRAMES);
         let scale = view.scale.unwrap();
-        let brightest = truth(&grid, &config, scale, &vec![0.0; grid.whole().voxels()], None).largest_weight;
         for (i, convert) in configs().into_iter().enumerate() {
             let mut memory = archive(grid, SampleType::F64, &samples);
             let stored = stored(&mut memory, &convert);
             let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
             for quantity in [Quantity::Emission, Quantity::Mean] {
-                let splat_error = if quantity == Quantity::Mean { 0.5 } else { 5e-3 };
                 let plain = looking(view, tau, quantity, &grid, FRAMES);
                 let region = Region { start: [1, 2, 3], ..grid.whole() };
                 let region = (i == 1).then_some(region);
                 let exact = RenderConfig { region, splat_error: 0.0, ..plain.clone() };
-                let quick = RenderConfig { region, splat_error, ..plain };
-                let (magnitude, range) = (1.01 * largest(&samples), 1.02 * span(&samples));
-                let unit = if quantity == Quantity::Mean { range } else { magnitude * brightest };
-                found += keeps_its_error(&mut scene, [&exact, &quick], unit, &format!("scene {n}, {i}"));
+                let quick = RenderConfig { region, splat_error: 5e-3, ..plain };
+                let seen = truth(&grid, &exact, scale, &vec![0.0; grid.whole().voxels()], None);
+                let largest = (1.01 * largest(&samples), 1.02 * span(&samples));
+                found += keeps_its_error(&mut scene, [&exact, &quick], (largest, &seen), &format!("scene {n}, {i}"));
             }
         }
     }
@@ -58,10 +56,20 @@ fn a_lattice_keeps_the_error_that_it_states() {
 }
 
 /// Whether it was on a lattice.
-fn keeps_its_error(scene: &mut dyn Scene, [exact, quick]: [&RenderConfig; 2], unit: f64, what: &str) -> usize {
+fn keeps_its_error(
+    scene: &mut dyn Scene,
+    [exact, quick]: [&RenderConfig; 2],
+    ((magnitude, range), seen): ((f64, f64), &Images),
+    what: &str,
+) -> usize {
     let ((expected, _), (pictures, report)) = (pictures(scene, exact), pictures(scene, quick));
-    for (found, expected) in pictures.iter().zip(&expected) {
+    for (at, (found, expected)) in pictures.iter().zip(&expected).enumerate() {
         assert_eq!(found.is_nan(), expected.is_nan(), "{what}");
+        let weight = seen.weight[at % seen.weight.len()];
+        let unit = match quick.quantity {
+            Quantity::Mean => range * seen.largest_weight / weight,
+            Quantity::Emission => magnitude * seen.largest_weight,
+        };
         let most = (report.stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
         let off = f64::from(*found) - f64::from(*expected);
         assert!(found.is_nan() || off.abs() <= most, "{what}: {found} for {expected}");
@@ -87,22 +95,20 @@ fn frames_on_a_lattice_keep_the_error_that_they_state() {
     let grid = Grid { dims: [33, 37, 35], spacing: [1.0, 1.0, 0.8], origin: [5.0, 0.0, -3.0] };
     let mut samples = field(&grid, 2, 3);
     samples.iter_mut().for_each(|v| *v += 20.0);
-    let (magnitude, range) = (largest(&samples), span(&samples));
+    let largest = (largest(&samples), span(&samples));
     for (n, (azimuth, elevation)) in DIRECTIONS.into_iter().enumerate() {
         let view = View { scale: Some(3.0), roll: 15.0 * (n % 3) as f64, ..view(azimuth, elevation, [70, 65]) };
         let tau = [0.0, 0.03][n % 2];
         let mut memory = archive(grid, SampleType::F64, &samples);
         let region = (n == 5).then_some(Region { start: [0, 2, 1], ..grid.whole() });
         let plain = RenderConfig { region, ..looking(view, tau, Quantity::Emission, &grid, 2) };
-        let brightest = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None).largest_weight;
+        let seen = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None);
         for splat_error in [2e-2, 1e-3, 3e-5] {
-            for (quantity, unit, factor) in
-                [(Quantity::Emission, magnitude * brightest, 1.0), (Quantity::Mean, range, 100.0)]
-            {
+            for quantity in [Quantity::Emission, Quantity::Mean] {
                 let exact = RenderConfig { quantity, ..plain.clone() };
-                let quick = RenderConfig { splat_error: factor * splat_error, ..exact.clone() };
+                let quick = RenderConfig { splat_error, ..exact.clone() };
                 let what = format!("view {n}, {quantity:?}, {splat_error}");
-                found += keeps_its_error(&mut direct(&memory, None), [&exact, &quick], unit, &what);
+                found += keeps_its_error(&mut direct(&memory, None), [&exact, &quick], (largest, &seen), &what);
             }
         }
         // What is missing is missing in both sums.
@@ -110,9 +116,9 @@ fn frames_on_a_lattice_keep_the_error_that_they_state() {
         memory = archive(grid, SampleType::F64, &masked(&samples, missing));
         let emission = RenderConfig { splat_error: 1e-3, ..plain };
         let exact = RenderConfig { splat_error: 0.0, ..emission.clone() };
-        keeps_its_error(&mut direct(&memory, None), [&exact, &emission], magnitude * brightest, "masked");
+        keeps_its_error(&mut direct(&memory, None), [&exact, &emission], (largest, &seen), "masked");
         let constant = masked(&vec![3.0; samples.len()], missing);
-        let mean = RenderConfig { quantity: Quantity::Mean, splat_error: 0.1, ..emission };
+        let mean = RenderConfig { quantity: Quantity::Mean, splat_error: 1e-3, ..emission };
         let (means, report) = pictures(&mut direct(&archive(grid, SampleType::F64, &constant), None), &mean);
         found += usize::from(report.method == "lattice");
         assert!(means.iter().all(|v| v.is_nan() || (v - 3.0).abs() < 1e-5), "means of a constant");

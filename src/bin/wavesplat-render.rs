@@ -74,9 +74,9 @@ struct Cli {
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
     sigma: Option<f64>,
-    /// What splatting may add to the error: of means as a share of the range, of emissions as one of the brightest that
-    /// the largest sample could give; 0 asks for the exact method
-    /// [default: a tenth of --tolerance or the file's tolerance; 1e-4 for frames]
+    /// What splatting may add to the error: of means as a share of the range, where a pixel's weights are the view's largest
+    /// (elsewhere in inverse proportion); of emissions as one of the brightest that the largest sample could give; 0 asks for
+    /// the exact method [default: a tenth of --tolerance or the file's tolerance; 1e-3 for frames]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
     /// Read and splat less, so that pictures may be this share of the range off (emissions, as samples that are): no less
@@ -250,7 +250,7 @@ impl Cli {
         let grid = scene.grid();
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
-        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(1e-4, |t| t / 10.0));
+        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(1e-3, |t| t / 10.0));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
             return Err(Error::usage("--splat-error: takes a number of 0 or more"));
         }

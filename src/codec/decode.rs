@@ -2,11 +2,11 @@
 
 use super::WindowCodec;
 use super::buffer::Buffer;
-use super::field::Field;
+use super::field::{Field, Plane};
 use super::pyramid::Passes;
 use super::rows::Change;
 use crate::sample;
-use wavesplat_format::{Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
+use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -82,6 +82,17 @@ impl Block {
     /// What the codes give.
     pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
         Field::decode(codec, self.size, self.step, &self.codes)
+    }
+
+    /// What the codes give, where one k says nothing without the others.
+    pub fn field_of_all(&self, codec: &WindowCodec) -> Option<Field<'static>> {
+        let together = codec.scheme.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
+        together.then(|| Field::refined(codec, self.size, self.step, &self.codes))
+    }
+
+    /// What the codes of one k give; `room` is for that.
+    pub fn plane<'a>(&'a self, codec: &WindowCodec, k: usize, room: (&'a mut Vec<f32>, &'a mut Vec<f64>)) -> Plane<'a> {
+        Plane::decode(codec, self.size, self.step, (&self.codes, k), room)
     }
 
     /// What the directory should say of each level part: its largest coefficient, or with a pyramid the largest change

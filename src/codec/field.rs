@@ -4,7 +4,7 @@ use super::WindowCodec;
 use super::buffer::{Buffer, Pooled};
 use super::pyramid::Passes;
 use super::real::Real;
-use super::rows::Change;
+use super::rows::{self, Change};
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use multiversion::multiversion;
 use wavesplat_format::Pyramid;
@@ -35,17 +35,69 @@ enum Values<'a> {
     Double(Buffer<f64>),
 }
 
+/// The coefficients of one k of a block, x fastest.
+#[derive(Debug, Clone, Copy)]
+pub enum Plane<'a> {
+    /// All are zero.
+    Zero,
+    /// 32-bit floats.
+    Single(&'a [f32]),
+    /// 64-bit floats.
+    Double(&'a [f64]),
+}
+
+impl<'a> Plane<'a> {
+    /// From the codes of a block of `size` voxels, where every k is coded by itself.
+    pub(super) fn decode(
+        codec: &WindowCodec,
+        size: [usize; 3],
+        step: f64,
+        (codes, k): (&[i32], usize),
+        (single, double): (&'a mut Vec<f32>, &'a mut Vec<f64>),
+    ) -> Self {
+        let Some(pyramid) = &codec.scheme.pyramid else {
+            let voxels: usize = size.iter().product();
+            return Self::scaled(step, codes.get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
+        };
+        let passes = Passes::new(pyramid, codec.shape(size));
+        match pyramid.single {
+            _ if codes.is_empty() => Self::Zero,
+            true if passes.decode_one(k, step, codes, single) => Self::Single(single),
+            false if passes.decode_one(k, step, codes, double) => Self::Double(double),
+            _ => Self::Zero,
+        }
+    }
+
+    fn scaled(step: f64, codes: &[i32], room: &'a mut Vec<f64>) -> Self {
+        if rows::all_zero(codes) {
+            return Self::Zero;
+        }
+        room.resize(codes.len(), 0.0);
+        scale(step, codes, room);
+        Self::Double(room)
+    }
+}
+
+impl Field<'static> {
+    /// From all codes of a block of `size` voxels that a pyramid refines.
+    pub(super) fn refined(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
+        let (values, marked) = match &codec.scheme.pyramid {
+            _ if codes.is_empty() => (Values::Zero, vec![false; codec.basis.coefficients()]),
+            Some(pyramid) if pyramid.single => refined(pyramid, codec.shape(size), step, codes, Values::Single),
+            Some(pyramid) => refined(pyramid, codec.shape(size), step, codes, Values::Double),
+            None => (Values::Zero, vec![false; codec.basis.coefficients()]),
+        };
+        Self { values, marked }
+    }
+}
+
 impl<'a> Field<'a> {
     /// From all codes of a block of `size` voxels; none: all are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a [i32]) -> Self {
-        let all = |some| vec![some; codec.basis.coefficients()];
-        let (values, marked) = match &codec.scheme.pyramid {
-            _ if codes.is_empty() => (Values::Zero, all(false)),
-            None => (Values::Codes { step, codes }, all(true)),
-            Some(pyramid) if pyramid.single => refined(pyramid, codec.shape(size), step, codes, Values::Single),
-            Some(pyramid) => refined(pyramid, codec.shape(size), step, codes, Values::Double),
-        };
-        Self { values, marked }
+        if codec.scheme.pyramid.is_some() || codes.is_empty() {
+            return Field::refined(codec, size, step, codes);
+        }
+        Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
     }
 
     /// Whether all coefficients are zero.
@@ -103,6 +155,18 @@ impl<'a> Field<'a> {
             let run = &mut run[..(8 * RUN).min(count - first)];
             self.load(first, run);
             visit(first, run);
+        }
+    }
+
+    /// The coefficients of one k; `room` is for those.
+    pub fn plane<'p>(&'p self, k: usize, voxels: usize, room: &'p mut Vec<f64>) -> Plane<'p> {
+        let range = k * voxels..(k + 1) * voxels;
+        match &self.values {
+            _ if !self.marked[k] => Plane::Zero,
+            Values::Zero => Plane::Zero,
+            Values::Codes { step, codes } => Plane::scaled(*step, &codes[range], room),
+            Values::Single(values) => Plane::Single(&values[range]),
+            Values::Double(values) => Plane::Double(&values[range]),
         }
     }
 

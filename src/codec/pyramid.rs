@@ -64,6 +64,16 @@ impl<'a> Passes<'a> {
         (0..self.slices).flat_map(|slice| std::iter::repeat_n(some(slice), self.shape[3])).collect()
     }
 
+    /// As [`Self::decode`], of one k that is not refined with others; false if all of it is zero.
+    pub(crate) fn decode_one<R: Real>(&self, k: usize, step: f64, codes: &[i32], nodes: &mut Vec<R>) -> bool {
+        let some = self.of_slice(k).any(|(_, range)| !rows::all_zero(&codes[range]));
+        if some {
+            nodes.resize(self.slice(), R::default());
+            self.decode_slice(k, step, codes, nodes);
+        }
+        some
+    }
+
     fn decode_slice<R: Real>(&self, slice: usize, step: f64, codes: &[i32], nodes: &mut [R]) {
         for (refined, range) in self.of_slice(slice) {
             let step = R::of(self.pyramid.step(step, refined.pass.level));
@@ -306,10 +316,10 @@ impl Iterator for Rows {
 
 /// Weights of some even nodes, the first being number `first`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Taps {
-    pub(crate) first: usize,
-    pub(crate) weights: [f64; 4],
-    pub(crate) count: usize,
+struct Taps {
+    first: usize,
+    weights: [f64; 4],
+    count: usize,
 }
 
 impl Taps {
@@ -329,7 +339,7 @@ impl Taps {
 /// What predicts odd node `i`, between the even nodes i and i + 1 of `evens`; all sums go from the first tap to the last.
 ///
 /// Cubic polynomials through four nodes, quadratic ones through three next to a face, and straight lines beyond the last.
-pub(crate) fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
+fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {
         () if last && evens == 1 => (i, [1.0, 0.0, 0.0, 0.0], 1),
@@ -340,17 +350,4 @@ pub(crate) fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
         () => (i, [0.5, 0.5, 0.0, 0.0], 2),
     };
     Taps { first, weights, count }
-}
-
-/// Fills a line, of which every `stride`-th node is given, by passes without codes.
-pub(crate) fn refine_line(stencil: Stencil, stride: usize, line: &mut [f64]) {
-    let mut distance = stride;
-    while distance > 1 {
-        let evens = line.len().div_ceil(distance);
-        for (i, node) in (distance / 2..line.len()).step_by(distance).enumerate() {
-            let taps = taps(stencil, i, evens);
-            line[node] = (0..taps.count).map(|t| taps.weights[t] * line[(taps.first + t) * distance]).sum();
-        }
-        distance /= 2;
-    }
 }

@@ -1,12 +1,13 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
+use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
-use super::lattice::{Coded, Lattice, Sums};
 use super::reading::{Allowance, Cheapest, Kept, Place, Rule};
-use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
+use super::scene::{Contents, FrameBounds, Group, Inverse, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use super::{Limit, RenderConfig};
 use crate::codec::WindowCodec;
+use crate::codec::buffer::Buffer;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
 use crate::error::Result;
@@ -71,12 +72,6 @@ impl Scene for CoefficientScene {
         let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
         self.file.largest_block() * (4 + 5 + 8 + 10 + refined + missing)
             + self.blocks().region(0).voxels() * errors * 10
-    }
-
-    fn on_lattice(&self) -> bool {
-        // Measured: few coefficients of series by themselves are splatted faster one by one.
-        let refined = self.file.metadata().windows.iter().any(|w| w.pyramid.is_some());
-        self.what == What::Samples || refined
     }
 
     fn group<'a>(
@@ -247,19 +242,6 @@ impl<'a> CoefficientGroup<'a> {
         block.is_missing(at) || self.codec.is_missing(value) // an exact block may do without a mask
     }
 
-    fn sums_of_samples(&self, block: &Block, samples: &[u8], region: &Region, lattice: &Lattice) -> Sums {
-        let mut dense = lattice.dense(region, self.layout.planes());
-        let mut values = vec![0.0; block.voxels];
-        for (i, samples) in self.of_frames(samples).chunks_exact(samples.len() / self.codec.frames()).enumerate() {
-            crate::sample::load(self.codec.sample, samples, &mut values);
-            let is_missing = |voxel: usize, value| self.misses(block, i, voxel, value);
-            dense.add_samples(&self.layout, i, &mut values, is_missing);
-        }
-        let mut sums = Sums::from(dense);
-        sums.bytes_read = block.bytes_read;
-        sums
-    }
-
     /// Terms of the coefficients, and of what overrides them; without the former, of the latter alone.
     fn terms_of_codes(&self, block: &Block, field: &Field<'_>, errors: &[f64], coefficients: bool) -> Terms {
         let mut terms = Terms::new(block.bytes_read);
@@ -330,54 +312,132 @@ impl Group for CoefficientGroup<'_> {
         })
     }
 
-    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
-        let region = &self.file.blocks.region(block);
-        if !clip.contains(region) {
-            return Ok(None);
-        }
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         let leaf = self.leaf_of(block as u32)?;
-        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        let block = self.file.block(&self.codec, &entry, &self.wanted)?;
-        if let Some(exact) = &block.exact {
-            return Ok(Some(self.sums_of_samples(&block, exact, region, lattice)));
-        }
-        if self.what == What::Samples {
-            return Ok(Some(self.sums_of_samples(&block, &block.samples(&self.codec), region, lattice)));
-        }
-        let field = block.field(&self.codec);
-        if field.is_zero() {
-            return Ok(None);
-        }
-        let (shape, pyramid) = (self.codec.shape(block.size), self.codec.scheme.pyramid.as_ref());
-        let Block { step, codes, .. } = &block;
-        let coded = Coded { start: region.start, shape, pyramid, step: *step, codes, field: &field };
-        let mut sums = lattice.of_codes(&coded, &self.kept, self.layout.planes());
-        lattice.add_terms(&self.terms_of_codes(&block, &field, &errors, false), region, region, &mut sums);
-        Ok(Some(sums))
+        let kept = self.keep(&leaf[block - leaf[0].id.block as usize]);
+        let block = self.file.block(&self.codec, &kept.entry, &self.wanted)?;
+        Ok(Box::new(CodedBlock::new(self, block)))
     }
 
     fn errors(&self) -> &SampleErrors {
         &self.errors
     }
 
-    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {
+    fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>> {
+        let mut marked = vec![false; self.codec.basis.coefficients()];
+        used.iter().filter(|p| **p < self.layout.coefficients).for_each(|p| marked[self.kept[*p]] = true);
+        let only = self.codec.basis.only(&marked);
+        let places: Vec<usize> = match &only {
+            Some(_) => (0..self.layout.coefficients).filter(|p| marked[self.kept[*p]]).collect(),
+            None => (0..self.layout.coefficients).collect(),
+        };
+        let to: Vec<usize> = if only.is_some() { (0..places.len()).collect() } else { self.kept.clone() };
+        let mut coefficients = vec![Lane::default(); only.as_ref().map_or(marked.len(), |b| b.coefficients())];
         let mut series = vec![Lane::default(); self.codec.frames()];
-        if self.layout.coefficients > 0 {
-            let mut coefficients = vec![Lane::default(); self.codec.basis.coefficients()];
-            self.kept.iter().zip(planes.iter()).for_each(|(k, plane)| coefficients[*k] = *plane);
-            self.codec.basis.inverse(&mut coefficients, &mut series);
-        }
-        for (f, out) in frames.iter_mut().enumerate() {
-            *out = series[self.frames[f]];
-            if self.layout.values {
-                let value = planes[self.layout.value(f)];
-                out.iter_mut().zip(value).for_each(|(o, v)| *o += v);
+        Box::new(move |planes, frames| {
+            if !places.is_empty() {
+                coefficients.fill(Lane::default());
+                places.iter().zip(&to).for_each(|(plane, k)| coefficients[*k] = planes[*plane]);
+                only.as_deref().unwrap_or(self.codec.basis.as_ref()).inverse(&mut coefficients, &mut series);
             }
-        }
+            for (f, out) in frames.iter_mut().enumerate() {
+                *out = series[self.frames[f]];
+                if self.layout.values {
+                    let value = planes[self.layout.value(f)];
+                    out.iter_mut().zip(value).for_each(|(o, v)| *o += v);
+                }
+            }
+        })
     }
 
     fn finish(&self) -> Result<()> {
         self.file.check_unchanged()
+    }
+}
+
+/// A block of a file that has been read.
+struct CodedBlock<'a> {
+    group: &'a CoefficientGroup<'a>,
+    block: Block,
+    /// Samples that are splatted frame by frame.
+    samples: Option<Buffer<u8>>,
+    /// What the codes give, where it was needed at once.
+    field: Option<Field<'static>>,
+    coefficients: u64,
+    /// What overrides coefficients, for each plane behind theirs.
+    few: Vec<Vec<(u32, f64)>>,
+}
+
+impl<'a> CodedBlock<'a> {
+    fn new(group: &'a CoefficientGroup<'a>, block: Block) -> Self {
+        let codec = &group.codec;
+        let samples = (block.exact.is_some() || group.what == What::Samples).then(|| block.samples(codec));
+        let mut new = Self { group, block, samples, field: None, coefficients: 0, few: Vec::new() };
+        if new.samples.is_none() {
+            new.field = new.block.field_of_all(codec);
+            new.add_overrides();
+        }
+        new
+    }
+
+    fn add_overrides(&mut self) {
+        let Self { group, block, .. } = self;
+        self.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
+        if block.outliers.positions.is_empty() && block.missing.0.is_empty() {
+            return;
+        }
+        let of_codes = block.field(&group.codec);
+        let terms = group.terms_of_codes(block, self.field.as_ref().unwrap_or(&of_codes), &[], false);
+        self.few.resize_with(group.layout.planes() - group.layout.coefficients, Vec::new);
+        for voxel in 0..block.voxels {
+            let (planes, amounts) = terms.of_voxel(voxel);
+            for (plane, amount) in planes.iter().zip(amounts) {
+                self.few[usize::from(*plane) - group.layout.coefficients].push((voxel as u32, *amount));
+            }
+        }
+    }
+}
+
+impl BlockPlanes for CodedBlock<'_> {
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+        let (group, block) = (self.group, &self.block);
+        if let Some(samples) = &self.samples {
+            return Ok(self.plane_of_samples(samples, plane, room));
+        }
+        if let Some(behind) = plane.checked_sub(group.layout.coefficients) {
+            return Ok(self.few.get(behind).map_or(Amounts::Nothing, |few| Amounts::Few(few)));
+        }
+        let k = group.kept[plane];
+        Ok(match &self.field {
+            Some(field) => field.plane(k, block.voxels, &mut room.double).into(),
+            None => block.plane(&group.codec, k, (&mut room.single, &mut room.double)).into(),
+        })
+    }
+
+    fn held(&self) -> [u64; 2] {
+        [self.coefficients, self.block.bytes_read]
+    }
+}
+
+impl CodedBlock<'_> {
+    fn plane_of_samples<'a>(&self, samples: &[u8], plane: usize, room: &'a mut Room) -> Amounts<'a> {
+        let Self { group, block, .. } = self;
+        let Some((frame, absent)) = group.layout.samples(plane) else { return Amounts::Nothing };
+        let bytes = samples.len() / group.codec.frames();
+        room.bytes.clear();
+        room.bytes.extend_from_slice(&samples[group.frames[frame] * bytes..][..bytes]);
+        if !group.layout.absent {
+            return room.amounts_of_samples(group.codec.sample, |v| v);
+        }
+        let voxel = std::cell::Cell::new(0);
+        room.amounts_of_samples(group.codec.sample, |v| {
+            let missing = group.misses(block, frame, voxel.replace(voxel.get() + 1), v);
+            match (missing, absent) {
+                (missing, true) => f64::from(u8::from(missing)),
+                (true, false) => 0.0,
+                (false, false) => v,
+            }
+        })
     }
 }
 

@@ -1,11 +1,11 @@
 //! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
 
 use super::Quantity;
+use super::canvas::{Finished, Pixels};
 use super::certificate::Certificate;
-use super::scene::Group;
-use super::splat::Tile;
+use super::scene::{Group, Inverse};
 use super::terms::Layout;
-use super::weights::Weights;
+use super::weights::{PixelWeight, Weights};
 use crate::wavelet::{LANES, Lane};
 
 /// What turns the planes of a group into pixels.
@@ -23,28 +23,57 @@ impl Finish<'_> {
         self.layout.frames * (1 + usize::from(self.certificate.is_some()))
     }
 
-    /// Turns the planes of a tile into its pixels.
-    pub(super) fn tile(&self, tile: &mut Tile) {
-        let pixels = tile.pixels();
+    /// Turns the planes of a tile into its pixels. Those of background are left as they are.
+    pub(super) fn tile(&self, mut tile: Finished<'_>, pixels: &mut Pixels<'_, f32>) {
+        let mut inverse = self.group.inverse(&tile.used());
         let mut planes = vec![Lane::default(); self.layout.planes()];
         let mut frames = vec![Lane::default(); self.layout.frames];
-        let mut out = vec![0.0; self.planes() * pixels];
-        for first in (0..pixels).step_by(LANES) {
-            let count = LANES.min(pixels - first);
-            tile.load(first, count, &mut planes);
-            let sums: Vec<(Lane, Lane)> = (0..self.layout.frames).map(|f| self.absent_and_errors(&planes, f)).collect();
-            self.group.reconstruct(&mut planes, &mut frames);
-            for (f, (emission, (absent, errors))) in frames.iter().zip(&sums).enumerate() {
-                for l in 0..count {
-                    let pixel = self.pixel(tile, first + l, f, emission[l], absent[l], errors[l]);
-                    out[f * pixels + first + l] = pixel.0;
-                    if self.certificate.is_some() {
-                        out[(self.layout.frames + f) * pixels + first + l] = pixel.1;
-                    }
+        let width = tile.place.x.len();
+        for (y, at) in tile.place.y.clone().zip((0..).step_by(width)) {
+            for first in (0..width).step_by(LANES) {
+                let count = LANES.min(width - first);
+                let x = tile.place.x.start + first;
+                let weights = Lanes::of(self.weights, [x, y], count);
+                if self.quantity == Quantity::Mean && weights.are_background() {
+                    continue;
                 }
+                tile.load(at + first, count, &mut planes);
+                self.put(&mut inverse, &mut planes, &mut frames, &weights, |picture, values| {
+                    pixels.put(picture, [x, y], &values.map(|v| v as f32)[..count]);
+                });
             }
         }
-        tile.replace(out);
+    }
+
+    /// Calls `put(picture, values)` for all pictures at some neighbouring pixels.
+    fn put(
+        &self,
+        inverse: &mut Inverse<'_>,
+        planes: &mut [Lane],
+        frames: &mut [Lane],
+        weights: &Lanes,
+        mut put: impl FnMut(usize, Lane),
+    ) {
+        let sums: Vec<(Lane, Lane)> = match self.layout.planes() > self.layout.value_planes() {
+            true => (0..self.layout.frames).map(|f| self.absent_and_errors(planes, f)).collect(),
+            false => Vec::new(),
+        };
+        inverse(planes, frames);
+        let all = weights.present(&Lane::default());
+        for (f, emission) in frames.iter().enumerate() {
+            let (absent, errors) = sums.get(f).copied().unwrap_or_default();
+            let present = if self.layout.absent { weights.present(&absent) } else { all };
+            let values = match self.quantity {
+                Quantity::Mean => std::array::from_fn(|l| emission[l] / present[l]),
+                Quantity::Emission => *emission,
+            };
+            put(f, values);
+            if let Some(certificate) = self.certificate {
+                let bounds = &self.group.errors().frames[f];
+                let error = |l| certificate.error(bounds, &weights.0[l], absent[l], errors[l], values[l]).into();
+                put(self.layout.frames + f, std::array::from_fn(error));
+            }
+        }
     }
 
     /// The weights that are missing in a frame, and the sums of weighted errors.
@@ -60,17 +89,21 @@ impl Finish<'_> {
         }
         (absent, errors)
     }
+}
 
-    /// The value of a pixel and its error.
-    fn pixel(&self, tile: &Tile, at: usize, frame: usize, emission: f64, absent: f64, errors: f64) -> (f64, f64) {
-        let weight = self.weights.at(tile, at);
-        let value = match self.quantity {
-            Quantity::Mean => weight.mean(emission, absent),
-            Quantity::Emission => emission,
-        };
-        let certified = self
-            .certificate
-            .map_or(0.0, |c| c.error(&self.group.errors().frames[frame], &weight, absent, errors, value));
-        (value, f64::from(certified))
+/// The weights of neighbouring pixels of a row; behind its end those of the last one.
+struct Lanes([PixelWeight; LANES]);
+
+impl Lanes {
+    fn of(weights: &Weights, [x, y]: [usize; 2], count: usize) -> Self {
+        Self(std::array::from_fn(|l| weights.at([x + l.min(count - 1), y])))
+    }
+
+    fn are_background(&self) -> bool {
+        self.0.iter().all(|weight| weight.present(0.0).is_nan())
+    }
+
+    fn present(&self, absent: &Lane) -> Lane {
+        std::array::from_fn(|l| self.0[l].present(absent[l]))
     }
 }

@@ -1,16 +1,15 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
 use super::RenderConfig;
+use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
-use super::lattice::{Lattice, Sums};
-use super::scene::{Contents, FrameBounds, Group, SampleErrors, Scene};
+use super::scene::{Contents, FrameBounds, Group, Inverse, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::{BlockGrid, Grid, Region};
-use crate::wavelet::Lane;
 
 /// Frames that are splatted together, so that a footprint is computed once for all of them.
 const GROUP: usize = 32;
@@ -57,10 +56,6 @@ impl Scene for FrameScene {
     fn block_bytes(&self, _config: &RenderConfig) -> usize {
         // Samples in their type and as f64, and a term of ten bytes for each.
         self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
-    }
-
-    fn on_lattice(&self) -> bool {
-        true
     }
 
     fn group<'a>(
@@ -126,20 +121,12 @@ impl Group for FrameGroup<'_> {
         Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
     }
 
-    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
-        let (region, ty) = (self.blocks.region(block).intersect(clip), self.archive.sample);
-        let mut dense = lattice.dense(&region, self.layout.planes());
-        let (mut bytes, mut values) = (vec![0; region.voxels() * ty.size()], vec![0.0; region.voxels()]);
-        for (i, frame) in self.frames.iter().enumerate() {
-            self.window.read_box(*frame, &region, &mut bytes)?;
-            sample::load(ty, &bytes, &mut values);
-            dense.add_samples(&self.layout, i, &mut values, |_, v| is_missing(v, self.missing_value));
-        }
-        Ok(Some(dense.into()))
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        Ok(Box::new(FrameBlock { group: self, region: self.blocks.region(block) }))
     }
 
-    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]) {
-        frames.copy_from_slice(&planes[..frames.len()]);
+    fn inverse(&self, _: &[usize]) -> Box<Inverse<'_>> {
+        Box::new(|planes, frames| frames.copy_from_slice(&planes[..frames.len()]))
     }
 
     fn errors(&self) -> &SampleErrors {
@@ -148,5 +135,30 @@ impl Group for FrameGroup<'_> {
 
     fn finish(&self) -> Result<()> {
         self.window.check_unchanged()
+    }
+}
+
+/// A block of frames that are read when they are needed.
+struct FrameBlock<'a> {
+    group: &'a FrameGroup<'a>,
+    region: Region,
+}
+
+impl BlockPlanes for FrameBlock<'_> {
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+        let FrameGroup { archive, layout, window, frames, missing_value, .. } = self.group;
+        let Some((frame, absent)) = layout.samples(plane) else { return Ok(Amounts::Nothing) };
+        room.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
+        window.read_box(frames[frame], &self.region, &mut room.bytes)?;
+        let is_missing = |v| layout.absent && is_missing(v, *missing_value);
+        Ok(room.amounts_of_samples(archive.sample, move |v| match (is_missing(v), absent) {
+            (missing, true) => f64::from(u8::from(missing)),
+            (true, false) => 0.0,
+            (false, false) => v,
+        }))
+    }
+
+    fn held(&self) -> [u64; 2] {
+        [0; 2]
     }
 }

@@ -3,19 +3,24 @@
 //! ```text
 //! for each group of frames of a window         plan: as many as fit in memory
 //!   for each band of rows
-//!     for each batch of blocks                 scene: read, decode, terms     (workers)
-//!       every tile splats the batch            splat: terms x footprint       (one owner per tile)
-//!     every tile inverts its pixels            finish: planes -> frames, then / weights; certificate
+//!     for each batch of blocks                 scene: read, decode            (workers)
+//!       every plane takes in the batch         lattice: amounts -> cells      (one owner per plane)
+//!     every tile inverts its pixels            lattice: cells -> planes of pixels
+//!                                              finish: planes -> frames, then / weights; certificate
 //!   give the finished frames to the sink
 //! ```
 //!
-//! Where that is less work, the codes of a file and the samples of frames go to cells of the view's sheared lattice instead,
-//! and from there to pixels (`lattice`); all planes then do, weights and what is missing included, so that means stay means.
+//! Where footprints are less work, where the lattice of the view is not near enough, and where pictures are certified, every
+//! tile splats the terms of the batch itself (`splat`). All planes go the same way, weights and what is missing included, so
+//! that means stay means.
 
+mod amounts;
+mod canvas;
 mod certificate;
 mod coefficients;
 pub mod colour;
 mod expectation;
+mod eye;
 mod finish;
 mod frames;
 mod lattice;
@@ -25,6 +30,7 @@ mod scene;
 pub mod sink;
 mod splat;
 mod terms;
+mod uncut;
 mod weights;
 
 pub use coefficients::{CoefficientScene, What};
@@ -32,22 +38,21 @@ pub use expectation::Expectation;
 pub use frames::FrameScene;
 pub use scene::{LeftOut, Scene};
 
-use crate::camera::{Camera, View};
-use crate::error::{Error, Result};
-use crate::footprint::{Footprint, Kernel, Method};
+use crate::camera::View;
+use crate::error::Result;
+use crate::footprint::{Kernel, Method};
 use crate::progress::Progress;
-use crate::volume::{BlockGrid, Grid, Region};
+use crate::volume::Region;
+use amounts::BlockPlanes;
+use canvas::{Blocks, Canvas};
 use certificate::Certificate;
+use eye::Eye;
 use finish::Finish;
-use lattice::{Cells, Lattice, Sums};
 use plan::Budget;
-use rayon::prelude::*;
 use scene::{Contents, Group};
 use serde::Serialize;
-use splat::{Order, Splats, Tile, overlap, rows_reached};
-use std::ops::Range;
 use std::time::{Duration, Instant};
-use terms::{Layout, Terms};
+use terms::Terms;
 use weights::Weights;
 
 /// What a pixel means (method.md section 2).
@@ -73,8 +78,8 @@ pub struct RenderConfig {
     /// Which voxels; by default all.
     pub region: Option<Region>,
     /// What splatting may add to the error: of an emission relative to the image of the largest |v| at the brightest
-    /// place of the plane of the picture, of a mean relative to the value range, if that place is in the picture. 0 asks
-    /// for the exact method.
+    /// place of the plane of the picture, of a mean relative to the value range where weights sum to as much as there, and
+    /// elsewhere in inverse proportion to that sum. 0 asks for the exact method.
     pub splat_error: f64,
     /// How far off the picture may be, in the unit of samples, so that less is read and splatted; none: as near as the
     /// file is. Of an emission: as far as where all samples are off by so much.
@@ -135,7 +140,7 @@ pub struct RenderReport {
     pub decode_seconds: f64,
     /// Seconds spent splatting.
     pub splat_seconds: f64,
-    /// Seconds spent on the inverse transform and the division by weights.
+    /// Seconds spent on pixels: from a lattice, by the inverse transform and the division by weights.
     pub inverse_seconds: f64,
     /// Seconds from beginning to end, without the sink.
     pub seconds: f64,
@@ -165,11 +170,12 @@ pub fn render(
 ) -> Result<RenderReport> {
     let started = Instant::now();
     let mut sink_time = Duration::ZERO;
-    let (eye, method) = Eye::new(scene, config)?;
+    let eye = Eye::new(scene, config)?;
+    let method = eye.method;
     let budget = Budget::new(config, scene, eye.lattice.as_ref())?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = stated_splat_error(config.quantity, method);
+    report.stated_splat_error = method.stated_error;
     let mut clock = Instant::now();
     let weights = Weights::new(&eye, config, &budget)?;
     let expectation = Expectation::new(&eye, config.quantity, &weights);
@@ -198,23 +204,15 @@ pub fn render(
 
 /// The cheapest splat method within an error.
 pub fn splat_method(quantity: Quantity, error: f64) -> Method {
-    Method::within(footprint_error(quantity, error))
+    Method::within(most_splat_error(quantity, error))
 }
 
-/// What footprints may be off by.
-fn footprint_error(quantity: Quantity, error: f64) -> f64 {
+/// What splatting may be off by.
+fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
     match quantity {
         Quantity::Emission => error,
         // A pixel that is not background must keep some of its weights.
-        Quantity::Mean => (error * weights::BACKGROUND).min(0.9 * weights::BACKGROUND),
-    }
-}
-
-/// The error that a splat method states.
-pub fn stated_splat_error(quantity: Quantity, method: Method) -> f64 {
-    match quantity {
-        Quantity::Emission => method.stated_error,
-        Quantity::Mean => method.stated_error / weights::BACKGROUND, // weights are down to so much of the largest
+        Quantity::Mean => error.min(0.9 * weights::BACKGROUND),
     }
 }
 
@@ -224,169 +222,13 @@ fn lap(clock: &mut Instant, stage: &mut f64) {
     *clock = Instant::now();
 }
 
-/// Means are of voxels of which some are not deeper than this over tau: exponentials lose digits at 708, and vanish.
-const DEEPEST: f64 = 640.0;
-
-/// Everything that is the same for all frames of a view.
-#[derive(Debug, Clone)]
-struct Eye {
-    camera: Camera,
-    footprint: Footprint,
-    grid: Grid,
-    blocks: BlockGrid,
-    /// The voxels that are splatted.
-    clip: Region,
-    /// What splats instead of footprints.
-    lattice: Option<Lattice>,
-}
-
-impl Eye {
-    fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<(Self, Method)> {
-        let (grid, blocks) = (*scene.grid(), scene.blocks());
-        let clip = config.region.unwrap_or(grid.whole());
-        if !grid.whole().contains(&clip) || clip.is_empty() {
-            let d = grid.dims;
-            return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
-        }
-        let method = splat_method(config.quantity, config.splat_error);
-        let camera = Camera::new(&config.view, &grid)?;
-        let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
-        let nearest = camera.nearest_of(&grid.crop(&clip));
-        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
-            let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
-            return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
-        }
-        let lattice = (scene.on_lattice() && !config.certify)
-            .then(|| {
-                let error = footprint_error(config.quantity, config.splat_error);
-                Lattice::within(error, config.kernel, (&grid, &blocks, &clip), &camera, &footprint)
-            })
-            .flatten();
-        let method = lattice.as_ref().map_or(method, |(_, method)| *method);
-        Ok((Self { camera, footprint, grid, blocks, clip, lattice: lattice.map(|l| l.0) }, method))
-    }
-
-    fn pixels(&self) -> usize {
-        self.camera.size[0] * self.camera.size[1]
-    }
-
-    fn tiles(&self, rows: Range<usize>, layout: &Layout) -> Vec<Tile> {
-        let order = if self.lattice.is_some() { Order::Pixels } else { layout.order };
-        Tile::cover(self.camera.size[0], rows, layout.planes(), order)
-    }
-
-    /// Copies the first planes of a tile to their places in as many whole pictures.
-    fn paste<T>(&self, tile: &Tile, planes: usize, pictures: &mut [T], convert: impl Fn(f64) -> T) {
-        let width = tile.x.len();
-        for (plane, pixels) in tile.planes().take(planes).enumerate() {
-            for (y, line) in tile.y.clone().zip(pixels.chunks_exact(width)) {
-                let at = plane * self.pixels() + y * self.camera.size[0] + tile.x.start;
-                pictures[at..at + width].iter_mut().zip(line).for_each(|(to, from)| *to = convert(*from));
-            }
-        }
-    }
-
-    /// Whether any voxel of a block can reach these rows of the picture.
-    fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
-        if let Some(lattice) = &self.lattice {
-            return overlap(&lattice.rows_reached(&self.blocks.region(block), self.camera.size), rows);
-        }
-        let region = self.blocks.region(block).intersect(&self.clip);
-        overlap(&rows_reached(&region, &self.grid, &self.camera, &self.footprint), rows)
-    }
-
-    /// Splats blocks in order into tiles, `batch` at a time.
-    fn splat(
-        &self,
-        tiles: &mut [Tile],
-        blocks: &[usize],
-        batch: usize,
-        source: &dyn Blocks,
-        report: &mut RenderReport,
-    ) -> Result<()> {
-        if let Some(lattice) = &self.lattice {
-            return self.splat_on(lattice, tiles, blocks, batch, source, report);
-        }
-        let project = |block: usize| {
-            let terms = source.terms(block)?;
-            let held = [terms.coefficients, terms.bytes_read];
-            let region = self.blocks.region(block);
-            Ok((Splats::new(terms, &region, &self.clip, &self.grid, &self.camera, &self.footprint), held))
-        };
-        in_batches(blocks, batch, report, project, |splats| {
-            tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, &self.footprint)));
-        })
-    }
-
-    /// The same by way of a lattice.
-    fn splat_on(
-        &self,
-        lattice: &Lattice,
-        tiles: &mut [Tile],
-        blocks: &[usize],
-        batch: usize,
-        source: &dyn Blocks,
-        report: &mut RenderReport,
-    ) -> Result<()> {
-        let planes = tiles.first().map_or(0, Tile::count);
-        let mut cells: Vec<Cells> = tiles.iter().map(|tile| lattice.cells_of(tile)).collect();
-        let sums_of = |block: usize| {
-            let sums: Sums = match source.sums(block, &self.clip, lattice)? {
-                Some(sums) => sums,
-                None => lattice.of_terms(&source.terms(block)?, &self.blocks.region(block), &self.clip, planes),
-            };
-            let held = [sums.coefficients, sums.bytes_read];
-            Ok((sums, held))
-        };
-        in_batches(blocks, batch, report, sums_of, |sums| {
-            cells.par_iter_mut().for_each(|cells| sums.iter().for_each(|(s, _)| s.add_to(cells, planes)));
-        })?;
-        let mut clock = Instant::now();
-        tiles.par_iter_mut().zip(&cells).for_each(|(tile, cells)| lattice.gather(cells, tile));
-        lap(&mut clock, &mut report.splat_seconds);
-        Ok(())
-    }
-}
-
-/// Makes something of every block, in order and `batch` at a time, each with its coefficients and the bytes read for them,
-/// and adds it.
-fn in_batches<T: Send>(
-    blocks: &[usize],
-    batch: usize,
-    report: &mut RenderReport,
-    make: impl Fn(usize) -> Result<(T, [u64; 2])> + Sync,
-    mut add: impl FnMut(&[(T, [u64; 2])]),
-) -> Result<()> {
-    let mut clock = Instant::now();
-    for blocks in blocks.chunks(batch) {
-        let made = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
-        lap(&mut clock, &mut report.decode_seconds);
-        add(&made);
-        for (_, [coefficients, bytes_read]) in &made {
-            report.coefficients += coefficients;
-            report.bytes_read += bytes_read;
-        }
-        lap(&mut clock, &mut report.splat_seconds);
-    }
-    Ok(())
-}
-
-/// Where the terms of blocks come from, and for a lattice their sums, if there is a shorter way to these.
-trait Blocks: Sync {
-    fn terms(&self, block: usize) -> Result<Terms>;
-
-    fn sums(&self, _block: usize, _clip: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
-        Ok(None)
-    }
-}
-
 impl Blocks for &dyn Group {
     fn terms(&self, block: usize) -> Result<Terms> {
         Group::terms(*self, block)
     }
 
-    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
-        Group::sums(*self, block, clip, lattice)
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        Group::planes(*self, block)
     }
 }
 
@@ -426,11 +268,10 @@ fn render_group(
     for rows in budget.bands(&layout) {
         let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
         report.blocks_read += seen.len() as u64;
-        let mut tiles = eye.tiles(rows.clone(), &layout);
-        eye.splat(&mut tiles, &seen, budget.batch(&layout, rows.len()), &group, report)?;
+        let mut canvas = Canvas::new(eye, rows.clone(), &layout);
+        canvas.splat(&seen, budget.batch(&layout, rows.len()), &group, report)?;
         let mut clock = Instant::now();
-        tiles.par_iter_mut().for_each(|tile| finish.tile(tile));
-        tiles.iter().for_each(|tile| eye.paste(tile, finish.planes(), &mut pictures, |pixel| pixel as f32));
+        canvas.finish(&mut pictures, |tile, pixels| finish.tile(tile, pixels));
         lap(&mut clock, &mut report.inverse_seconds);
     }
     group.finish()?;

@@ -12,34 +12,31 @@ use crate::memory;
 use std::ops::Range;
 
 /// What is allocated at once.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Budget {
+#[derive(Debug)]
+pub(super) struct Budget<'a> {
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
     /// Finished numbers of a pixel and frame: its value, and its error.
     numbers: usize,
     block_bytes: usize,
-    /// Cells that a tile has besides its pixels, with as many planes.
-    tile_cells: usize,
+    lattice: Option<&'a Lattice>,
 }
 
 /// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
-impl Budget {
+impl<'a> Budget<'a> {
     /// For pictures of a scene.
-    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, lattice: Option<&Lattice>) -> Result<Self> {
+    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, lattice: Option<&'a Lattice>) -> Result<Self> {
         let size = config.view.size;
         let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
         let numbers = 1 + usize::from(config.certify);
         let available = config.memory.saturating_sub(fixed);
-        // All planes at once, and those that are kept.
-        let group = scene.most_planes(1, config) + scene.most_planes(scene.group_end(0), config);
-        let cells = |l: &Lattice| l.block_cells(&scene.blocks().region(0)) * group * size_of::<f64>();
+        let cells = |l: &Lattice| l.block_cells(&scene.blocks().region(0)) * size_of::<f64>();
         let block_bytes = scene.block_bytes(config) + lattice.map_or(0, cells);
-        let budget = Self { available, size, numbers, block_bytes, tile_cells: lattice.map_or(0, Lattice::tile_cells) };
-        let least = budget.picture_bytes(1) + budget.row_bytes(scene.most_planes(1, config)) + budget.block_bytes;
+        let budget = Self { available, size, numbers, block_bytes, lattice };
+        let least = budget.picture_bytes(1) + budget.band_bytes(scene.most_planes(1, config), TILE) + block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
             let what =
@@ -54,17 +51,23 @@ impl Budget {
         frames * self.numbers * self.size[0] * self.size[1] * size_of::<f32>()
     }
 
-    /// One row of tiles with all planes.
-    fn row_bytes(&self, planes: usize) -> usize {
-        let cells = self.size[0].div_ceil(TILE) * self.tile_cells;
-        planes * (self.size[0] * TILE + cells) * size_of::<f64>()
+    /// A band of so many rows with all planes.
+    fn band_bytes(&self, planes: usize, rows: usize) -> usize {
+        let numbers = match self.lattice {
+            Some(lattice) => {
+                lattice.band_cells(self.size[0], rows) + rayon::current_num_threads() * lattice.tile_cells()
+            }
+            None => self.size[0] * rows.next_multiple_of(TILE),
+        };
+        planes * numbers * size_of::<f64>()
     }
 
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let fits = |f: &usize| {
-            let rows = self.row_bytes(scene.most_planes(*f, config)) * self.size[1].div_ceil(TILE).min(FEW_ROWS);
-            self.picture_bytes(*f) + rows + self.block_bytes <= self.available
+            let rows = self.size[1].min(FEW_ROWS * TILE);
+            let band = self.band_bytes(scene.most_planes(*f, config), rows);
+            self.picture_bytes(*f) + band + self.block_bytes <= self.available
         };
         (1..=most).rev().find(fits).unwrap_or(1)
     }
@@ -72,16 +75,19 @@ impl Budget {
     /// The bands of rows to splat one after another, each as tall as fits.
     pub(super) fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
         let left = self.available - self.picture_bytes(layout.frames) - self.block_bytes;
-        let rows = (left / self.row_bytes(layout.planes()).max(1)).max(1).saturating_mul(TILE);
+        let fits = |tiles: &usize| self.band_bytes(layout.planes(), tiles * TILE) <= left;
+        let rows = TILE * (1..=self.size[1].div_ceil(TILE)).rev().find(fits).unwrap_or(1);
         (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
-        let used = self.picture_bytes(layout.frames) + self.row_bytes(layout.planes()) * rows.div_ceil(TILE);
-        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, memory::MOST_BLOCKS)
+        let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
+        // What a lattice takes in plane by plane had better be near.
+        let most = if self.lattice.is_some() { rayon::current_num_threads() } else { memory::MOST_BLOCKS };
+        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, most)
     }
 }
 
-/// Rows of tiles that a band should have: blocks that reach over a band's edge are decoded for both.
+/// Tiles across a band, at least, if it can be: blocks that reach over a band's edge are decoded for both.
 const FEW_ROWS: usize = 4;

@@ -4,8 +4,8 @@
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
 use super::RenderConfig;
+use super::amounts::BlockPlanes;
 use super::expectation::Expectation;
-use super::lattice::{Lattice, Sums};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
 use crate::volume::{BlockGrid, Grid, Region};
@@ -32,11 +32,6 @@ pub trait Scene {
     /// An upper bound of the bytes that one block takes while its terms are made.
     fn block_bytes(&self, config: &RenderConfig) -> usize;
 
-    /// Whether its blocks may be splatted on the lattice of the view.
-    fn on_lattice(&self) -> bool {
-        false
-    }
-
     /// Opens some frames of one group, ascending.
     fn group<'a>(
         &'a mut self,
@@ -57,13 +52,11 @@ pub trait Group: Sync {
     /// The terms of a block.
     fn terms(&self, block: usize) -> Result<Terms>;
 
-    /// The sums of a block on a lattice, of its voxels within `clip` and all planes; none: its terms are splatted.
-    fn sums(&self, _block: usize, _clip: &Region, _lattice: &Lattice) -> Result<Option<Sums>> {
-        Ok(None)
-    }
+    /// The same terms, plane by plane; without those of error planes.
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 
-    /// The frames at some pixels from their planes: the inverse transform (eq 8). Overwrites `planes`.
-    fn reconstruct(&self, planes: &mut [Lane], frames: &mut [Lane]);
+    /// What gives the frames at some pixels from their planes, of which all but `used` are zero: the inverse transform (eq 8).
+    fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
 
     /// How far the samples may be from the source's, besides what the terms in error planes say.
     fn errors(&self) -> &SampleErrors;
@@ -71,6 +64,9 @@ pub trait Group: Sync {
     /// An error if what was read changed meanwhile.
     fn finish(&self) -> Result<()>;
 }
+
+/// The frames at some pixels from all planes. Overwrites these.
+pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
 /// The blocks of a group.
 #[derive(Debug, Default)]

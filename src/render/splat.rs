@@ -23,13 +23,37 @@ pub enum Order {
     Pixels,
 }
 
-/// A rectangle of pixels with its planes.
-#[derive(Debug)]
-pub(super) struct Tile {
+/// A rectangle of pixels.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
     /// Columns of the picture.
     pub(super) x: Range<usize>,
     /// Rows of the picture.
     pub(super) y: Range<usize>,
+}
+
+impl Place {
+    /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels wide.
+    pub(super) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
+        let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
+        pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
+    }
+
+    /// Number of pixels.
+    pub(super) fn pixels(&self) -> usize {
+        self.x.len() * self.y.len()
+    }
+
+    /// The column and the row of a pixel, counted row by row.
+    pub(super) fn pixel(&self, n: usize) -> [usize; 2] {
+        [self.x.start + n % self.x.len(), self.y.start + n / self.x.len()]
+    }
+}
+
+/// A rectangle of pixels with its planes.
+#[derive(Debug)]
+pub(super) struct Tile {
+    pub(super) place: Place,
     /// Number of planes.
     count: usize,
     order: Order,
@@ -37,18 +61,14 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    /// The tiles of the rows `y` of a picture `width` pixels wide, with all planes at zero.
-    pub(super) fn cover(width: usize, y: Range<usize>, count: usize, order: Order) -> Vec<Self> {
-        let pieces = |r: Range<usize>| r.clone().step_by(TILE).map(move |s| s..(s + TILE).min(r.end));
-        pieces(y)
-            .flat_map(|y| pieces(0..width).map(move |x| (x, y.clone())))
-            .map(|(x, y)| Self { sums: vec![0.0; count * x.len() * y.len()], x, y, count, order })
-            .collect()
+    /// With all planes at zero.
+    pub(super) fn new(place: Place, count: usize, order: Order) -> Self {
+        Self { sums: vec![0.0; count * place.pixels()], place, count, order }
     }
 
     /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
     pub(super) fn load(&self, first: usize, count: usize, planes: &mut [Lane]) {
-        let pixels = self.pixels();
+        let pixels = self.place.pixels();
         for (p, lane) in planes.iter_mut().enumerate() {
             for (l, sum) in lane.iter_mut().enumerate().take(count) {
                 *sum = match self.order {
@@ -59,42 +79,15 @@ impl Tile {
         }
     }
 
-    /// Its planes one after another, row by row; of a tile in that order.
-    pub(super) fn planes(&self) -> impl Iterator<Item = &[f64]> {
-        debug_assert!(self.order == Order::Planes || self.count == 1);
-        self.sums.chunks_exact(self.pixels())
-    }
-
-    /// Number of planes.
-    pub(super) fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Its sums, of a tile whose planes lie pixel by pixel.
-    pub(super) fn sums_mut(&mut self) -> &mut [f64] {
-        debug_assert!(self.order == Order::Pixels);
-        &mut self.sums
-    }
-
-    /// Puts other planes, one after another, in place of its own.
-    pub(super) fn replace(&mut self, planes: Vec<f64>) {
-        (self.count, self.order, self.sums) = (planes.len() / self.pixels(), Order::Planes, planes);
-    }
-
-    /// Number of pixels.
-    pub(super) fn pixels(&self) -> usize {
-        self.x.len() * self.y.len()
-    }
-
     /// Adds a block's voxels.
     pub(super) fn splat(&mut self, voxels: &Splats, footprint: &Footprint) {
-        if !(overlap(&voxels.x, &self.x) && overlap(&voxels.y, &self.y)) {
+        if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;
         }
         let (mut column, mut row, mut all) = (Vec::new(), Vec::new(), vec![0.0; self.count]);
         for voxel in &voxels.voxels {
             let (full_x, full_y) = (footprint.span(voxel.x, voxels.size[0]), footprint.span(voxel.y, voxels.size[1]));
-            let (x, y) = (intersect(&full_x, &self.x), intersect(&full_y, &self.y));
+            let (x, y) = (intersect(&full_x, &self.place.x), intersect(&full_y, &self.place.y));
             if x.is_empty() || y.is_empty() {
                 continue;
             }
@@ -121,15 +114,17 @@ impl Tile {
 
     /// Adds `amount` times the outer product of a row and a column of weights to a plane.
     fn add(&mut self, plane: usize, amount: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let width = self.x.len();
-        let start = plane * self.pixels() + (y - self.y.start) * width + (x - self.x.start);
+        let Place { x: xs, y: ys } = &self.place;
+        let (width, pixels) = (xs.len(), self.place.pixels());
+        let start = plane * pixels + (y - ys.start) * width + (x - xs.start);
         add_to_plane(&mut self.sums[start..], width, amount, row, column);
     }
 
     /// Adds an amount for every plane, as [`Self::add`] does for one.
     fn add_all(&mut self, amounts: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let width = self.x.len();
-        let start = ((y - self.y.start) * width + (x - self.x.start)) * self.count;
+        let Place { x: xs, y: ys } = &self.place;
+        let width = xs.len();
+        let start = ((y - ys.start) * width + (x - xs.start)) * self.count;
         add_to_pixels(&mut self.sums[start..], width, amounts, row, column);
     }
 }
@@ -246,9 +241,9 @@ mod tests {
     #[test]
     fn tiles_cover_each_pixel_once() {
         let mut seen = vec![0; 150 * 100];
-        for tile in Tile::cover(150, 30..100, 1, Order::Planes) {
-            for y in tile.y.clone() {
-                tile.x.clone().for_each(|x| seen[y * 150 + x] += 1);
+        for place in Place::cover(150, 30..100, TILE) {
+            for y in place.y.clone() {
+                place.x.clone().for_each(|x| seen[y * 150 + x] += 1);
             }
         }
         assert!(seen[..30 * 150].iter().all(|n| *n == 0) && seen[30 * 150..].iter().all(|n| *n == 1));

@@ -37,6 +37,13 @@ impl Layout {
         self.value_planes() + frame
     }
 
+    /// Whose samples a plane holds: the frame, and whether those are weights that are missing.
+    pub(super) fn samples(&self, plane: usize) -> Option<(usize, bool)> {
+        let of = |first: usize, there: bool| plane.checked_sub(first).filter(|f| there && *f < self.frames);
+        let absent = || of(self.absent(0), self.absent).map(|f| (f, true));
+        of(self.value(0), self.values).map(|f| (f, false)).or_else(absent)
+    }
+
     /// The plane of the weights that are missing in all frames.
     pub fn absent_in_all(&self) -> usize {
         self.value_planes() + self.frames

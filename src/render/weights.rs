@@ -1,14 +1,19 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
+use super::amounts::{BlockPlanes, OnesOf};
+use super::canvas::{Blocks, Canvas, Finished, Pixels};
 use super::certificate;
-use super::lattice::{Lattice, Sums};
+use super::eye::Eye;
 use super::plan::Budget;
-use super::splat::{Order, Tile};
+use super::splat::Order;
 use super::terms::{Layout, Terms};
-use super::{Blocks, Eye, Quantity, RenderConfig, RenderReport};
+use super::uncut::Uncut;
+use super::{Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
 use crate::footprint::{Footprint, Method};
-use crate::volume::{BlockGrid, Region};
+use crate::volume::BlockGrid;
+use crate::wavelet::LANES;
+use rayon::prelude::*;
 
 /// A pixel is background where its weights sum to less than this share of the view's largest.
 pub(super) const BACKGROUND: f64 = 0.01;
@@ -16,7 +21,7 @@ pub(super) const BACKGROUND: f64 = 0.01;
 const LEAST_PRESENT: f64 = 1e-6;
 
 /// The sums of weights of all voxels of a view.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Weights {
     size: [usize; 2],
     /// With the footprints that values are splatted with, so that the quotient is a mean.
@@ -40,36 +45,49 @@ pub(super) struct PixelWeight {
 }
 
 impl PixelWeight {
-    /// The weighted mean of an emission, less weights that are missing; NaN in the background, and where so much is
-    /// missing that rounding is what is left.
-    pub(super) fn mean(&self, emission: f64, absent: f64) -> f64 {
+    /// What a mean divides by, less weights that are missing; NaN in the background, and where so much is missing that
+    /// rounding is what is left.
+    pub(super) fn present(&self, absent: f64) -> f64 {
         let present = self.sum - absent;
         let enough = self.uncut - absent >= self.threshold && present > LEAST_PRESENT * self.sum;
-        if enough { emission / present } else { f64::NAN }
+        if enough { present } else { f64::NAN }
     }
 }
 
 impl Weights {
     /// Splats a 1 for every voxel.
     pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Self> {
-        let mean = config.quantity == Quantity::Mean;
         let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
         let seen_by = |footprint: Footprint| Eye { footprint, lattice: None, ..eye.clone() };
         let sums = sums(eye, budget)?;
-        let exact = by(Method::EXACT)?;
-        let uncut = if mean && (eye.lattice.is_some() || eye.footprint.reach < exact.reach) {
-            self::sums(&seen_by(exact), budget)?
-        } else {
-            Vec::new()
-        };
-        let mut beyond = Vec::new();
+        let largest = sums.iter().copied().fold(0.0, f64::max);
+        let mut weights = Self { size: eye.camera.size, threshold: BACKGROUND * largest, sums, ..Self::default() };
+        if config.quantity == Quantity::Mean && eye.method != Method::EXACT {
+            weights.judge(&Uncut::new(eye, &by(Method::EXACT)?), eye.method.stated_error);
+        }
         if config.certify {
             let whole = seen_by(by(certificate::WHOLE)?);
-            beyond = self::sums(&whole, budget)?;
-            certificate::leave_beyond(&whole, &sums, &mut beyond);
+            weights.beyond = self::sums(&whole, budget)?;
+            certificate::leave_beyond(&whole, &weights.sums, &mut weights.beyond);
         }
-        let largest = if uncut.is_empty() { &sums } else { &uncut }.iter().copied().fold(0.0, f64::max);
-        Ok(Self { size: eye.camera.size, sums, uncut, beyond, threshold: BACKGROUND * largest })
+        Ok(weights)
+    }
+
+    /// Sums that are off by less than this share of the largest become uncut ones where the difference may matter: for the
+    /// largest, and for those near what is then the threshold.
+    fn judge(&mut self, uncut: &Uncut<'_>, off: f64) {
+        let pixel = |at: usize| [at % self.size[0], at / self.size[0]];
+        let brightest =
+            (0..self.sums.len()).fold(0, |best, at| if self.sums[at] > self.sums[best] { at } else { best });
+        let largest = uncut.at(pixel(brightest));
+        let (threshold, near) = (BACKGROUND * largest, off * uncut.most());
+        let mut sums = self.sums.clone();
+        sums.par_iter_mut().enumerate().for_each(|(at, sum)| {
+            if (*sum - threshold).abs() <= near {
+                *sum = uncut.at(pixel(at));
+            }
+        });
+        (self.threshold, self.uncut) = (threshold, sums);
     }
 
     /// The sums of the pixels that are not background.
@@ -86,9 +104,8 @@ impl Weights {
         seen.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
     }
 
-    /// The weights of a tile's pixel, counted row by row.
-    pub(super) fn at(&self, tile: &Tile, pixel: usize) -> PixelWeight {
-        let (x, y) = (tile.x.start + pixel % tile.x.len(), tile.y.start + pixel / tile.x.len());
+    /// The weights of the pixel in a column and a row.
+    pub(super) fn at(&self, [x, y]: [usize; 2]) -> PixelWeight {
         let at = y * self.size[0] + x;
         let sum = self.sums[at];
         let uncut = self.uncut.get(at).copied().unwrap_or(sum);
@@ -102,10 +119,10 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();
-        let mut tiles = eye.tiles(rows.clone(), &layout);
+        let mut canvas = Canvas::new(eye, rows.clone(), &layout);
         let (batch, report) = (budget.batch(&layout, rows.len()), &mut RenderReport::default());
-        eye.splat(&mut tiles, &blocks, batch, &Ones(&eye.blocks), report)?;
-        tiles.iter().for_each(|tile| eye.paste(tile, 1, &mut out, |sum| sum));
+        canvas.splat(&blocks, batch, &Ones(&eye.blocks), report)?;
+        canvas.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
     }
     Ok(out)
 }
@@ -118,10 +135,20 @@ impl Blocks for Ones<'_> {
         Ok(Terms::ones(self.0.region(block).voxels()))
     }
 
-    fn sums(&self, block: usize, clip: &Region, lattice: &Lattice) -> Result<Option<Sums>> {
-        let region = self.0.region(block).intersect(clip);
-        let mut dense = lattice.dense(&region, 1);
-        dense.add(0, &vec![1.0; region.voxels()]);
-        Ok(Some(dense.into()))
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        Ok(Box::new(OnesOf(self.0.region(block).voxels())))
+    }
+}
+
+fn put_first_plane(tile: &mut Finished<'_>, pixels: &mut Pixels<'_, f64>) {
+    let place = tile.place;
+    if tile.used().is_empty() {
+        return;
+    }
+    for (y, at) in place.y.clone().zip((0..).step_by(place.x.len())) {
+        for first in (0..place.x.len()).step_by(LANES) {
+            let count = LANES.min(place.x.len() - first);
+            pixels.put(0, [place.x.start + first, y], &tile.load_one(at + first, count)[..count]);
+        }
     }
 }

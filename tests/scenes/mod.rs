@@ -161,7 +161,7 @@ impl Truth {
     /// the cut; and where the cut can leave out all that there is, as far from the volume, there is no mean.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let weight = self.images.weight[at];
-        let stated = report.stated_splat_error * BACKGROUND;
+        let stated = report.stated_splat_error;
         let share = if self.masked { stated } else { Method::EXACT.stated_error };
         (weight - BACKGROUND * self.largest_weight).abs() <= share * self.brightest || weight <= stated * self.brightest
     }
@@ -183,7 +183,7 @@ impl Truth {
                 let left = if self.masked { 1e-15 * self.largest * self.brightest } else { 0.0 };
                 delta * self.images.weight[at] + report.stated_splat_error * magnitude * self.brightest + left
             }
-            Quantity::Mean => delta + report.stated_splat_error * (hi - lo) * self.brightest / self.largest_weight,
+            Quantity::Mean => delta + report.stated_splat_error * (hi - lo) * self.brightest / self.images.weight[at],
         }
     }
 }

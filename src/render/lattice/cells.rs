@@ -1,23 +1,85 @@
-//! Planes of sums over cells: amounts are spread into them, and passes of a pyramid widen them.
+//! Planes of sums over the cells of a band of a picture.
 
-use super::spline::Spread;
 use multiversion::multiversion;
 use std::ops::Range;
 
-/// A rectangle of cells with some planes, one after another, each row by row.
+/// A rectangle of cells with some planes, one after another.
+///
+/// A row of cells is stored as one run for each of the q phases, cells u = q j + phase of one phase side by side: what a row
+/// of voxels adds to them then is side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
-    /// The first cell along u and v.
+    pub(super) frame: Frame,
+    sums: Aligned,
+    /// Which planes something was added to.
+    touched: Vec<bool>,
+}
+
+/// Where the cells of a rectangle are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    /// The first cell along u and v; that along u begins a cache line, wherever rectangles begin.
     pub(super) first: [isize; 2],
     /// Cells along u and v.
     pub(super) size: [usize; 2],
-    pub(super) sums: Vec<f64>,
+    /// q
+    pub(super) phases: usize,
+    /// Cells of one phase in a row, whole cache lines.
+    pub(super) run: usize,
 }
 
-impl Cells {
-    /// With all planes at zero.
-    pub(super) fn new(first: [isize; 2], size: [usize; 2], planes: usize) -> Self {
-        Self { first, size, sums: vec![0.0; size[0] * size[1] * planes] }
+/// Cells of one phase in a row, whole cache lines of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Run {
+    /// The place in the row of the first that is here.
+    pub(super) start: usize,
+    /// Which of the lines are here.
+    pub(super) here: Range<usize>,
+    /// The place in the first line of the cell that was asked for.
+    pub(super) inside: usize,
+}
+
+/// Numbers in a cache line.
+pub(super) const LINE: usize = 8;
+
+/// Zeros that begin with a cache line.
+#[derive(Debug, Default)]
+pub(super) struct Aligned {
+    numbers: Vec<f64>,
+    first: usize,
+    len: usize,
+}
+
+impl Aligned {
+    pub(super) fn of(len: usize) -> Self {
+        let numbers = vec![0.0; len + LINE - 1];
+        let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE - 1);
+        Self { numbers, first, len }
+    }
+}
+
+impl std::ops::Deref for Aligned {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.numbers[self.first..][..self.len]
+    }
+}
+
+impl std::ops::DerefMut for Aligned {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.numbers[self.first..][..self.len]
+    }
+}
+
+impl Frame {
+    /// The smallest one that holds so many cells from some first ones on.
+    pub(super) fn holding(first: [isize; 2], size: [usize; 2], phases: usize) -> Self {
+        let before = first[0].rem_euclid((phases * LINE) as isize);
+        let lines = (size[0] + before as usize).div_ceil(phases * LINE);
+        // Not a power of two: lines below one another would share a few places of the first cache.
+        let run = LINE * if (phases * lines).is_multiple_of(8) { lines + 1 } else { lines };
+        Self { first: [first[0] - before, first[1]], size: [phases * run, size[1]], phases, run }
     }
 
     /// Cells of a plane.
@@ -25,108 +87,88 @@ impl Cells {
         self.size[0] * self.size[1]
     }
 
-    /// A plane.
-    pub(super) fn plane(&self, plane: usize) -> &[f64] {
-        &self.sums[plane * self.area()..][..self.area()]
+    /// Where so many cache lines of a row are, of which cell u lies in the first.
+    pub(super) fn run_of(&self, u: isize, lines: usize) -> Run {
+        let (u, size, line) = (u - self.first[0], self.run as isize, LINE as isize);
+        let (phase, j) = (u.rem_euclid(self.phases as isize), u.div_euclid(self.phases as isize));
+        let first = j.div_euclid(line);
+        let here = (-first).max(0).min(lines as isize)..(size / line - first).clamp(0, lines as isize);
+        let here = if here.is_empty() { 0..0 } else { here.start as usize..here.end as usize };
+        let start = phase * size + (first + here.start as isize).clamp(0, size / line) * line;
+        Run { start: start as usize, here, inside: j.rem_euclid(line) as usize }
     }
 
-    fn plane_mut(&mut self, plane: usize) -> &mut [f64] {
-        let area = self.area();
-        &mut self.sums[plane * area..][..area]
+    /// Where a cell is in its row; none if it is not here.
+    pub(super) fn in_row(&self, u: isize) -> Option<usize> {
+        let u = u - self.first[0];
+        let j = u.div_euclid(self.phases as isize);
+        (0..self.run as isize).contains(&j).then(|| u.rem_euclid(self.phases as isize) as usize * self.run + j as usize)
     }
 
-    /// Adds one amount, spread along both axes.
-    pub(super) fn add(&mut self, plane: usize, amount: f64, places: [(isize, Spread); 2], degree: usize) {
-        let [(u, along), (v, across)] = places;
-        let (u, v, width) = ((u - self.first[0]) as usize, (v - self.first[1]) as usize, self.size[0]);
-        let plane = self.plane_mut(plane);
-        for (line, weight) in (v..).zip(&across[..=degree]) {
-            let cells = &mut plane[line * width + u..][..=degree];
-            cells.iter_mut().zip(&along).for_each(|(sum, w)| *sum += amount * weight * w);
-        }
+    /// Of cells u, u + q, ... of a row, less than `count` cells from u on, those that are here: how far from u they begin, and
+    /// where they are in the row.
+    pub(super) fn first_in_row(&self, u: isize, count: usize) -> (usize, Range<usize>) {
+        let phases = self.phases;
+        let skipped = ((self.first[0] - u).max(0) as usize).div_ceil(phases);
+        let wanted = count.div_ceil(phases).saturating_sub(skipped);
+        let start = self.in_row(u + (skipped * phases) as isize).unwrap_or(0);
+        let left = if self.in_row(u + (skipped * phases) as isize).is_some() { self.run - start % self.run } else { 0 };
+        (skipped * phases, start..start + wanted.min(left))
     }
 
-    /// Adds a row of amounts along u, every `distance`-th cell one, spread along both axes.
-    pub(super) fn add_row(&mut self, plane: usize, row: &Row<'_>, work: &mut Vec<f64>) {
-        let length = (row.amounts.len() - 1) * row.distance + row.degree + 1;
-        work.clear();
-        work.resize(length, 0.0);
-        for (o, weight) in row.along[..=row.degree].iter().enumerate() {
-            add_spaced(&mut work[o..], row.distance, *weight, row.amounts);
-        }
-        let [u, v] = [0, 1].map(|i| (row.cell[i] - self.first[i]) as usize);
-        let width = self.size[0];
-        let plane = self.plane_mut(plane);
-        for (line, weight) in (v..).zip(&row.across[..=row.degree]) {
-            add_scaled(&mut plane[line * width + u..][..length], *weight, work);
-        }
-    }
-
-    /// Adds the plane to itself, moved by whole cells: `sum += factor * (sum at the place less the offset)` for every
-    /// (offset, factor), all of the plane as it was. What leaves the rectangle is lost.
-    pub(super) fn widen(&mut self, plane: usize, moves: &[([isize; 2], f64)], work: &mut Vec<f64>) {
-        let size = self.size;
-        let sums = self.plane_mut(plane);
-        work.clear();
-        work.extend_from_slice(sums);
-        for ([du, dv], factor) in moves {
-            let (to_u, to_v) = (reached(size[0], *du), reached(size[1], *dv));
-            if to_u.is_empty() {
-                continue;
-            }
-            for v in to_v {
-                let from = (v as isize - dv) as usize * size[0];
-                let from = &work[from + (to_u.start as isize - du) as usize..][..to_u.len()];
-                add_scaled(&mut sums[v * size[0] + to_u.start..][..to_u.len()], *factor, from);
-            }
-        }
-    }
-
-    /// Adds other planes, each times a weight, to a plane.
-    pub(super) fn add_planes(&mut self, plane: usize, others: &[(usize, f64)]) {
-        let area = self.area();
-        for (other, weight) in others {
-            let (low, high) = self.sums.split_at_mut(plane.max(*other) * area);
-            let (here, there) = (plane.min(*other) * area, &mut high[..area]);
-            let here = &mut low[here..][..area];
-            if plane > *other { add_scaled(there, *weight, here) } else { add_scaled(here, *weight, there) }
-        }
+    /// The cells of row v in a plane; none if it is not here.
+    pub(super) fn row(&self, v: isize) -> Option<Range<usize>> {
+        let v = usize::try_from(v - self.first[1]).ok().filter(|v| *v < self.size[1])?;
+        Some(v * self.size[0]..(v + 1) * self.size[0])
     }
 }
 
-/// Places that something moved by `by` still reaches.
-fn reached(size: usize, by: isize) -> Range<usize> {
-    let end = size.saturating_add_signed(by.min(0));
-    (by.max(0) as usize).min(end)..end
+impl Cells {
+    /// With all planes at zero.
+    pub(super) fn new(frame: Frame, planes: usize) -> Self {
+        Self { frame, sums: Aligned::of(frame.area() * planes), touched: vec![false; planes] }
+    }
+
+    /// The planes that something was added to, and their numbers.
+    pub(super) fn touched(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        let planes = self.sums.chunks_exact(self.frame.area().max(1)).enumerate();
+        planes.zip(&self.touched).filter(|(_, touched)| **touched).map(|(plane, _)| plane)
+    }
+
+    /// All planes, where to add.
+    pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
+        let frame = self.frame;
+        let planes = self.sums.chunks_exact_mut(frame.area().max(1)).zip(&mut self.touched);
+        planes.map(|(sums, touched)| CellPlane { frame, sums, touched }).collect()
+    }
 }
 
-/// Amounts at every `distance`-th cell along u.
-#[derive(Debug)]
-pub(super) struct Row<'a> {
-    /// The first cell that is reached.
-    pub(super) cell: [isize; 2],
-    pub(super) distance: usize,
-    pub(super) amounts: &'a [f64],
-    pub(super) degree: usize,
-    /// Weights along u.
-    pub(super) along: &'a Spread,
-    /// Weights along v.
-    pub(super) across: &'a Spread,
+impl CellPlane<'_> {
+    /// Adds the cells of another rectangle.
+    pub(super) fn add(&mut self, frame: &Frame, sums: &[f64]) {
+        for (v, from) in (frame.first[1]..).zip(sums.chunks_exact(frame.size[0])) {
+            let Some(row) = self.frame.row(v) else { continue };
+            let to = &mut self.sums[row];
+            for (phase, from) in from.chunks_exact(frame.run).enumerate() {
+                let run = self.frame.run_of(frame.first[0] + phase as isize, frame.run / LINE);
+                add_to(&mut to[run.start..][..run.here.len() * LINE], &from[run.here.start * LINE..]);
+            }
+        }
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn add_scaled(sums: &mut [f64], factor: f64, amounts: &[f64]) {
-    for (sum, amount) in sums.iter_mut().zip(amounts) {
-        *sum += factor * amount;
-    }
+fn add_to(sums: &mut [f64], more: &[f64]) {
+    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
-fn add_spaced(sums: &mut [f64], distance: usize, factor: f64, amounts: &[f64]) {
-    if distance == 1 {
-        add_scaled(sums, factor, amounts);
-    } else {
-        sums.iter_mut().step_by(distance).zip(amounts).for_each(|(sum, amount)| *sum += factor * amount);
-    }
+/// One plane.
+#[derive(Debug)]
+pub(in crate::render) struct CellPlane<'a> {
+    pub(super) frame: Frame,
+    pub(super) sums: &'a mut [f64],
+    /// Whether something was added.
+    pub(super) touched: &'a mut bool,
 }
 
 #[cfg(test)]
@@ -134,18 +176,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_plane_is_added_to_itself_moved() {
-        let mut cells = Cells::new([0, 0], [3, 2], 1);
-        cells.sums = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        cells.widen(0, &[([1, 0], 10.0), ([-2, 1], 100.0), ([5, 0], 7.0), ([0, -9], 7.0)], &mut Vec::new());
-        assert_eq!(cells.sums, [1.0, 12.0, 23.0, 304.0, 45.0, 56.0]);
-    }
-
-    #[test]
-    fn planes_are_added_from_either_side() {
-        let mut cells = Cells::new([0, 0], [1, 1], 3);
-        cells.sums = vec![1.0, 10.0, 100.0];
-        cells.add_planes(1, &[(0, 2.0), (2, 3.0)]);
-        assert_eq!(cells.sums, [1.0, 312.0, 100.0]);
+    fn runs_are_the_cells_that_are_there() {
+        let frame = Frame::holding([-3, 2], [14, 2], 2);
+        assert_eq!((frame.first, frame.size, frame.run), ([-16, 2], [32, 2], 16));
+        let run = |start, here, inside| Run { start, here, inside };
+        // Even cells first: -16, -14, ... 14, then -15, -13, ... 15.
+        for (u, lines, expected) in [
+            (-16, 1, run(0, 0..1, 0)),
+            (-19, 2, run(16, 1..2, 6)),
+            (-18, 1, run(0, 0..0, 7)),
+            (15, 3, run(24, 0..1, 7)),
+            (16, 3, run(16, 0..0, 0)),
+        ] {
+            assert_eq!(frame.run_of(u, lines), expected, "{u}");
+        }
+        for (u, count, expected) in
+            [(-16, 4, (0, 0..2)), (-19, 8, (4, 16..18)), (13, 9, (0, 30..32)), (16, 3, (0, 0..0))]
+        {
+            assert_eq!(frame.first_in_row(u, count), expected, "{u}");
+        }
+        assert_eq!([1, 2, 3, 4].map(|v| frame.row(v)), [None, Some(0..32), Some(32..64), None]);
+        assert_eq!([-17, -16, 1, 15, 16].map(|u| frame.in_row(u)), [None, Some(0), Some(24), Some(31), None]);
     }
 }

@@ -14,24 +14,24 @@ use crate::volume::Grid;
 
 /// The sheared lattice of one view.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shear {
+pub(in crate::render) struct Shear {
     /// b, c and a.
-    pub(super) axes: [usize; 3],
+    pub(in crate::render) axes: [usize; 3],
     /// alpha and beta.
-    pub(super) slopes: [f64; 2],
+    pub(in crate::render) slopes: [f64; 2],
     /// World units of depth from a voxel to the next one along b, c and a.
-    pub(super) depths: [f64; 3],
+    pub(in crate::render) depths: [f64; 3],
     /// Pixels from a voxel to the next one along b and along c.
-    pub(super) pixels: [[f64; 2]; 2],
+    pub(in crate::render) pixels: [[f64; 2]; 2],
     /// The pixel and the depth of voxel (0, 0, 0).
-    pub(super) origin: [f64; 3],
+    pub(in crate::render) origin: [f64; 3],
     /// Cells per voxel along b and c.
     pub(super) fineness: usize,
 }
 
 impl Shear {
     /// Of a view of a grid, with so many cells per voxel.
-    pub(super) fn new(camera: &Camera, grid: &Grid, fineness: usize) -> Self {
+    pub(in crate::render) fn new(camera: &Camera, grid: &Grid, fineness: usize) -> Self {
         let origin = camera.project(grid.position([0; 3]));
         let steps: [[f64; 3]; 3] = std::array::from_fn(|axis| camera.step(axis, grid.spacing[axis]));
         let facing = |axis: usize| (steps[axis][2] / grid.spacing[axis]).abs();
@@ -45,19 +45,19 @@ impl Shear {
     }
 
     /// The cells of a voxel.
-    pub(super) fn place(&self, voxel: [usize; 3]) -> [f64; 2] {
+    pub(in crate::render) fn place(&self, voxel: [usize; 3]) -> [f64; 2] {
         let [b, c, a] = self.axes.map(|axis| voxel[axis] as f64);
         let q = self.fineness as f64;
         [q * (b + self.slopes[0] * a), q * (c + self.slopes[1] * a)]
     }
 
     /// The depth of a voxel.
-    pub(super) fn depth(&self, voxel: [usize; 3]) -> f64 {
+    pub(in crate::render) fn depth(&self, voxel: [usize; 3]) -> f64 {
         (0..3).fold(self.origin[2], |z, i| z + self.depths[i] * voxel[self.axes[i]] as f64)
     }
 
     /// The cells that an offset in pixels is.
-    pub(super) fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub(in crate::render) fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [b, c] = self.pixels;
         let det = b[0] * c[1] - b[1] * c[0];
         [(x * c[1] - y * c[0]) / det, (b[0] * y - b[1] * x) / det].map(|voxels| voxels * self.fineness as f64)

@@ -203,6 +203,9 @@ fn conversion(checked: &Checked, frames: usize) -> Conversion {
     }
 }
 
+/// The share of the largest sum of weights that a pixel has at least, or it is background.
+const LEAST_WEIGHT: f64 = 0.01;
+
 /// `voxel` is what no sample's error may exceed, if anything.
 fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> Rendering {
     let spread = |seconds: fn(&Rendered) -> f64| Spread::of(runs.iter().map(|r| seconds(&r.did)).collect());
@@ -214,9 +217,10 @@ fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> R
         further_view,
         splat: run.splat.clone(),
         stated_splat_error: run.stated_splat_error,
-        promised: voxel.zip(run.stated_splat_error).map(|(voxel, splat)| voxel + splat),
+        promised: voxel.zip(run.stated_splat_error).map(|(voxel, splat)| voxel + splat / LEAST_WEIGHT),
         image_error: run.error,
         certified_error: run.certified_error,
+        certificate_tightness: run.certificate_tightness,
         beyond_certificate: run.beyond_certificate,
         peak_bytes: most(runs),
     }

@@ -7,7 +7,7 @@ use std::iter::successors;
 use wavesplat::bound::Bound;
 use wavesplat::error::{Error, Result};
 use wavesplat::footprint::Method;
-use wavesplat::render::{Quantity, splat_method, stated_splat_error};
+use wavesplat::render::{Quantity, splat_method};
 use wavesplat::wavelet::Basis;
 
 /// A basis, and the window it is measured with.
@@ -125,7 +125,7 @@ impl Sweep {
         self.splats.iter().map(move |method| {
             let coefficients = BASES.iter().map(|b| Contender::Coefficients(b, &BOUNDS[0]));
             let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(method.radius)]).collect();
-            let splat_error = stated_splat_error(Quantity::Mean, *method) * (1.0 + 1e-9);
+            let splat_error = method.stated_error * (1.0 + 1e-9);
             Group { kind, tolerance: self.fine, splat_error, splat: Some(method.name), contenders }
         })
     }

@@ -92,17 +92,12 @@ pub struct Rendering {
     pub image_error: ImageError,
     /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
     pub certified_error: Option<f64>,
+    /// That in units of the largest true error of the same pictures.
+    pub certificate_tightness: Option<f64>,
     /// Compared pixels that are further off than certified.
     pub beyond_certificate: usize,
     /// The most memory of the process, pages of mapped files included.
     pub peak_bytes: Option<u64>,
-}
-
-impl Rendering {
-    /// The largest certified error in units of the largest true one.
-    pub fn certificate_tightness(&self) -> Option<f64> {
-        self.certified_error.map(|certified| certified / self.image_error.largest)
-    }
 }
 
 /// Repeated measurements.
@@ -140,6 +135,7 @@ impl Point {
             promised: None,
             image_error: ImageError { largest: 0.5, rms: 0.25 },
             certified_error: None,
+            certificate_tightness: None,
             beyond_certificate: 0,
             peak_bytes: Some(1),
         };

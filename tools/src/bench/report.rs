@@ -80,7 +80,7 @@ fn rendered(point: &Point, all: &[Point]) -> String {
     let bound = point.bound.as_deref().unwrap_or("");
     let own = if point.bound.is_some() { format!("{:e}", point.tolerance) } else { String::new() };
     let share = |e: Option<f64>| e.map_or(String::new(), |e| format!("{e:.1e}"));
-    let tightness = r.certificate_tightness().map_or(String::new(), |t| format!("{t:.2}"));
+    let tightness = r.certificate_tightness.map_or(String::new(), |t| format!("{t:.2}"));
     format!(
         "| {own} | {} | {bound} | {} | {} | {} | {} | {} | {:.1e} | {:.1e} | {} | {tightness} | {} |\n",
         point.method,

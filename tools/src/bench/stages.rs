@@ -66,14 +66,16 @@ pub(super) fn render(step: &Render) -> Result<Rendered> {
     })?;
     let further = method.view(step, &step.look.further(), &mut |_, _| {})?;
     let certified = if step.certify { method.certified(step, &truth)? } else { Vec::new() };
+    let largest = |of: fn(&(f64, f64)) -> f64| certified.iter().map(of).reduce(f64::max);
     Ok(Rendered {
         first_seconds: opening + first.seconds,
         further_seconds: further.seconds,
         splat: first.splat,
         stated_splat_error: first.stated_error,
         error: Truth::error(&differences),
-        certified_error: certified.iter().copied().reduce(f64::max),
-        beyond_certificate: certified.iter().zip(&differences).filter(|(c, d)| d > c).count(),
+        certified_error: largest(|c| c.0),
+        certificate_tightness: largest(|c| c.0).zip(largest(|c| c.1)).map(|(certified, error)| certified / error),
+        beyond_certificate: certified.iter().filter(|(certified, error)| error > certified).count(),
     })
 }
 
@@ -113,12 +115,14 @@ impl Method {
 }
 
 impl Method {
-    /// The certified errors of the first view's compared pixels, as shares of the value range; none of the textbook form.
-    fn certified(&mut self, step: &Render, truth: &Truth) -> Result<Vec<f64>> {
+    /// The certified and the true errors of the first view's compared pixels where pictures are certified, as shares of the
+    /// value range; none of the textbook form.
+    fn certified(&mut self, step: &Render, truth: &Truth) -> Result<Vec<(f64, f64)>> {
         let mut all = Vec::new();
         if let Self::Library(scene) = self {
             by_library(scene.as_mut(), step, &step.look, true, &mut |r| {
-                all.extend(truth.at_pixels(r.frame, r.error.unwrap_or_default()));
+                let certified = truth.at_pixels(r.frame, r.error.unwrap_or_default());
+                all.extend(certified.into_iter().zip(truth.differences(r.frame, r.picture)));
             })?;
         }
         Ok(all)

@@ -93,6 +93,8 @@ pub(super) struct Rendered {
     pub(super) error: ImageError,
     /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
     pub(super) certified_error: Option<f64>,
+    /// That in units of the largest true error of the same pictures.
+    pub(super) certificate_tightness: Option<f64>,
     /// Compared pixels that are further off than certified.
     pub(super) beyond_certificate: usize,
 }

@@ -1,0 +1,77 @@
+//! What a block adds to the planes of a picture, as amounts of its voxels and one plane at a time.
+
+use crate::codec::field::Plane;
+use crate::error::Result;
+use crate::sample::{SampleType, load_as};
+
+/// The amounts of a block's voxels in one plane.
+#[derive(Debug, Clone, Copy)]
+pub enum Amounts<'a> {
+    /// All are zero.
+    Nothing,
+    /// One for each voxel, x fastest.
+    Single(&'a [f32]),
+    /// As [`Self::Single`].
+    Double(&'a [f64]),
+    /// Those that are not zero: (voxel, amount).
+    Few(&'a [(u32, f64)]),
+}
+
+impl<'a> From<Plane<'a>> for Amounts<'a> {
+    fn from(plane: Plane<'a>) -> Self {
+        match plane {
+            Plane::Zero => Self::Nothing,
+            Plane::Single(values) => Self::Single(values),
+            Plane::Double(values) => Self::Double(values),
+        }
+    }
+}
+
+/// A block that has been read.
+pub trait BlockPlanes: Send + Sync {
+    /// The amounts of a plane, which may be in `room`.
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>>;
+
+    /// Nonzero coefficients, and stored bytes that were read for them.
+    fn held(&self) -> [u64; 2];
+}
+
+/// Room for the amounts of a plane while they are made.
+#[derive(Debug, Default)]
+pub struct Room {
+    pub(super) bytes: Vec<u8>,
+    pub(super) single: Vec<f32>,
+    pub(super) double: Vec<f64>,
+}
+
+impl Room {
+    /// The amounts of samples that lie in `bytes`, each made another by `of`.
+    pub(super) fn amounts_of_samples(&mut self, ty: SampleType, of: impl Fn(f64) -> f64) -> Amounts<'_> {
+        let count = self.bytes.len() / ty.size();
+        if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
+            // Singles do not hold them.
+            self.double.resize(count, 0.0);
+            load_as(ty, &self.bytes, &mut self.double, of);
+            return Amounts::Double(&self.double);
+        }
+        self.single.resize(count, 0.0);
+        load_as(ty, &self.bytes, &mut self.single, |v| of(v) as f32);
+        Amounts::Single(&self.single)
+    }
+}
+
+/// A 1 for each of so many voxels.
+#[derive(Debug)]
+pub(super) struct OnesOf(pub(super) usize);
+
+impl BlockPlanes for OnesOf {
+    fn plane<'a>(&'a self, _: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+        room.single.clear();
+        room.single.resize(self.0, 1.0);
+        Ok(Amounts::Single(&room.single))
+    }
+
+    fn held(&self) -> [u64; 2] {
+        [0; 2]
+    }
+}

@@ -1,0 +1,203 @@
+//! A band of a picture while blocks are splatted into it, by footprints or by way of a lattice, and its tiles once they are.
+
+use super::RenderReport;
+use super::amounts::BlockPlanes;
+use super::eye::Eye;
+use super::lap;
+use super::lattice::{Cells, Gather, Lattice, Placed, Work};
+use super::splat::{Place, Splats, TILE, Tile};
+use super::terms::{Layout, Terms};
+use crate::error::Result;
+use crate::wavelet::Lane;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::time::Instant;
+
+/// Where blocks come from.
+pub(super) trait Blocks: Sync {
+    /// The terms of a block.
+    fn terms(&self, block: usize) -> Result<Terms>;
+
+    /// The same, plane by plane.
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
+}
+
+/// A band of a picture.
+pub(super) struct Canvas<'a> {
+    eye: &'a Eye,
+    rows: Range<usize>,
+    planes: usize,
+    sums: Sums,
+}
+
+enum Sums {
+    Tiles(Vec<Tile>),
+    Cells(Cells),
+}
+
+impl<'a> Canvas<'a> {
+    /// Some rows of a picture with all planes at zero.
+    pub(super) fn new(eye: &'a Eye, rows: Range<usize>, layout: &Layout) -> Self {
+        let (width, planes) = (eye.camera.size[0], layout.planes());
+        let tile = |place| Tile::new(place, planes, layout.order);
+        let sums = match &eye.lattice {
+            Some(lattice) => Sums::Cells(lattice.cells_of(width, &rows, planes)),
+            None => Sums::Tiles(Place::cover(width, rows.clone(), TILE).into_iter().map(tile).collect()),
+        };
+        Self { eye, rows, planes, sums }
+    }
+
+    /// Splats blocks in order, `batch` at a time.
+    pub(super) fn splat(
+        &mut self,
+        blocks: &[usize],
+        batch: usize,
+        source: &dyn Blocks,
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let Eye { grid, camera, footprint, clip, .. } = self.eye;
+        let region = |block: usize| self.eye.blocks.region(block);
+        match (&mut self.sums, &self.eye.lattice) {
+            (Sums::Cells(cells), Some(lattice)) => {
+                let place = |block: usize| {
+                    let planes = source.planes(block)?;
+                    let held = planes.held();
+                    Ok(((lattice.placed(&region(block), clip), planes), held))
+                };
+                in_batches(blocks, batch, report, place, |blocks| add_planes(cells, blocks))
+            }
+            (Sums::Tiles(tiles), _) => {
+                let project = |block: usize| {
+                    let terms = source.terms(block)?;
+                    let held = [terms.coefficients, terms.bytes_read];
+                    Ok((Splats::new(terms, &region(block), clip, grid, camera, footprint), held))
+                };
+                in_batches(blocks, batch, report, project, |splats| {
+                    tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, footprint)));
+                    Ok(())
+                })
+            }
+            (Sums::Cells(_), None) => Ok(()), // a band of cells is of a lattice
+        }
+    }
+
+    /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
+    pub(super) fn finish<T: Send>(&self, pictures: &mut [T], finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync) {
+        let width = self.eye.camera.size[0];
+        let side = self.eye.lattice.as_ref().map_or(TILE, Lattice::tile);
+        let columns = width.div_ceil(side);
+        let places = Place::cover(width, self.rows.clone(), side);
+        let bands = self.by_rows_of_tiles(pictures, side);
+        places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
+            let mut pixels = Pixels { planes, width, top: places[0].y.start };
+            for (i, place) in places.iter().enumerate() {
+                let sums = match (&self.sums, &self.eye.lattice) {
+                    (Sums::Cells(cells), Some(lattice)) => Some(lattice.gather(cells, place)),
+                    _ => None,
+                };
+                let tile = match &self.sums {
+                    Sums::Tiles(tiles) => tiles.get(n * columns + i),
+                    Sums::Cells(_) => None,
+                };
+                finish(Finished { place, planes: self.planes, gather: sums, tile }, &mut pixels);
+            }
+        });
+    }
+
+    /// For every row of tiles its rows of every picture.
+    fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
+        let [width, height] = self.eye.camera.size;
+        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
+        bands.resize_with(self.rows.len().div_ceil(side), Vec::new);
+        for picture in pictures.chunks_exact_mut(width * height) {
+            let rows = picture[self.rows.start * width..self.rows.end * width].chunks_mut(side * width);
+            bands.iter_mut().zip(rows).for_each(|(band, rows)| band.push(rows));
+        }
+        bands
+    }
+}
+
+/// A tile that has all its blocks.
+pub(super) struct Finished<'a> {
+    pub(super) place: &'a Place,
+    planes: usize,
+    gather: Option<Gather<'a>>,
+    tile: Option<&'a Tile>,
+}
+
+impl Finished<'_> {
+    /// The planes that may have sums.
+    pub(super) fn used(&self) -> Vec<usize> {
+        self.gather.as_ref().map_or_else(|| (0..self.planes).collect(), |gather| gather.used().to_vec())
+    }
+
+    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    pub(super) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
+        match (&mut self.gather, self.tile) {
+            (Some(gather), _) => gather.load(first, count, planes),
+            (None, Some(tile)) => tile.load(first, count, planes),
+            (None, None) => {}
+        }
+    }
+
+    /// The same where there is one plane only.
+    pub(super) fn load_one(&mut self, first: usize, count: usize) -> Lane {
+        let mut planes = [Lane::default()];
+        match (&mut self.gather, self.tile) {
+            (Some(gather), _) => planes[0] = gather.load_one(first, count),
+            (None, Some(tile)) => tile.load(first, count, &mut planes),
+            (None, None) => {}
+        }
+        planes[0]
+    }
+}
+
+/// The rows of some pictures that a row of tiles is in.
+pub(super) struct Pixels<'a, T> {
+    planes: Vec<&'a mut [T]>,
+    width: usize,
+    top: usize,
+}
+
+impl<T: Copy> Pixels<'_, T> {
+    /// Puts neighbouring pixels of a row into a picture.
+    pub(super) fn put(&mut self, picture: usize, [x, y]: [usize; 2], pixels: &[T]) {
+        self.planes[picture][(y - self.top) * self.width + x..][..pixels.len()].copy_from_slice(pixels);
+    }
+}
+
+type BlockInCells<'a> = ((Placed, Box<dyn BlockPlanes + 'a>), [u64; 2]);
+
+/// Adds blocks to every plane of cells.
+fn add_planes(cells: &mut Cells, blocks: &[BlockInCells<'_>]) -> Result<()> {
+    cells.planes_mut().into_par_iter().enumerate().try_for_each_init(Default::default, |room, (plane, mut sums)| {
+        let (room, work): &mut (_, Work) = room;
+        for ((placed, block), _) in blocks {
+            placed.add(block.plane(plane, room)?, &mut sums, work);
+        }
+        Ok(())
+    })
+}
+
+/// Makes something of every block, in order and `batch` at a time, each with its coefficients and the bytes read for them,
+/// and adds it.
+fn in_batches<T: Send>(
+    blocks: &[usize],
+    batch: usize,
+    report: &mut RenderReport,
+    make: impl Fn(usize) -> Result<(T, [u64; 2])> + Sync,
+    mut add: impl FnMut(&[(T, [u64; 2])]) -> Result<()>,
+) -> Result<()> {
+    let mut clock = Instant::now();
+    for blocks in blocks.chunks(batch) {
+        let made = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
+        lap(&mut clock, &mut report.decode_seconds);
+        add(&made)?;
+        for (_, [coefficients, bytes_read]) in &made {
+            report.coefficients += coefficients;
+            report.bytes_read += bytes_read;
+        }
+        lap(&mut clock, &mut report.splat_seconds);
+    }
+    Ok(())
+}

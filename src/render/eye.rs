@@ -1,0 +1,82 @@
+//! Where a scene is seen from, and how it is splatted: everything that is the same for all frames of a view.
+
+use super::lattice::Lattice;
+use super::scene::Scene;
+use super::splat::{overlap, rows_reached};
+use super::weights::BACKGROUND;
+use super::{Quantity, RenderConfig, most_splat_error, splat_method};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::footprint::{Footprint, Method};
+use crate::volume::{BlockGrid, Grid, Region};
+use std::ops::Range;
+
+/// Means are of voxels of which some are not deeper than this over tau: exponentials lose digits at 708, and vanish.
+const DEEPEST: f64 = 640.0;
+
+/// Everything that is the same for all frames of a view.
+#[derive(Debug, Clone)]
+pub(super) struct Eye {
+    pub(super) camera: Camera,
+    pub(super) footprint: Footprint,
+    pub(super) tau: f64,
+    pub(super) grid: Grid,
+    pub(super) blocks: BlockGrid,
+    /// The voxels that are splatted.
+    pub(super) clip: Region,
+    /// What splats instead of footprints.
+    pub(super) lattice: Option<Lattice>,
+    /// As what that is reported.
+    pub(super) method: Method,
+}
+
+impl Eye {
+    pub(super) fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<Self> {
+        let (grid, blocks) = (*scene.grid(), scene.blocks());
+        let clip = config.region.unwrap_or(grid.whole());
+        if !grid.whole().contains(&clip) || clip.is_empty() {
+            let d = grid.dims;
+            return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
+        }
+        // Where weights are small, certificates would say little of looser cuts.
+        let share = if config.certify && config.quantity == Quantity::Mean { BACKGROUND } else { 1.0 };
+        let method = splat_method(config.quantity, share * config.splat_error);
+        let camera = Camera::new(&config.view, &grid)?;
+        let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
+        let nearest = camera.nearest_of(&grid.crop(&clip));
+        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
+            let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
+            return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
+        }
+        let lattice = (!config.certify)
+            .then(|| {
+                let error = most_splat_error(config.quantity, config.splat_error);
+                Lattice::within(error, config.kernel, (&grid, &clip), &camera, &footprint)
+            })
+            .flatten();
+        let method = lattice.as_ref().map_or(method, |(_, method)| *method);
+        Ok(Self {
+            camera,
+            footprint,
+            tau: config.kernel.tau,
+            grid,
+            blocks,
+            clip,
+            lattice: lattice.map(|l| l.0),
+            method,
+        })
+    }
+
+    pub(super) fn pixels(&self) -> usize {
+        self.camera.size[0] * self.camera.size[1]
+    }
+
+    /// Whether any voxel of a block can reach these rows of the picture.
+    pub(super) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
+        if let Some(lattice) = &self.lattice {
+            return overlap(&lattice.rows_reached(&self.blocks.region(block), self.camera.size), rows);
+        }
+        let region = self.blocks.region(block).intersect(&self.clip);
+        overlap(&rows_reached(&region, &self.grid, &self.camera, &self.footprint), rows)
+    }
+}

@@ -1,0 +1,178 @@
+//! The pixels of a tile from its cells.
+
+use super::cells::Cells;
+use super::kernel::Weights;
+use super::picture::Lattice;
+use crate::render::splat::Place;
+use crate::wavelet::{LANES, Lane};
+use multiversion::multiversion;
+use std::ops::Range;
+
+/// The cells that a tile sees, with the planes that have any sum there.
+#[derive(Debug)]
+pub(in crate::render) struct Gather<'a> {
+    lattice: &'a Lattice,
+    place: &'a Place,
+    first: [isize; 2],
+    /// Cells along u and v.
+    size: [usize; 2],
+    used: Vec<usize>,
+    /// For every so many planes their sums side by side, cell by cell.
+    together: usize,
+    bundles: Vec<Vec<f64>>,
+    /// Of [`LANES`] pixels.
+    weights: Vec<Weights>,
+}
+
+/// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
+const TOGETHER: usize = 16;
+
+impl<'a> Gather<'a> {
+    pub(super) fn new(lattice: &'a Lattice, cells: &Cells, place: &'a Place) -> Self {
+        let (first, size) = lattice.seen_by(&place.x, &place.y);
+        let seen = Seen::of(cells, first, size);
+        let planes: Vec<(usize, &[f64])> = cells.touched().filter(|(_, plane)| seen.any(plane)).collect();
+        let together = planes.len().next_power_of_two().min(TOGETHER);
+        let bundles = planes.chunks(together).map(|planes| seen.bundle(planes, together)).collect();
+        let weights = (0..LANES).map(|_| Weights::of(&lattice.kernel)).collect();
+        let used = planes.into_iter().map(|(number, _)| number).collect();
+        Self { lattice, place, first, size, used, together, bundles, weights }
+    }
+
+    /// The planes that have any sum here.
+    pub(in crate::render) fn used(&self) -> &[usize] {
+        &self.used
+    }
+
+    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
+        planes.fill(Lane::default());
+        if self.used.is_empty() {
+            return;
+        }
+        let from = self.weigh(first, count);
+        let mut sums = [0.0; TOGETHER];
+        for (used, bundle) in self.used.chunks(self.together).zip(&self.bundles) {
+            for (l, (weights, from)) in self.weights.iter().zip(from).enumerate().take(count) {
+                sum_cells(weights, bundle, (from, self.size[0]), &mut sums[..self.together]);
+                used.iter().zip(sums).for_each(|(plane, sum)| planes[*plane][l] = sum * self.lattice.peak);
+            }
+        }
+    }
+
+    /// The only plane that there is, at such pixels: rounded in its own way, which no other plane must see.
+    pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
+        let mut sums = Lane::default();
+        let from = if self.used.is_empty() { return sums } else { self.weigh(first, count) };
+        if let [bundle] = &self.bundles[..] {
+            for (l, (sum, weights)) in sums.iter_mut().zip(&self.weights).enumerate().take(count) {
+                *sum = sum_plane(weights, bundle, (from[l], self.size[0])) * self.lattice.peak;
+            }
+        }
+        sums
+    }
+
+    /// The weights of some pixels, and for each the first of its cells.
+    fn weigh(&mut self, first: usize, count: usize) -> [usize; LANES] {
+        let mut from = [0; LANES];
+        for (l, weights) in self.weights.iter_mut().enumerate().take(count) {
+            let [x, y] = self.place.pixel(first + l).map(|n| n as f64 + 0.5);
+            let cell = self.lattice.kernel.weights(self.lattice.place([x, y]), weights);
+            let [u, v] = [0, 1].map(|i| (cell[i] - self.first[i]) as usize);
+            from[l] = v * self.size[0] + u;
+        }
+        from
+    }
+}
+
+/// Where the cells that a tile sees are in planes.
+struct Seen {
+    size: [usize; 2],
+    phases: usize,
+    /// The rows that are there.
+    rows: Vec<Option<Range<usize>>>,
+    /// Of each phase the cells of a row that are there, and the first of these in the row of the tile.
+    runs: Vec<(usize, Range<usize>)>,
+}
+
+impl Seen {
+    fn of(cells: &Cells, first: [isize; 2], size: [usize; 2]) -> Self {
+        let (frame, phases) = (&cells.frame, cells.frame.phases);
+        let run = |phase: usize| {
+            let (u, run) = frame.first_in_row(first[0] + phase as isize, size[0].saturating_sub(phase));
+            (phase + u, run)
+        };
+        let rows = (first[1]..).take(size[1]).map(|v| frame.row(v)).collect();
+        Self { size, phases, rows, runs: (0..phases).map(run).collect() }
+    }
+
+    /// Whether a plane has any sum here.
+    fn any(&self, plane: &[f64]) -> bool {
+        let rows = self.rows.iter().flatten().map(|row| &plane[row.clone()]);
+        rows.flat_map(|row| self.runs.iter().map(|(_, run)| &row[run.clone()])).any(any)
+    }
+
+    /// Some planes side by side, cell by cell, with zeros up to so many.
+    fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Vec<f64> {
+        let mut bundle = vec![0.0; self.size[0] * self.size[1] * together];
+        for (to, row) in bundle.chunks_exact_mut(self.size[0] * together).zip(&self.rows) {
+            let Some(row) = row else { continue };
+            for (n, (_, plane)) in planes.iter().enumerate() {
+                for (u, run) in self.runs.iter().filter(|(_, run)| !run.is_empty()) {
+                    let to = to[u * together + n..].iter_mut().step_by(self.phases * together);
+                    to.zip(&plane[row.clone()][run.clone()]).for_each(|(to, from)| *to = *from);
+                }
+            }
+        }
+        bundle
+    }
+}
+
+/// Whether any number is not zero.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn any(numbers: &[f64]) -> bool {
+    numbers.iter().fold(0, |bits, n| bits | (n.to_bits() << 1)) != 0 // of either zero none is left
+}
+
+/// The weighted sums of the cells that a pixel sees, the first one being cell `first` of rows of `width`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn sum_cells(weights: &Weights, cells: &[f64], (first, width): (usize, usize), sums: &mut [f64]) {
+    match sums.len() {
+        1 => sums.copy_from_slice(&sum_planes::<1>(weights, cells, (first, width))),
+        2 => sums.copy_from_slice(&sum_planes::<2>(weights, cells, (first, width))),
+        4 => sums.copy_from_slice(&sum_planes::<4>(weights, cells, (first, width))),
+        8 => sums.copy_from_slice(&sum_planes::<8>(weights, cells, (first, width))),
+        _ => sums.copy_from_slice(&sum_planes::<TOGETHER>(weights, cells, (first, width))),
+    }
+}
+
+/// Of `N` planes side by side.
+#[inline(always)]
+fn sum_planes<const N: usize>(weights: &Weights, cells: &[f64], (first, width): (usize, usize)) -> [f64; N] {
+    let mut sums = [0.0; N];
+    let cells = cells.as_chunks::<N>().0;
+    for (n, start, weights) in weights.rows() {
+        let row = &cells[first + n * width + start..][..weights.len()];
+        for (weight, cell) in weights.iter().zip(row) {
+            for (sum, value) in sums.iter_mut().zip(cell) {
+                *sum += weight * value;
+            }
+        }
+    }
+    sums
+}
+
+/// Of one plane: neighbouring cells are taken together.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn sum_plane(weights: &Weights, cells: &[f64], (first, width): (usize, usize)) -> f64 {
+    let mut sums = [0.0; LANES];
+    for (n, start, weights) in weights.rows() {
+        let row = &cells[first + n * width + start..][..weights.len()];
+        for (weights, row) in weights.chunks(LANES).zip(row.chunks(LANES)) {
+            for (sum, (weight, value)) in sums.iter_mut().zip(weights.iter().zip(row)) {
+                *sum += weight * value;
+            }
+        }
+    }
+    sums.iter().sum()
+}

@@ -1,0 +1,291 @@
+//! The amounts of a block's voxels to the cells around them.
+//!
+//! All voxels of a slice across the principal axis are spread by the same weights, so that a row of them is convolved with
+//! the weights along u, once for each phase, and rows of cells are sums of such rows times the weights along v.
+
+use super::Spreading;
+use super::cells::{Aligned, CellPlane, Frame, LINE};
+use super::spline::{MOST_DEGREE, Spread, spread};
+use crate::codec::real::Real;
+use crate::render::amounts::Amounts;
+use crate::volume::Region;
+use multiversion::multiversion;
+use std::ops::Range;
+
+/// Where the voxels of a block are in cells: the same for all planes.
+#[derive(Debug)]
+pub(in crate::render) struct Placed {
+    spreading: Spreading,
+    /// The block, and what of it counts.
+    region: Region,
+    clip: Region,
+    slices: Vec<Slice>,
+    /// The cells that they reach.
+    frame: Frame,
+    /// Voxels that count along b, c and a; the first of them, and from one to the next, in an array of all.
+    count: [usize; 3],
+    first: usize,
+    steps: [usize; 3],
+    /// exp(-tau z) from the first voxel along b and c.
+    fading: [Vec<f64>; 2],
+}
+
+/// A slice of a block across the principal axis.
+#[derive(Debug)]
+struct Slice {
+    /// The first cell that its first voxel reaches.
+    cell: [isize; 2],
+    along: Spread,
+    /// Times exp(-tau z) of its first voxel.
+    across: Spread,
+}
+
+/// Room for a slice that is being spread.
+#[derive(Debug, Default)]
+pub(in crate::render) struct Work {
+    /// Rows of voxels times their fading, with zeros on both sides.
+    faded: Vec<f64>,
+    /// The block's own cells.
+    sums: Aligned,
+    /// Zeros before a faded row, and all numbers of one.
+    before: usize,
+    width: usize,
+    /// Cache lines that a row reaches, of each phase.
+    lines: usize,
+}
+
+impl Placed {
+    /// Of the block at `region`, of which the voxels in `clip` count.
+    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region) -> Self {
+        let (clip, shear) = (region.intersect(clip), &spreading.shear);
+        let (dims, block) = (clip.dims(), region.dims());
+        let stride = |axis: usize| block[..axis].iter().product::<usize>();
+        let count = shear.axes.map(|axis| dims[axis]);
+        let fading = [0, 1].map(|i| {
+            let depth = spreading.tau * shear.depths[i];
+            (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
+        });
+        let slices: Vec<Slice> = (0..count[2]).map(|k| Slice::new(clip.start, spreading, k)).collect();
+        Self {
+            spreading: *spreading,
+            frame: frame_of(&slices, spreading, [count[0], count[1]]),
+            slices,
+            count,
+            first: region.index(clip.start),
+            steps: shear.axes.map(stride),
+            fading,
+            region: *region,
+            clip,
+        }
+    }
+
+    /// Adds amounts to a plane.
+    pub(in crate::render) fn add(&self, amounts: Amounts<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
+        *plane.touched |= !matches!(amounts, Amounts::Nothing);
+        match amounts {
+            Amounts::Nothing => {}
+            Amounts::Single(amounts) => self.add_all(amounts, plane, work),
+            Amounts::Double(amounts) => self.add_all(amounts, plane, work),
+            Amounts::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane)),
+        }
+    }
+
+    /// By way of the block's own cells, which stay in the second cache.
+    fn add_all<R: Real>(&self, amounts: &[R], plane: &mut CellPlane<'_>, work: &mut Work) {
+        if work.sums.len() < self.frame.area() {
+            work.sums = Aligned::of(self.frame.area());
+        }
+        let mut sums = std::mem::take(&mut work.sums);
+        let own = &mut sums[..self.frame.area()];
+        own.fill(0.0);
+        add_block(self, amounts, own, work);
+        plane.add(&self.frame, own);
+        work.sums = sums;
+    }
+
+    fn add_one(&self, voxel: u32, amount: f64, plane: &mut CellPlane<'_>) {
+        let Spreading { shear, degree, tau } = &self.spreading;
+        let voxel = self.region.voxel(voxel as usize);
+        if !(0..3).all(|a| (self.clip.start[a]..self.clip.end[a]).contains(&voxel[a])) {
+            return;
+        }
+        let amount = amount * libm::exp(-tau * shear.depth(voxel));
+        let [(u, along), (v, across)] = shear.place(voxel).map(|place| spread(*degree, place));
+        for (v, across) in (v..).zip(&across[..=*degree]) {
+            let Some(row) = plane.frame.row(v) else { continue };
+            for (u, along) in (u..).zip(&along[..=*degree]) {
+                if let Some(at) = plane.frame.in_row(u) {
+                    plane.sums[row.start + at] += amount * across * along;
+                }
+            }
+        }
+    }
+}
+
+impl Slice {
+    /// Of the `k`-th slice of voxels from `start` on.
+    fn new(start: [usize; 3], spreading: &Spreading, k: usize) -> Self {
+        let mut voxel = start;
+        voxel[spreading.shear.axes[2]] += k;
+        let [u, v] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
+        let fading = libm::exp(-spreading.tau * spreading.shear.depth(voxel));
+        Self { cell: [u.0, v.0], along: u.1, across: v.1.map(|w| w * fading) }
+    }
+}
+
+/// The cells that slices of so many voxels along b and c reach.
+fn frame_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Frame {
+    let q = spreading.shear.fineness;
+    let range = |i: usize| {
+        let cells = || slices.iter().map(|s| s.cell[i]);
+        let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
+        // Of rows with fewer taps than others some zeros are added, too.
+        (low, (high - low) as usize + q * count[i].saturating_sub(1) + spreading.degree.max(MOST_DEGREE) + 1 + q)
+    };
+    let (u, v) = (range(0), range(1));
+    Frame::holding([u.0, v.0], [u.1, v.1], q)
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_block<R: Real>(placed: &Placed, amounts: &[R], sums: &mut [f64], work: &mut Work) {
+    let Spreading { shear, degree, .. } = &placed.spreading;
+    match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
+        (1, ..=4) => add_slices::<R, 1, 4>(placed, amounts, sums, work),
+        (1, _) => add_slices::<R, 1, 8>(placed, amounts, sums, work),
+        (2, ..=2) => add_slices::<R, 2, 2>(placed, amounts, sums, work),
+        (2, 3) => add_slices::<R, 2, 3>(placed, amounts, sums, work),
+        (2, _) => add_slices::<R, 2, 4>(placed, amounts, sums, work),
+        (3, _) => add_slices::<R, 3, 3>(placed, amounts, sums, work),
+        (_, _) => add_slices::<R, 4, 2>(placed, amounts, sums, work),
+    }
+}
+
+/// `Q` cells per voxel, of which along an axis a cell sees at most `TAPS` voxels.
+#[inline(always)]
+fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
+    placed: &Placed,
+    amounts: &[R],
+    sums: &mut [f64],
+    work: &mut Work,
+) {
+    work.clear(placed, TAPS);
+    for first in (0..placed.count[1]).step_by(ROWS) {
+        let rows = first..placed.count[1].min(first + ROWS);
+        for (k, slice) in placed.slices.iter().enumerate() {
+            let amounts = &amounts[placed.first + k * placed.steps[2]..];
+            if fade_rows(placed, amounts, &rows, work) {
+                add_rows::<Q, TAPS>((slice, &placed.frame), &rows, work, sums);
+            }
+        }
+    }
+}
+
+/// Voxels across rows that are taken through all slices together: what they reach stays in the first cache.
+const ROWS: usize = 32;
+
+impl Work {
+    fn clear(&mut self, placed: &Placed, taps: usize) {
+        self.before = LINE - 1 + taps - 1;
+        self.lines = (self.before + placed.count[0]).div_ceil(LINE);
+        self.width = self.before + self.lines * LINE;
+        // Rows of zeros take the place of those behind the last one.
+        let rows = ROWS.min(placed.count[1]) + taps - 1;
+        self.faded.clear();
+        self.faded.resize(rows * self.width, 0.0);
+    }
+}
+
+/// Some rows of a slice times their fading; whether any is not zero.
+#[inline(always)]
+fn fade_rows<R: Real>(placed: &Placed, amounts: &[R], rows: &Range<usize>, work: &mut Work) -> bool {
+    let ([width, ..], [along, across, _]) = (placed.count, placed.steps);
+    let mut live = false;
+    let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
+    for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
+        let (scale, row) = (placed.fading[1][c], &mut row[work.before..][..width]);
+        live |= fade(&amounts[c * across..], along, (scale, &placed.fading[0]), row);
+    }
+    behind.fill(0.0);
+    live
+}
+
+/// Every `step`-th amount times its fading, into a row; whether any is not zero.
+#[inline(always)]
+fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) -> bool {
+    if step == 1 {
+        for ((row, amount), fading) in row.iter_mut().zip(amounts).zip(fading) {
+            *row = amount.to_f64() * (scale * fading);
+        }
+    } else {
+        for ((row, amount), fading) in row.iter_mut().zip(amounts.iter().step_by(step)).zip(fading) {
+            *row = amount.to_f64() * (scale * fading);
+        }
+    }
+    row.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)) != 0 // of either zero none is left
+}
+
+/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c, what is
+/// spread along u stays in registers for all rows of cells that it reaches.
+#[inline(always)]
+fn add_rows<const Q: usize, const TAPS: usize>(
+    (slice, frame): (&Slice, &Frame),
+    rows: &Range<usize>,
+    work: &Work,
+    sums: &mut [f64],
+) {
+    let across = by_phase::<Q, TAPS>(&slice.across);
+    let top = (slice.cell[1] - frame.first[1]) as usize + rows.start * Q;
+    for (phase, along) in by_phase::<Q, TAPS>(&slice.along).into_iter().enumerate() {
+        let run = frame.run_of(slice.cell[0] + phase as isize, work.lines);
+        for (n, column) in run.here.zip((run.start..).step_by(LINE)) {
+            let from = n * LINE + work.before - run.inside + 1 - TAPS;
+            let faded = work.faded[from..].chunks(work.width).take(rows.len() + TAPS - 1);
+            let mut sums = sums[top * frame.size[0] + column..].chunks_mut(frame.size[0]);
+            let mut window = [[0.0; LINE]; TAPS];
+            for row in faded {
+                for m in (1..TAPS).rev() {
+                    window[m] = window[m - 1];
+                }
+                window[0] = convolved(row, &along);
+                for (across, sums) in across.iter().zip(sums.by_ref()) {
+                    add_weighted(&window, across, sums);
+                }
+            }
+        }
+    }
+}
+
+/// The weights that fall on the cells of each phase: of the voxel there, of the one before, ...
+#[inline(always)]
+fn by_phase<const Q: usize, const TAPS: usize>(weights: &Spread) -> [[f64; TAPS]; Q] {
+    let mut of_phases = [[0.0; TAPS]; Q];
+    for (phase, taps) in of_phases.iter_mut().enumerate() {
+        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = *weight);
+    }
+    of_phases
+}
+
+/// out_j = sum over m of w_m row_(j + TAPS - 1 - m)
+#[inline(always)]
+fn convolved<const TAPS: usize>(row: &[f64], weights: &[f64; TAPS]) -> [f64; LINE] {
+    let row = &row[..LINE + TAPS - 1];
+    let mut out = [0.0; LINE];
+    for m in 0..TAPS {
+        for l in 0..LINE {
+            out[l] += weights[m] * row[TAPS - 1 - m + l];
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn add_weighted<const TAPS: usize>(rows: &[[f64; LINE]; TAPS], weights: &[f64; TAPS], sums: &mut [f64]) {
+    let sums = &mut sums[..LINE];
+    let mut more = [0.0; LINE];
+    for m in 0..TAPS {
+        for l in 0..LINE {
+            more[l] += weights[m] * rows[m][l];
+        }
+    }
+    (0..LINE).for_each(|l| sums[l] += more[l]);
+}

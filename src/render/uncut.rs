@@ -1,0 +1,101 @@
+//! The sum of all weights at one place of the picture, by uncut footprints: what background is judged by, whatever splats.
+
+use super::eye::Eye;
+use super::lattice::Shear;
+use crate::footprint::Footprint;
+use std::ops::Range;
+
+/// The sums of weights of a view at single pixels.
+pub(super) struct Uncut<'a> {
+    eye: &'a Eye,
+    footprint: &'a Footprint,
+    shear: Shear,
+}
+
+impl<'a> Uncut<'a> {
+    /// By a footprint that stands in for an uncut one.
+    pub(super) fn new(eye: &'a Eye, footprint: &'a Footprint) -> Self {
+        Self { eye, footprint, shear: Shear::new(&eye.camera, &eye.grid, 1) }
+    }
+
+    /// The sum at a pixel's centre: slice by slice, row by row, over the voxels that are near enough.
+    pub(super) fn at(&self, [x, y]: [usize; 2]) -> f64 {
+        let [b, c, a] = self.shear.axes;
+        let clip = &self.eye.clip;
+        let place = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
+        let [_, v] = self.shear.cells(place);
+        let half = self.half(1);
+        let mut sum = 0.0;
+        for k in clip.start[a]..clip.end[a] {
+            let centre = v - self.shear.slopes[1] * k as f64;
+            for i in around(centre, half, clip.start[c]..clip.end[c]) {
+                let mut voxel = [0; 3];
+                (voxel[a], voxel[c]) = (k, i);
+                sum += self.row(voxel, clip.start[b]..clip.end[b], place);
+            }
+        }
+        sum
+    }
+
+    /// No place of the plane has a larger sum.
+    ///
+    /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one another,
+    /// footprints included, each a step deeper than the last, and what a footprint reaches is not much nearer.
+    pub(super) fn most(&self) -> f64 {
+        let Shear { axes, slopes, depths, .. } = &self.shear;
+        let (tau, dims) = (self.eye.tau, self.eye.clip.dims());
+        let reach = |i: usize| self.half(i);
+        let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * reach(i)) / slopes[i].abs() + 1.0;
+        let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
+        let deeper = (depths[2] - slopes[0] * depths[0] - slopes[1] * depths[1]).abs();
+        let nearer: f64 = [0, 1].map(|i| reach(i) * depths[i].abs()).iter().sum();
+        let nearest = self.eye.camera.nearest_of(&self.eye.grid.crop(&self.eye.clip));
+        let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - nearer).max(0.0))).sum();
+        along * self.slice() * self.footprint.at_depth(nearest)
+    }
+
+    /// The sum of weights of a slice without end at the place of one of its voxels, in units of that one's.
+    fn slice(&self) -> f64 {
+        let rows = self.half(1).ceil() as isize;
+        let [b, c] = self.shear.pixels;
+        let most = self.half(0).ceil() as isize;
+        let weight = |i: isize, j: isize| {
+            let [x, y] = [0, 1].map(|n| i as f64 * b[n] + j as f64 * c[n]);
+            self.footprint.share([x, y])
+        };
+        (-rows..=rows).flat_map(|j| (-most..=most).map(move |i| weight(i, j))).sum()
+    }
+
+    /// Voxels along b (0) or c (1) that a footprint reaches to one side.
+    fn half(&self, i: usize) -> f64 {
+        let reach = self.footprint.reach;
+        let corners = [[reach, reach], [reach, -reach]].map(|off| self.shear.cells(off)[i].abs());
+        corners[0].max(corners[1])
+    }
+
+    /// The sum over the voxels of a row along b, of which `voxel` would be the first one.
+    fn row(&self, mut voxel: [usize; 3], all: Range<usize>, place: [f64; 2]) -> f64 {
+        let ([bx, by], reach) = (self.shear.pixels[0], self.footprint.reach);
+        let squared = bx * bx + by * by;
+        let off = self.off(voxel, place);
+        let centre = -(off[0] * bx + off[1] * by) / squared;
+        let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
+        voxel[self.shear.axes[0]] = near.start;
+        let (off, z) = (self.off(voxel, place), self.shear.depth(voxel));
+        self.footprint.sum_of_row(off, z, ([bx, by], self.shear.depths[0]), near.len())
+    }
+
+    /// Pixels from a place to a voxel.
+    fn off(&self, voxel: [usize; 3], place: [f64; 2]) -> [f64; 2] {
+        let [u, v] = self.shear.place(voxel);
+        let [b, c] = self.shear.pixels;
+        [0, 1].map(|i| u * b[i] + v * c[i] - place[i])
+    }
+}
+
+/// The whole numbers of a range that are not further from a place than `half`.
+fn around(centre: f64, half: f64, all: Range<usize>) -> Range<usize> {
+    let end = (centre + half + 1.0).floor().clamp(0.0, all.end as f64) as usize;
+    let start = (centre - half).ceil().clamp(all.start as f64, all.end as f64) as usize;
+    start.min(end)..end
+}
