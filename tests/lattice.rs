@@ -6,7 +6,7 @@ use crate::images::under_less_memory;
 use crate::reference::splat::Images;
 use wavesplat::camera::View;
 use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, Scene, What};
+use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, Scene, What};
 use wavesplat::sample::SampleType;
 use wavesplat::volume::{Grid, Region};
 use wavesplat::wavelet::Basis;
@@ -147,4 +147,53 @@ fn memory_changes_no_bit_of_a_lattice() {
     let mut frames = direct(&memory, None);
     assert_eq!(pictures(&mut frames, &config).1.method, "lattice");
     assert!(under_less_memory(&mut frames, &config) > 2);
+}
+
+#[test]
+fn what_is_too_deep_to_be_seen_is_left_out_within_the_stated_error() {
+    let grid = Grid::unit([20, 130, 21]);
+    let samples = field(&grid, FRAMES, 11);
+    let mut memory = archive(grid, SampleType::F64, &samples);
+    let stored = stored(&mut memory, &configs()[2]);
+    let largest = (1.01 * largest(&samples), 1.02 * span(&samples));
+    let mut dimmed = Vec::new();
+    for (n, (tau, scale)) in [(0.0, 1.5), (0.1, 1.5), (0.3, 1.5), (1.0, 0.7)].into_iter().enumerate() {
+        let view = View { scale: Some(scale), ..view(0.0, 20.0 * (n % 2) as f64, [50, 45]) };
+        for quantity in [Quantity::Emission, Quantity::Mean] {
+            let exact = looking(view, tau, quantity, &grid, FRAMES);
+            let quick = RenderConfig { splat_error: 5e-3, ..exact.clone() };
+            let seen = truth(&grid, &exact, scale, &vec![0.0; grid.whole().voxels()], None);
+            let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+            keeps_its_error(&mut scene, [&exact, &quick], (largest, &seen), &format!("tau {tau}, {quantity:?}"));
+            let (all, some) = (pictures(&mut scene, &exact).1, pictures(&mut scene, &quick).1);
+            assert!((tau == 0.0) == (some.blocks_dimmed == 0) && all.blocks_dimmed == 0, "{tau}");
+            assert!(some.blocks_dimmed == 0 || some.bytes_read < all.bytes_read);
+            assert!(some.stated_splat_error <= 5e-3);
+            dimmed.push(some.blocks_dimmed);
+        }
+    }
+    assert!(dimmed.is_sorted() && dimmed[2] < dimmed[4], "{dimmed:?}");
+}
+
+#[test]
+fn parts_of_other_frames_are_counted_and_not_read() {
+    // Nothing predicts in space; along time, what is between two frames.
+    let grid = Grid::unit([32, 33, 34]);
+    let (places, noise) = (field(&grid, 1, 5), field(&grid, 16, 6));
+    let value = |i: usize| {
+        let (frame, voxel) = (i / places.len(), i % places.len());
+        places[voxel] * (voxel * 7919 % 101) as f64 * (1.0 + 0.02 * frame as f64) + 1e-3 * noise[i]
+    };
+    let mut memory = archive(grid, SampleType::F64, &Vec::from_iter((0..noise.len()).map(value)));
+    let stored = stored(&mut memory, &settings(Basis::Samples, 16, 1e-4));
+    let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+    let all = looking(view(30.0, 30.0, [30, 30]), 0.0, Quantity::Mean, &grid, 16);
+    let whole = pictures(&mut scene, &all).1;
+    assert_eq!(whole.other_frames, LeftOut::default());
+    let [even, odd] = [8, 9].map(|frame| pictures(&mut scene, &RenderConfig { frames: vec![frame], ..all.clone() }).1);
+    for part in [&even, &odd] {
+        assert_eq!(part.bytes_read + part.other_frames.bytes, whole.bytes_read);
+        assert_eq!(part.coefficients + part.other_frames.coefficients, whole.coefficients);
+    }
+    assert!(even.other_frames.bytes > 0 && odd.other_frames == LeftOut::default(), "{:?}", even.other_frames);
 }

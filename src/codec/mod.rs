@@ -91,7 +91,7 @@ impl WindowCodec {
     }
 
     /// Whether a level part says anything about the coefficients that `wanted` marks.
-    fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
+    pub(crate) fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
         match &self.scheme.pyramid {
             None => wanted[self.levels[part].clone()].contains(&true),
             // Along time, the last pass adds the odd frames alone.

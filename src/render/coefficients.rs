@@ -2,8 +2,8 @@
 
 use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
-use super::reading::{Allowance, Cheapest, Kept, Place, Rule};
-use super::scene::{Contents, FrameBounds, Group, Inverse, SampleErrors, Scene};
+use super::reading::{Allowance, Cheapest, Kept, Place, Rule, left_out};
+use super::scene::{Contents, FrameBounds, Group, Inverse, LeftOut, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use super::{Limit, RenderConfig};
 use crate::codec::WindowCodec;
@@ -16,7 +16,7 @@ use crate::sample::{SampleType, magnitude};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, Window};
+use wavesplat_format::{BlockEntry, PartEntry, PartKind, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -206,6 +206,16 @@ impl<'a> CoefficientGroup<'a> {
         Place { entry, voxels: region.voxels(), seen: self.expectation.of_block(&region) }
     }
 
+    /// The parts that say nothing of the group's frames.
+    fn of_other_frames(&self, entry: &BlockEntry) -> LeftOut {
+        let needs = |part: &PartEntry| match part.kind {
+            PartKind::Level(level) => self.codec.needs_part(level.into(), &self.wanted),
+            _ => true,
+        };
+        let parts = entry.parts.iter().filter(|part| needs(part)).copied().collect();
+        left_out(entry, &BlockEntry { parts, ..entry.clone() })
+    }
+
     /// Whether a block adds nothing to any plane.
     fn adds_nothing(&self, kept: &Kept) -> bool {
         kept.entry.parts.is_empty() && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
@@ -290,6 +300,7 @@ impl Group for CoefficientGroup<'_> {
             for entry in entries? {
                 let kept = self.keep(&entry);
                 found.left_out += kept.left_out;
+                found.other_frames += self.of_other_frames(&kept.entry);
                 found.certified = found.certified.max(kept.certified);
                 found.expected += kept.expected;
                 found.empty -= u64::from(!entry.parts.is_empty());

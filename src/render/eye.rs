@@ -3,11 +3,12 @@
 use super::lattice::Lattice;
 use super::scene::Scene;
 use super::splat::{overlap, rows_reached};
+use super::uncut::Uncut;
 use super::weights::BACKGROUND;
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::footprint::{Footprint, Method};
+use crate::footprint::{Footprint, Kernel, Method};
 use crate::volume::{BlockGrid, Grid, Region};
 use std::ops::Range;
 
@@ -28,6 +29,10 @@ pub(super) struct Eye {
     pub(super) lattice: Option<Lattice>,
     /// As what that is reported.
     pub(super) method: Method,
+    /// The error of the method, and of voxels left out for their depth.
+    pub(super) stated_error: f64,
+    /// Voxels further away may be left out.
+    pub(super) deepest: f64,
 }
 
 impl Eye {
@@ -55,24 +60,39 @@ impl Eye {
             })
             .flatten();
         let method = lattice.as_ref().map_or(method, |(_, method)| *method);
-        Ok(Self {
-            camera,
-            footprint,
-            tau: config.kernel.tau,
-            grid,
-            blocks,
-            clip,
-            lattice: lattice.map(|l| l.0),
-            method,
-        })
+        let (tau, stated_error) = (config.kernel.tau, method.stated_error);
+        let (lattice, deepest) = (lattice.map(|l| l.0), f64::INFINITY);
+        let eye = Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest };
+        let left = most_splat_error(config.quantity, config.splat_error) - stated_error;
+        if config.certify || tau == 0.0 || left <= 0.0 { Ok(eye) } else { eye.without_what_is_dim(config.kernel, left) }
     }
 
     pub(super) fn pixels(&self) -> usize {
         self.camera.size[0] * self.camera.size[1]
     }
 
-    /// Whether any voxel of a block can reach these rows of the picture.
+    /// Leaves out what is so deep that it adds at most such a share of the largest sum of weights.
+    fn without_what_is_dim(mut self, kernel: Kernel, share: f64) -> Result<Self> {
+        let exact = Footprint::new(kernel, &self.grid, self.camera.scale, Method::EXACT)?;
+        let deepest = Uncut::new(&self, &exact).deepest(share);
+        if deepest < self.camera.depth(&self.grid) {
+            (self.deepest, self.stated_error) = (deepest, self.stated_error + share);
+        }
+        Ok(self)
+    }
+
+    /// Whether a block is so deep that it may be left out.
+    pub(super) fn dims(&self, block: usize) -> bool {
+        self.camera.nearest_of(&self.grid.crop(&self.blocks.region(block))) > self.deepest
+    }
+
+    /// Whether a block is to be splatted into these rows of the picture.
     pub(super) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
+        self.reaches(block, rows) && !self.dims(block)
+    }
+
+    /// Whether any voxel of a block can reach these rows of the picture.
+    pub(super) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
         if let Some(lattice) = &self.lattice {
             return overlap(&lattice.rows_reached(&self.blocks.region(block), self.camera.size), rows);
         }

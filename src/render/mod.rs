@@ -121,8 +121,12 @@ pub struct RenderReport {
     pub blocks_empty: u64,
     /// Blocks left out because no pixel sees them.
     pub blocks_outside: u64,
+    /// Blocks left out because they lie so deep that what they add is within the splat error.
+    pub blocks_dimmed: u64,
     /// What a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
+    /// What of these blocks was not read because it is of frames that were not asked for.
+    pub other_frames: LeftOut,
     /// No sample that was splatted is further from the source's.
     pub certified_sample_error: f64,
     /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
@@ -175,7 +179,7 @@ pub fn render(
     let budget = Budget::new(config, scene, eye.lattice.as_ref())?;
     progress.start(Some(config.frames.len() as u64));
     let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = method.stated_error;
+    report.stated_splat_error = eye.stated_error;
     let mut clock = Instant::now();
     let weights = Weights::new(&eye, config, &budget)?;
     let expectation = Expectation::new(&eye, config.quantity, &weights);
@@ -284,13 +288,17 @@ fn render_group(
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
 fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Vec<usize>> {
-    let Contents { mut blocks, empty, left_out, certified, expected } = group.blocks(&eye.clip)?;
+    let Contents { mut blocks, empty, left_out, other_frames, certified, expected } = group.blocks(&eye.clip)?;
     let held = blocks.len();
-    blocks.retain(|b| eye.sees(*b, &(0..eye.camera.size[1])));
+    blocks.retain(|b| eye.reaches(*b, &(0..eye.camera.size[1])));
+    let reached = blocks.len();
+    blocks.retain(|b| !eye.dims(*b));
     report.blocks += eye.blocks.len() as u64;
     report.blocks_empty += empty;
-    report.blocks_outside += (held - blocks.len()) as u64;
+    report.blocks_outside += (held - reached) as u64;
+    report.blocks_dimmed += (reached - blocks.len()) as u64;
     report.left_out += left_out;
+    report.other_frames += other_frames;
     report.certified_sample_error = report.certified_sample_error.max(certified);
     // Frame by frame, so that it is the same however frames are grouped.
     (0..group.layout().frames).for_each(|_| report.expected_error += expected);

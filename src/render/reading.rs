@@ -290,7 +290,7 @@ fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
 }
 
 /// The difference between a whole entry and what is kept of it.
-fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
+pub(super) fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
     let parts = || entry.parts.iter().filter(|p| kept.part(p.kind).is_none());
     LeftOut {
         blocks: u64::from(kept.parts.is_empty() && !entry.parts.is_empty()),

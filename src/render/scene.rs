@@ -77,13 +77,15 @@ pub struct Contents {
     pub empty: u64,
     /// What a looser tolerance leaves out of all.
     pub left_out: LeftOut,
+    /// What is only of frames that are not asked for.
+    pub other_frames: LeftOut,
     /// No sample of them is further off.
     pub certified: f64,
     /// What the errors of their samples are expected to come to in the mean square over pixels.
     pub expected: f64,
 }
 
-/// What a looser tolerance leaves out.
+/// What need not be read of blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
     /// Blocks of which nothing is read.

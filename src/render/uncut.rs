@@ -42,16 +42,41 @@ impl<'a> Uncut<'a> {
     /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one another,
     /// footprints included, each a step deeper than the last, and what a footprint reaches is not much nearer.
     pub(super) fn most(&self) -> f64 {
-        let Shear { axes, slopes, depths, .. } = &self.shear;
+        let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.eye.tau, self.eye.clip.dims());
-        let reach = |i: usize| self.half(i);
-        let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * reach(i)) / slopes[i].abs() + 1.0;
+        let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
         let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
-        let deeper = (depths[2] - slopes[0] * depths[0] - slopes[1] * depths[1]).abs();
-        let nearer: f64 = [0, 1].map(|i| reach(i) * depths[i].abs()).iter().sum();
-        let nearest = self.eye.camera.nearest_of(&self.eye.grid.crop(&self.eye.clip));
+        let (deeper, nearer) = (self.deeper(), self.nearer());
         let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - nearer).max(0.0))).sum();
-        along * self.slice() * self.footprint.at_depth(nearest)
+        along * self.slice() * self.footprint.at_depth(self.nearest())
+    }
+
+    /// A depth behind which voxels add at most such a share of the nearest voxel's own weight, and so of the largest sum
+    /// anywhere. With S the sum of a slice without end, r_n = r_0 + n d where a ray meets slice n, and voxels that a place sees
+    /// at most e nearer or further away than that, all voxels deeper than z add up to
+    ///
+    /// ```text
+    /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))
+    /// ```
+    pub(super) fn deepest(&self, share: f64) -> f64 {
+        let (tau, deeper, nearer) = (self.eye.tau, self.deeper(), self.nearer());
+        let slices = 2.0 * nearer / deeper + 1.0 - 1.0 / libm::expm1(-tau * deeper);
+        self.nearest() + libm::log(self.slice() * slices / share) / tau
+    }
+
+    /// What a ray goes deeper by from slice to slice.
+    fn deeper(&self) -> f64 {
+        let Shear { slopes, depths, .. } = &self.shear;
+        (depths[2] - slopes[0] * depths[0] - slopes[1] * depths[1]).abs()
+    }
+
+    /// What a voxel that a place sees can be nearer than the place where its slice meets the ray.
+    fn nearer(&self) -> f64 {
+        [0, 1].map(|i| self.half(i) * self.shear.depths[i].abs()).iter().sum()
+    }
+
+    fn nearest(&self) -> f64 {
+        self.eye.camera.nearest_of(&self.eye.grid.crop(&self.eye.clip))
     }
 
     /// The sum of weights of a slice without end at the place of one of its voxels, in units of that one's.

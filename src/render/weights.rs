@@ -63,7 +63,7 @@ impl Weights {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         let mut weights = Self { size: eye.camera.size, threshold: BACKGROUND * largest, sums, ..Self::default() };
         if config.quantity == Quantity::Mean && eye.method != Method::EXACT {
-            weights.judge(&Uncut::new(eye, &by(Method::EXACT)?), eye.method.stated_error);
+            weights.judge(&Uncut::new(eye, &by(Method::EXACT)?), eye.stated_error);
         }
         if config.certify {
             let whole = seen_by(by(certificate::WHOLE)?);
