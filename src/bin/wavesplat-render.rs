@@ -76,7 +76,7 @@ struct Cli {
     sigma: Option<f64>,
     /// What splatting may add to the error: of means as a share of the range, where a pixel's weights are the view's largest
     /// (elsewhere in inverse proportion); of emissions as one of the brightest that the largest sample could give; 0 asks for
-    /// the exact method [default: a tenth of --tolerance or the file's tolerance; 1e-3 for frames]
+    /// the exact method [default: half of --tolerance or the file's tolerance, at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
     /// Read and splat less, so that pictures may be this share of the range off (emissions, as samples that are): no less
@@ -250,7 +250,7 @@ impl Cli {
         let grid = scene.grid();
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
-        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(1e-3, |t| t / 10.0));
+        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(MOST_SPLAT_ERROR, |t| MOST_SPLAT_ERROR.min(t / 2.0)));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
             return Err(Error::usage("--splat-error: takes a number of 0 or more"));
         }
@@ -298,6 +298,8 @@ impl Cli {
     }
 }
 
+/// What splatting may add by default: at most this, and half of the tolerance.
+const MOST_SPLAT_ERROR: f64 = 1e-3;
 const NOT_ITS_OWN: &str = "--error-image: takes a file of its own";
 const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
 

@@ -1,7 +1,7 @@
 //! A band of a picture while blocks are splatted into it, by footprints or by way of a lattice, and its tiles once they are.
 
 use super::RenderReport;
-use super::amounts::BlockPlanes;
+use super::amounts::{BlockPlanes, Room};
 use super::eye::Eye;
 use super::lap;
 use super::lattice::{Cells, Gather, Lattice, Placed, Work};
@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::wavelet::Lane;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Where blocks come from.
@@ -64,7 +65,9 @@ impl<'a> Canvas<'a> {
                     let held = planes.held();
                     Ok(((lattice.placed(&region(block), clip), planes), held))
                 };
-                in_batches(blocks, batch, report, place, |blocks| add_planes(cells, blocks))
+                // Used again: memory fresh from the system costs as much as what it is for.
+                let spare = Mutex::default();
+                in_batches(blocks, batch, report, place, |blocks| add_planes(cells, blocks, &spare))
             }
             (Sums::Tiles(tiles), _) => {
                 let project = |block: usize| {
@@ -169,12 +172,14 @@ impl<T: Copy> Pixels<'_, T> {
 type BlockInCells<'a> = ((Placed, Box<dyn BlockPlanes + 'a>), [u64; 2]);
 
 /// Adds blocks to every plane of cells.
-fn add_planes(cells: &mut Cells, blocks: &[BlockInCells<'_>]) -> Result<()> {
-    cells.planes_mut().into_par_iter().enumerate().try_for_each_init(Default::default, |room, (plane, mut sums)| {
-        let (room, work): &mut (_, Work) = room;
+fn add_planes(cells: &mut Cells, blocks: &[BlockInCells<'_>], spare: &Mutex<Vec<(Room, Work)>>) -> Result<()> {
+    let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+    cells.planes_mut().into_par_iter().enumerate().try_for_each(|(plane, mut sums)| {
+        let (mut room, mut work) = spare().pop().unwrap_or_default();
         for ((placed, block), _) in blocks {
-            placed.add(block.plane(plane, room)?, &mut sums, work);
+            placed.add(block.plane(plane, &mut room)?, &mut sums, &mut work);
         }
+        spare().push((room, work));
         Ok(())
     })
 }

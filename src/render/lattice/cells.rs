@@ -10,9 +10,8 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
     pub(super) frame: Frame,
-    sums: Aligned,
-    /// Which planes something was added to.
-    touched: Vec<bool>,
+    /// Those that nothing was added to take no room.
+    planes: Vec<Option<Aligned>>,
 }
 
 /// Where the cells of a rectangle are.
@@ -52,7 +51,9 @@ pub(super) struct Aligned {
 
 impl Aligned {
     pub(super) fn of(len: usize) -> Self {
-        let numbers = vec![0.0; len + LINE - 1];
+        // Written now: memory that is read before it is written costs twice.
+        let mut numbers = Vec::with_capacity(len + LINE - 1);
+        numbers.resize(len + LINE - 1, 0.0);
         let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE - 1);
         Self { numbers, first, len }
     }
@@ -126,31 +127,38 @@ impl Frame {
 impl Cells {
     /// With all planes at zero.
     pub(super) fn new(frame: Frame, planes: usize) -> Self {
-        Self { frame, sums: Aligned::of(frame.area() * planes), touched: vec![false; planes] }
+        Self { frame, planes: (0..planes).map(|_| None).collect() }
     }
 
     /// The planes that something was added to, and their numbers.
     pub(super) fn touched(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        let planes = self.sums.chunks_exact(self.frame.area().max(1)).enumerate();
-        planes.zip(&self.touched).filter(|(_, touched)| **touched).map(|(plane, _)| plane)
+        let planes = self.planes.iter().enumerate();
+        planes.filter_map(|(number, sums)| sums.as_deref().map(|sums| (number, sums)))
     }
 
     /// All planes, where to add.
     pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
         let frame = self.frame;
-        let planes = self.sums.chunks_exact_mut(frame.area().max(1)).zip(&mut self.touched);
-        planes.map(|(sums, touched)| CellPlane { frame, sums, touched }).collect()
+        self.planes.iter_mut().map(|sums| CellPlane { frame, sums }).collect()
     }
 }
 
 impl CellPlane<'_> {
+    /// Its sums, at zero if nothing was added yet.
+    pub(super) fn sums(&mut self) -> &mut [f64] {
+        let area = self.frame.area();
+        self.sums.get_or_insert_with(|| Aligned::of(area))
+    }
+
     /// Adds the cells of another rectangle.
     pub(super) fn add(&mut self, frame: &Frame, sums: &[f64]) {
+        let own = self.frame;
+        let own_sums = self.sums();
         for (v, from) in (frame.first[1]..).zip(sums.chunks_exact(frame.size[0])) {
-            let Some(row) = self.frame.row(v) else { continue };
-            let to = &mut self.sums[row];
+            let Some(row) = own.row(v) else { continue };
+            let to = &mut own_sums[row];
             for (phase, from) in from.chunks_exact(frame.run).enumerate() {
-                let run = self.frame.run_of(frame.first[0] + phase as isize, frame.run / LINE);
+                let run = own.run_of(frame.first[0] + phase as isize, frame.run / LINE);
                 add_to(&mut to[run.start..][..run.here.len() * LINE], &from[run.here.start * LINE..]);
             }
         }
@@ -166,9 +174,7 @@ fn add_to(sums: &mut [f64], more: &[f64]) {
 #[derive(Debug)]
 pub(in crate::render) struct CellPlane<'a> {
     pub(super) frame: Frame,
-    pub(super) sums: &'a mut [f64],
-    /// Whether something was added.
-    pub(super) touched: &'a mut bool,
+    sums: &'a mut Option<Aligned>,
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::cells::Cells;
 use super::kernel::Weights;
 use super::picture::Lattice;
+use crate::codec::buffer::Buffer;
 use crate::render::splat::Place;
 use crate::wavelet::{LANES, Lane};
 use multiversion::multiversion;
@@ -19,7 +20,7 @@ pub(in crate::render) struct Gather<'a> {
     used: Vec<usize>,
     /// For every so many planes their sums side by side, cell by cell.
     together: usize,
-    bundles: Vec<Vec<f64>>,
+    bundles: Vec<Buffer<f64>>,
     /// Of [`LANES`] pixels.
     weights: Vec<Weights>,
 }
@@ -113,8 +114,9 @@ impl Seen {
     }
 
     /// Some planes side by side, cell by cell, with zeros up to so many.
-    fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Vec<f64> {
-        let mut bundle = vec![0.0; self.size[0] * self.size[1] * together];
+    fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Buffer<f64> {
+        let mut bundle = Buffer::of(self.size[0] * self.size[1] * together);
+        bundle.fill(0.0);
         for (to, row) in bundle.chunks_exact_mut(self.size[0] * together).zip(&self.rows) {
             let Some(row) = row else { continue };
             for (n, (_, plane)) in planes.iter().enumerate() {

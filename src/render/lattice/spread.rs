@@ -81,7 +81,6 @@ impl Placed {
 
     /// Adds amounts to a plane.
     pub(in crate::render) fn add(&self, amounts: Amounts<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
-        *plane.touched |= !matches!(amounts, Amounts::Nothing);
         match amounts {
             Amounts::Nothing => {}
             Amounts::Single(amounts) => self.add_all(amounts, plane, work),
@@ -115,7 +114,7 @@ impl Placed {
             let Some(row) = plane.frame.row(v) else { continue };
             for (u, along) in (u..).zip(&along[..=*degree]) {
                 if let Some(at) = plane.frame.in_row(u) {
-                    plane.sums[row.start + at] += amount * across * along;
+                    plane.sums()[row.start + at] += amount * across * along;
                 }
             }
         }
