@@ -250,7 +250,8 @@ impl Cli {
         let grid = scene.grid();
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
-        let splat_error = self.splat_error.unwrap_or(tolerance.map_or(MOST_SPLAT_ERROR, |t| MOST_SPLAT_ERROR.min(t / 2.0)));
+        let splat_error =
+            self.splat_error.unwrap_or(tolerance.map_or(MOST_SPLAT_ERROR, |t| MOST_SPLAT_ERROR.min(t / 2.0)));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
             return Err(Error::usage("--splat-error: takes a number of 0 or more"));
         }

@@ -84,10 +84,17 @@ impl Block {
         Field::decode(codec, self.size, self.step, &self.codes)
     }
 
-    /// What the codes give, where one k says nothing without the others.
-    pub fn field_of_all(&self, codec: &WindowCodec) -> Option<Field<'static>> {
-        let together = codec.scheme.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
-        together.then(|| Field::refined(codec, self.size, self.step, &self.codes))
+    /// What the codes of a pyramid give, where it is needed at once: if one k says nothing without the others, or if any
+    /// sample is overridden.
+    pub fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
+        let pyramid = codec.scheme.pyramid.as_ref()?;
+        let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
+        at_once.then(|| Field::refined(codec, self.size, self.step, &self.codes))
+    }
+
+    /// Whether any sample is not what the coefficients give.
+    pub fn overrides(&self) -> bool {
+        !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
     /// What the codes of one k give; `room` is for that.

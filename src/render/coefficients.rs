@@ -385,7 +385,7 @@ impl<'a> CodedBlock<'a> {
         let samples = (block.exact.is_some() || group.what == What::Samples).then(|| block.samples(codec));
         let mut new = Self { group, block, samples, field: None, coefficients: 0, few: Vec::new() };
         if new.samples.is_none() {
-            new.field = new.block.field_of_all(codec);
+            new.field = new.block.field_at_once(codec);
             new.add_overrides();
         }
         new
@@ -394,11 +394,13 @@ impl<'a> CodedBlock<'a> {
     fn add_overrides(&mut self) {
         let Self { group, block, .. } = self;
         self.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
-        if block.outliers.positions.is_empty() && block.missing.0.is_empty() {
+        if !block.overrides() {
             return;
         }
-        let of_codes = block.field(&group.codec);
-        let terms = group.terms_of_codes(block, self.field.as_ref().unwrap_or(&of_codes), &[], false);
+        let terms = match &self.field {
+            Some(field) => group.terms_of_codes(block, field, &[], false),
+            None => group.terms_of_codes(block, &block.field(&group.codec), &[], false),
+        };
         self.few.resize_with(group.layout.planes() - group.layout.coefficients, Vec::new);
         for voxel in 0..block.voxels {
             let (planes, amounts) = terms.of_voxel(voxel);

