@@ -35,7 +35,8 @@ pub struct Method {
     pub name: &'static str,
     /// Where the kernel is cut, in standard deviations.
     pub radius: f64,
-    /// What of the largest sum of weights, anywhere in the plane of the picture, may lie beyond the cut: 4 exp(-R^2 / 2).
+    /// What of the largest sum of weights, anywhere in the plane of the picture, sums may be off by. Of footprints it is what
+    /// may lie beyond the cut: 4 exp(-R^2 / 2).
     ///
     /// For what lies more than R to one side of a place weighs there at most exp(-R^2 / 2) times what it weighs at the
     /// place R further to that side, as (q + R)^2 >= q^2 + R^2 for q >= 0; and the cut has four sides.
@@ -104,7 +105,7 @@ impl Footprint {
     pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
-        if self.decay > NARROW {
+        if self.decay > NARROW || exponent(off, z) > DEEP {
             let at = |n: f64| libm::exp(-exponent([off[0] + n * step[0], off[1] + n * step[1]], z + n * deeper));
             return self.peak * (0..count).map(|n| at(n as f64)).sum::<f64>();
         }
@@ -179,6 +180,8 @@ const EXPONENTIALS: f64 = 2e-12;
 
 /// Up to this decay quotients of voxels that are both within reach are numbers.
 const NARROW: f64 = 30.0;
+/// From a weight that is smaller than the exponential of minus this none is multiplied up: others may be nearer.
+const DEEP: f64 = 600.0;
 
 /// Beyond this decay a weight may underflow where its quotient overflows. A span is then two pixels: each is computed.
 const STEEP: f64 = 100.0;
@@ -215,9 +218,14 @@ mod tests {
                 let (off, step) = ([-f.reach, 0.3 * f.reach], [step, -0.1 * step]);
                 let count = (2.5 * f.reach / step[0]).ceil() as usize;
                 let at = |n: usize| [0, 1].map(|i| off[i] + n as f64 * step[i]);
-                let expected: f64 = (0..count).map(|n| f.at_depth(3.0 + 0.5 * n as f64) * f.share(at(n))).sum();
-                let found = f.sum_of_row(off, 3.0, (step, 0.5), count);
-                assert!((found - expected).abs() <= 1e-9 * expected, "{scale} {step:?}: {found} for {expected}");
+                // The last ones begin where weights are no normal numbers, and come nearer.
+                for (z, deeper) in [(3.0, 0.5), (3.0, -0.5), (7e3, -0.5), (7.45e3, -50.0)] {
+                    let depth = |n: usize| z + deeper * n as f64;
+                    let expected: f64 = (0..count).map(|n| f.at_depth(depth(n)) * f.share(at(n))).sum();
+                    let found = f.sum_of_row(off, z, (step, deeper), count);
+                    let off = (found - expected).abs();
+                    assert!(off <= 1e-9 * expected + 1e-320, "{scale} {step:?} {z}: {found} for {expected}");
+                }
             }
         }
     }

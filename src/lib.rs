@@ -36,7 +36,7 @@
 //! consecutive frames; *block* a box of voxels over one window; *coefficient* c_{i,k} of voxel i and basis function k;
 //! *code* a quantised coefficient; *part* a piece of a block with its own zstd frame: a group of temporal *levels*,
 //! coarse to fine, or what overrides them (*outliers*, *missing* samples, an *exact* block); *plane* a sum of splats
-//! over pixels; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed,
+//! over pixels, or over the *cells* of the lattice that a view shears the volume's into; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed,
 //! *share* how much of its bound a sample or series uses, *reached* the largest error found.
 //! Triples are x, y, z; arrays have x fastest, then y, z, and time slowest.
 //!
@@ -49,15 +49,15 @@
 //! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
 //! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions
 //!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
-//!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/mod.rs`, `extract.rs` and
-//!    `verify.rs`.
+//!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/canvas.rs`,
+//!    `render/weights.rs`, `extract.rs` and `verify.rs`; `render/plan.rs` asks how many there are.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
 //!    only correctly rounded operations and `libm` are used.
 //! 7. Nothing is ever loaded whole: memory follows the budget and not the archive.
 //! 8. A transform is one replaceable part: [`wavelet::TimeBasis`] is all that the rest knows of it, and a
-//!    [`render::Scene`] turns blocks into terms and planes into frames, whatever they are made of.
+//!    [`render::Scene`] turns blocks into amounts of voxels and planes into frames, whatever they are made of.
 
 pub mod bound;
 pub mod camera;

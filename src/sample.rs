@@ -119,6 +119,18 @@ pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
     !value.is_finite() || Some(value) == declared
 }
 
+/// Whether any value is missing; all are looked at, as vector code does.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
+    let declared = declared.unwrap_or(f64::NAN); // equal to nothing
+    let mut any = false;
+    for v in values {
+        let v: f64 = (*v).into();
+        any |= !v.is_finite() | (v == declared);
+    }
+    any
+}
+
 /// A declared missing value as samples of type `ty` have it: 1e35 is another number as f32 than as f64.
 pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
     declared.map(|v| if ty.is_float() { round_to(ty, v) } else { v })

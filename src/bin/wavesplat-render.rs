@@ -15,7 +15,7 @@ use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render,
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
 use wavesplat_format::Metadata;
 
@@ -250,8 +250,7 @@ impl Cli {
         let grid = scene.grid();
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
-        let splat_error =
-            self.splat_error.unwrap_or(tolerance.map_or(MOST_SPLAT_ERROR, |t| MOST_SPLAT_ERROR.min(t / 2.0)));
+        let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
         if !(splat_error.is_finite() && splat_error >= 0.0) {
             return Err(Error::usage("--splat-error: takes a number of 0 or more"));
         }
@@ -299,8 +298,6 @@ impl Cli {
     }
 }
 
-/// What splatting may add by default: at most this, and half of the tolerance.
-const MOST_SPLAT_ERROR: f64 = 1e-3;
 const NOT_ITS_OWN: &str = "--error-image: takes a file of its own";
 const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
 

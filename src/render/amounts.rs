@@ -45,18 +45,37 @@ pub struct Room {
 }
 
 impl Room {
-    /// The amounts of samples that lie in `bytes`, each made another by `of`.
-    pub(super) fn amounts_of_samples(&mut self, ty: SampleType, of: impl Fn(f64) -> f64) -> Amounts<'_> {
+    /// The samples that lie in `bytes`, of which none is missing.
+    pub(super) fn samples(&mut self, ty: SampleType) -> Amounts<'_> {
         let count = self.bytes.len() / ty.size();
         if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
             // Singles do not hold them.
             self.double.resize(count, 0.0);
-            load_as(ty, &self.bytes, &mut self.double, of);
+            load_as(ty, &self.bytes, &mut self.double, |v| v);
             return Amounts::Double(&self.double);
         }
         self.single.resize(count, 0.0);
-        load_as(ty, &self.bytes, &mut self.single, |v| of(v) as f32);
+        load_as(ty, &self.bytes, &mut self.single, |v| v as f32);
         Amounts::Single(&self.single)
+    }
+
+    /// Those with zeros for what is missing; or, if `absent`, a 1 for that and zeros else.
+    pub(super) fn masked(
+        &mut self,
+        ty: SampleType,
+        absent: bool,
+        is_missing: impl Fn(usize, f64) -> bool,
+    ) -> Amounts<'_> {
+        self.double.resize(self.bytes.len() / ty.size(), 0.0);
+        load_as(ty, &self.bytes, &mut self.double, |v| v);
+        for (index, v) in self.double.iter_mut().enumerate() {
+            *v = match (is_missing(index, *v), absent) {
+                (missing, true) => f64::from(u8::from(missing)),
+                (true, false) => 0.0,
+                (false, false) => *v,
+            };
+        }
+        Amounts::Double(&self.double)
     }
 }
 

@@ -28,12 +28,12 @@ pub(super) struct Canvas<'a> {
     eye: &'a Eye,
     rows: Range<usize>,
     planes: usize,
-    sums: Sums,
+    sums: Sums<'a>,
 }
 
-enum Sums {
+enum Sums<'a> {
     Tiles(Vec<Tile>),
-    Cells(Cells),
+    Cells(&'a Lattice, Cells),
 }
 
 impl<'a> Canvas<'a> {
@@ -42,7 +42,7 @@ impl<'a> Canvas<'a> {
         let (width, planes) = (eye.camera.size[0], layout.planes());
         let tile = |place| Tile::new(place, planes, layout.order);
         let sums = match &eye.lattice {
-            Some(lattice) => Sums::Cells(lattice.cells_of(width, &rows, planes)),
+            Some(lattice) => Sums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
             None => Sums::Tiles(Place::cover(width, rows.clone(), TILE).into_iter().map(tile).collect()),
         };
         Self { eye, rows, planes, sums }
@@ -56,31 +56,9 @@ impl<'a> Canvas<'a> {
         source: &dyn Blocks,
         report: &mut RenderReport,
     ) -> Result<()> {
-        let Eye { grid, camera, footprint, clip, .. } = self.eye;
-        let region = |block: usize| self.eye.blocks.region(block);
-        match (&mut self.sums, &self.eye.lattice) {
-            (Sums::Cells(cells), Some(lattice)) => {
-                let place = |block: usize| {
-                    let planes = source.planes(block)?;
-                    let held = planes.held();
-                    Ok(((lattice.placed(&region(block), clip), planes), held))
-                };
-                // Used again: memory fresh from the system costs as much as what it is for.
-                let spare = Mutex::default();
-                in_batches(blocks, batch, report, place, |blocks| add_planes(cells, blocks, &spare))
-            }
-            (Sums::Tiles(tiles), _) => {
-                let project = |block: usize| {
-                    let terms = source.terms(block)?;
-                    let held = [terms.coefficients, terms.bytes_read];
-                    Ok((Splats::new(terms, &region(block), clip, grid, camera, footprint), held))
-                };
-                in_batches(blocks, batch, report, project, |splats| {
-                    tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, footprint)));
-                    Ok(())
-                })
-            }
-            (Sums::Cells(_), None) => Ok(()), // a band of cells is of a lattice
+        match &mut self.sums {
+            Sums::Tiles(tiles) => splat_into_tiles(self.eye, tiles, (blocks, batch), source, report),
+            Sums::Cells(lattice, cells) => splat_into_cells(self.eye, lattice, cells, (blocks, batch), source, report),
         }
     }
 
@@ -94,15 +72,11 @@ impl<'a> Canvas<'a> {
         places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
             let mut pixels = Pixels { planes, width, top: places[0].y.start };
             for (i, place) in places.iter().enumerate() {
-                let sums = match (&self.sums, &self.eye.lattice) {
-                    (Sums::Cells(cells), Some(lattice)) => Some(lattice.gather(cells, place)),
-                    _ => None,
+                let sums = match &self.sums {
+                    Sums::Tiles(tiles) => OfTile::Tile(&tiles[n * columns + i]),
+                    Sums::Cells(lattice, cells) => OfTile::Gather(lattice.gather(cells, place)),
                 };
-                let tile = match &self.sums {
-                    Sums::Tiles(tiles) => tiles.get(n * columns + i),
-                    Sums::Cells(_) => None,
-                };
-                finish(Finished { place, planes: self.planes, gather: sums, tile }, &mut pixels);
+                finish(Finished { place, planes: self.planes, sums }, &mut pixels);
             }
         });
     }
@@ -124,32 +98,37 @@ impl<'a> Canvas<'a> {
 pub(super) struct Finished<'a> {
     pub(super) place: &'a Place,
     planes: usize,
-    gather: Option<Gather<'a>>,
-    tile: Option<&'a Tile>,
+    sums: OfTile<'a>,
+}
+
+enum OfTile<'a> {
+    Tile(&'a Tile),
+    Gather(Gather<'a>),
 }
 
 impl Finished<'_> {
     /// The planes that may have sums.
     pub(super) fn used(&self) -> Vec<usize> {
-        self.gather.as_ref().map_or_else(|| (0..self.planes).collect(), |gather| gather.used().to_vec())
+        match &self.sums {
+            OfTile::Tile(_) => (0..self.planes).collect(),
+            OfTile::Gather(gather) => gather.used().to_vec(),
+        }
     }
 
     /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
     pub(super) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
-        match (&mut self.gather, self.tile) {
-            (Some(gather), _) => gather.load(first, count, planes),
-            (None, Some(tile)) => tile.load(first, count, planes),
-            (None, None) => {}
+        match &mut self.sums {
+            OfTile::Tile(tile) => tile.load(first, count, planes),
+            OfTile::Gather(gather) => gather.load(first, count, planes),
         }
     }
 
     /// The same where there is one plane only.
     pub(super) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut planes = [Lane::default()];
-        match (&mut self.gather, self.tile) {
-            (Some(gather), _) => planes[0] = gather.load_one(first, count),
-            (None, Some(tile)) => tile.load(first, count, &mut planes),
-            (None, None) => {}
+        match &mut self.sums {
+            OfTile::Tile(tile) => tile.load(first, count, &mut planes),
+            OfTile::Gather(gather) => planes[0] = gather.load_one(first, count),
         }
         planes[0]
     }
@@ -167,6 +146,45 @@ impl<T: Copy> Pixels<'_, T> {
     pub(super) fn put(&mut self, picture: usize, [x, y]: [usize; 2], pixels: &[T]) {
         self.planes[picture][(y - self.top) * self.width + x..][..pixels.len()].copy_from_slice(pixels);
     }
+}
+
+/// Footprints of all voxels, tile by tile.
+fn splat_into_tiles(
+    eye: &Eye,
+    tiles: &mut [Tile],
+    blocks: (&[usize], usize),
+    source: &dyn Blocks,
+    report: &mut RenderReport,
+) -> Result<()> {
+    let Eye { grid, camera, footprint, clip, .. } = eye;
+    let project = |block: usize| {
+        let terms = source.terms(block)?;
+        let held = [terms.coefficients, terms.bytes_read];
+        Ok((Splats::new(terms, &eye.blocks.region(block), clip, grid, camera, footprint), held))
+    };
+    in_batches(blocks, report, project, |splats| {
+        tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, footprint)));
+        Ok(())
+    })
+}
+
+/// Amounts of all voxels, plane by plane.
+fn splat_into_cells(
+    eye: &Eye,
+    lattice: &Lattice,
+    cells: &mut Cells,
+    blocks: (&[usize], usize),
+    source: &dyn Blocks,
+    report: &mut RenderReport,
+) -> Result<()> {
+    // Used again: memory fresh from the system costs as much as what it is for.
+    let spare = Mutex::default();
+    let place = |block: usize| {
+        let planes = source.planes(block)?;
+        let held = planes.held();
+        Ok(((lattice.placed(&eye.blocks.region(block), &eye.clip), planes), held))
+    };
+    in_batches(blocks, report, place, |blocks| add_planes(cells, blocks, &spare))
 }
 
 type BlockInCells<'a> = ((Placed, Box<dyn BlockPlanes + 'a>), [u64; 2]);
@@ -187,8 +205,7 @@ fn add_planes(cells: &mut Cells, blocks: &[BlockInCells<'_>], spare: &Mutex<Vec<
 /// Makes something of every block, in order and `batch` at a time, each with its coefficients and the bytes read for them,
 /// and adds it.
 fn in_batches<T: Send>(
-    blocks: &[usize],
-    batch: usize,
+    (blocks, batch): (&[usize], usize),
     report: &mut RenderReport,
     make: impl Fn(usize) -> Result<(T, [u64; 2])> + Sync,
     mut add: impl FnMut(&[(T, [u64; 2])]) -> Result<()>,

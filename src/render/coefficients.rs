@@ -3,7 +3,7 @@
 use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
 use super::reading::{Allowance, Cheapest, Kept, Place, Rule, left_out};
-use super::scene::{Contents, FrameBounds, Group, Inverse, LeftOut, SampleErrors, Scene};
+use super::scene::{Contents, FrameBounds, Group, Inverse, LeftOut, Read, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use super::{Limit, RenderConfig};
 use crate::codec::WindowCodec;
@@ -361,8 +361,8 @@ impl Group for CoefficientGroup<'_> {
         })
     }
 
-    fn finish(&self) -> Result<()> {
-        self.file.check_unchanged()
+    fn finish(&self) -> Result<Read> {
+        self.file.check_unchanged().map(|()| Read::AsExpected)
     }
 }
 
@@ -439,18 +439,10 @@ impl CodedBlock<'_> {
         let bytes = samples.len() / group.codec.frames();
         room.bytes.clear();
         room.bytes.extend_from_slice(&samples[group.frames[frame] * bytes..][..bytes]);
-        if !group.layout.absent {
-            return room.amounts_of_samples(group.codec.sample, |v| v);
+        match group.layout.absent {
+            true => room.masked(group.codec.sample, absent, |voxel, v| group.misses(block, frame, voxel, v)),
+            false => room.samples(group.codec.sample),
         }
-        let voxel = std::cell::Cell::new(0);
-        room.amounts_of_samples(group.codec.sample, |v| {
-            let missing = group.misses(block, frame, voxel.replace(voxel.get() + 1), v);
-            match (missing, absent) {
-                (missing, true) => f64::from(u8::from(missing)),
-                (true, false) => 0.0,
-                (false, false) => v,
-            }
-        })
     }
 }
 

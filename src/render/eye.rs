@@ -82,21 +82,23 @@ impl Eye {
     }
 
     /// Whether a block is so deep that it may be left out.
-    pub(super) fn dims(&self, block: usize) -> bool {
+    pub(super) fn is_too_deep(&self, block: usize) -> bool {
         self.camera.nearest_of(&self.grid.crop(&self.blocks.region(block))) > self.deepest
     }
 
     /// Whether a block is to be splatted into these rows of the picture.
     pub(super) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
-        self.reaches(block, rows) && !self.dims(block)
+        self.reaches(block, rows) && !self.is_too_deep(block)
     }
 
     /// Whether any voxel of a block can reach these rows of the picture.
     pub(super) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
-        if let Some(lattice) = &self.lattice {
-            return overlap(&lattice.rows_reached(&self.blocks.region(block), self.camera.size), rows);
-        }
         let region = self.blocks.region(block).intersect(&self.clip);
-        overlap(&rows_reached(&region, &self.grid, &self.camera, &self.footprint), rows)
+        let reached = match &self.lattice {
+            _ if region.is_empty() => 0..0,
+            Some(lattice) => lattice.rows_reached(&region, self.camera.size),
+            None => rows_reached(&region, &self.grid, &self.camera, &self.footprint),
+        };
+        overlap(&reached, rows)
     }
 }

@@ -3,15 +3,16 @@
 use super::RenderConfig;
 use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
-use super::scene::{Contents, FrameBounds, Group, Inverse, SampleErrors, Scene};
+use super::scene::{Contents, FrameBounds, Group, Inverse, Read, SampleErrors, Scene};
 use super::terms::{Layout, Order, Terms};
 use crate::error::Result;
 use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
 use crate::volume::{BlockGrid, Grid, Region};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Frames that are splatted together, so that a footprint is computed once for all of them.
+/// Frames that are splatted together, so that the weights of voxels, or of pixels, are computed once for all of them.
 const GROUP: usize = 32;
 /// Voxels a side of the boxes in which frames are read.
 const EDGE: usize = 32;
@@ -21,6 +22,8 @@ pub struct FrameScene {
     source: Box<dyn FrameSource>,
     archive: Archive,
     missing_value: Option<f64>,
+    /// Whether a sample turned out to be missing: from then on frames are looked at before they are splatted.
+    missing_seen: AtomicBool,
 }
 
 impl FrameScene {
@@ -28,7 +31,7 @@ impl FrameScene {
     pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
         let archive = source.archive().clone();
         let missing_value = sample::missing_value(archive.sample, missing_value);
-        Self { source, archive, missing_value }
+        Self { source, archive, missing_value, missing_seen: AtomicBool::new(false) }
     }
 }
 
@@ -71,7 +74,8 @@ impl Scene for FrameScene {
         let look = |frame: &usize| {
             scan_frame(Scan::NOTHING, window.as_ref(), frame - first, &archive.grid, archive.sample, declared)
         };
-        let looked_at = if can_miss || config.certify { frames } else { &[] };
+        let look_first = can_miss && self.missing_seen.load(Relaxed);
+        let looked_at = if look_first || config.certify { frames } else { &[] };
         let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
         let absent = seen.iter().any(|s| s.missing > 0);
         let layout = Layout {
@@ -85,8 +89,18 @@ impl Scene for FrameScene {
         let errors = seen.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
-        let blocks = self.blocks();
-        Ok(Box::new(FrameGroup { archive, blocks, missing_value: declared, window, frames, layout, errors }))
+        let (blocks, seen) = (self.blocks(), &self.missing_seen);
+        let unexpected = (can_miss && looked_at.is_empty()).then_some(seen);
+        Ok(Box::new(FrameGroup {
+            archive,
+            blocks,
+            missing_value: declared,
+            unexpected,
+            window,
+            frames,
+            layout,
+            errors,
+        }))
     }
 }
 
@@ -95,6 +109,8 @@ struct FrameGroup<'a> {
     archive: &'a Archive,
     blocks: BlockGrid,
     missing_value: Option<f64>,
+    /// Where to note that a sample is missing, if nobody looked for that before.
+    unexpected: Option<&'a AtomicBool>,
     window: Box<dyn FrameWindow>,
     /// Counted from the first frame of the window.
     frames: Vec<usize>,
@@ -118,6 +134,9 @@ impl Group for FrameGroup<'_> {
         let frames = self.frames.iter().copied();
         let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
         let declared = self.missing_value;
+        let mut values = vec![0.0; samples.len() / archive.sample.size()];
+        sample::load(archive.sample, &samples, &mut values);
+        self.note_missing(&values);
         Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
     }
 
@@ -133,8 +152,18 @@ impl Group for FrameGroup<'_> {
         &self.errors
     }
 
-    fn finish(&self) -> Result<()> {
-        self.window.check_unchanged()
+    fn finish(&self) -> Result<Read> {
+        self.window.check_unchanged()?;
+        let unexpected = self.unexpected.is_some_and(|seen| seen.load(Relaxed));
+        Ok(if unexpected { Read::Otherwise } else { Read::AsExpected })
+    }
+}
+
+impl FrameGroup<'_> {
+    fn note_missing<T: Copy + Into<f64>>(&self, values: &[T]) {
+        if let Some(seen) = self.unexpected.filter(|_| sample::is_any_missing(values, self.missing_value)) {
+            seen.store(true, Relaxed);
+        }
     }
 }
 
@@ -150,12 +179,16 @@ impl BlockPlanes for FrameBlock<'_> {
         let Some((frame, absent)) = layout.samples(plane) else { return Ok(Amounts::Nothing) };
         room.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
         window.read_box(frames[frame], &self.region, &mut room.bytes)?;
-        let is_missing = |v| layout.absent && is_missing(v, *missing_value);
-        Ok(room.amounts_of_samples(archive.sample, move |v| match (is_missing(v), absent) {
-            (missing, true) => f64::from(u8::from(missing)),
-            (true, false) => 0.0,
-            (false, false) => v,
-        }))
+        if layout.absent {
+            return Ok(room.masked(archive.sample, absent, |_, v| is_missing(v, *missing_value)));
+        }
+        let samples = room.samples(archive.sample);
+        match samples {
+            Amounts::Single(values) => self.group.note_missing(values),
+            Amounts::Double(values) => self.group.note_missing(values),
+            Amounts::Few(_) | Amounts::Nothing => {}
+        }
+        Ok(samples)
     }
 
     fn held(&self) -> [u64; 2] {

@@ -49,7 +49,7 @@ use certificate::Certificate;
 use eye::Eye;
 use finish::Finish;
 use plan::Budget;
-use scene::{Contents, Group};
+use scene::{Contents, Group, Read};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 use terms::Terms;
@@ -189,8 +189,15 @@ pub fn render(
         let end = scene.group_end(*first);
         let most = rest.partition_point(|f| *f < end);
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
-        let group = scene.group(now, config, &expectation)?;
-        let pictures = render_group(group.as_ref(), &eye, config, &weights, &budget, &mut report)?;
+        let pictures = loop {
+            let before = report.clone();
+            let group = scene.group(now, config, &expectation)?;
+            let pictures = render_group(group.as_ref(), &eye, config, &weights, &budget, &mut report)?;
+            match group.finish()? {
+                Read::AsExpected => break pictures,
+                Read::Otherwise => report = before,
+            }
+        };
         for rendered in pictures.frames(now) {
             let writing = Instant::now();
             sink(rendered)?;
@@ -204,6 +211,11 @@ pub fn render(
     report.expected_error = (report.expected_error / report.frames.max(1) as f64).sqrt();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
+}
+
+/// What splatting may add by default to pictures of a file of such a tolerance, or of frames: half of that, at most 1e-3.
+pub fn default_splat_error(tolerance: Option<f64>) -> f64 {
+    tolerance.map_or(f64::INFINITY, |t| t / 2.0).min(1e-3)
 }
 
 /// The cheapest splat method within an error.
@@ -278,7 +290,6 @@ fn render_group(
         canvas.finish(&mut pictures, |tile, pixels| finish.tile(tile, pixels));
         lap(&mut clock, &mut report.inverse_seconds);
     }
-    group.finish()?;
     if certificate.is_some() {
         let errors = pictures[layout.frames * eye.pixels()..].iter().map(|e| f64::from(*e));
         report.certified_error = Some(errors.fold(report.certified_error.unwrap_or(0.0), f64::max));
@@ -292,7 +303,7 @@ fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Re
     let held = blocks.len();
     blocks.retain(|b| eye.reaches(*b, &(0..eye.camera.size[1])));
     let reached = blocks.len();
-    blocks.retain(|b| !eye.dims(*b));
+    blocks.retain(|b| !eye.is_too_deep(*b));
     report.blocks += eye.blocks.len() as u64;
     report.blocks_empty += empty;
     report.blocks_outside += (held - reached) as u64;

@@ -9,6 +9,7 @@ use super::splat::TILE;
 use super::terms::Layout;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::volume::Region;
 use std::ops::Range;
 
 /// What is allocated at once.
@@ -19,6 +20,8 @@ pub(super) struct Budget<'a> {
     size: [usize; 2],
     /// Finished numbers of a pixel and frame: its value, and its error.
     numbers: usize,
+    /// The largest block.
+    block: Region,
     block_bytes: usize,
     lattice: Option<&'a Lattice>,
 }
@@ -33,14 +36,16 @@ impl<'a> Budget<'a> {
         let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
         let numbers = 1 + usize::from(config.certify);
         let available = config.memory.saturating_sub(fixed);
-        let cells = |l: &Lattice| l.block_cells(&scene.blocks().region(0)) * size_of::<f64>();
-        let block_bytes = scene.block_bytes(config) + lattice.map_or(0, cells);
-        let budget = Self { available, size, numbers, block_bytes, lattice };
+        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes(config));
+        let budget = Self { available, size, numbers, block, block_bytes, lattice };
         let least = budget.picture_bytes(1) + budget.band_bytes(scene.most_planes(1, config), TILE) + block_bytes;
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
-            let what =
-                format!("--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB", size[0], size[1]);
+            let threads = rayon::current_num_threads();
+            let what = format!(
+                "--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB with {threads} thread(s)",
+                size[0], size[1]
+            );
             return Err(Error::usage(what));
         }
         Ok(budget)
@@ -55,11 +60,12 @@ impl<'a> Budget<'a> {
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
         let numbers = match self.lattice {
             Some(lattice) => {
-                lattice.band_cells(self.size[0], rows) + rayon::current_num_threads() * lattice.tile_cells()
+                let scratch = lattice.scratch(&self.block, planes);
+                planes * lattice.band_cells(self.size[0], rows) + rayon::current_num_threads() * scratch
             }
-            None => self.size[0] * rows.next_multiple_of(TILE),
+            None => planes * self.size[0] * rows.next_multiple_of(TILE),
         };
-        planes * numbers * size_of::<f64>()
+        numbers * size_of::<f64>()
     }
 
     /// How many of `most` frames to render together.

@@ -61,12 +61,21 @@ pub trait Group: Sync {
     /// How far the samples may be from the source's, besides what the terms in error planes say.
     fn errors(&self) -> &SampleErrors;
 
-    /// An error if what was read changed meanwhile.
-    fn finish(&self) -> Result<()>;
+    /// What was found on the way; an error if what was read changed meanwhile.
+    fn finish(&self) -> Result<Read>;
 }
 
 /// The frames at some pixels from all planes. Overwrites these.
 pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
+
+/// What reading a group found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Read {
+    /// Nothing else than its layout has room for.
+    AsExpected,
+    /// More than that: it must be opened and rendered again, and will then have room.
+    Otherwise,
+}
 
 /// The blocks of a group.
 #[derive(Debug, Default)]

@@ -40,14 +40,15 @@ impl<'a> Uncut<'a> {
     /// No place of the plane has a larger sum.
     ///
     /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one another,
-    /// footprints included, each a step deeper than the last, and what a footprint reaches is not much nearer.
+    /// footprints included, each a step deeper than the last; it may meet the first one before the volume begins, and voxels
+    /// of a slice may be nearer than the place where it meets that.
     pub(super) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.eye.tau, self.eye.clip.dims());
         let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
         let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
         let (deeper, nearer) = (self.deeper(), self.nearer());
-        let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - nearer).max(0.0))).sum();
+        let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - 2.0 * nearer).max(0.0))).sum();
         along * self.slice() * self.footprint.at_depth(self.nearest())
     }
 

@@ -58,7 +58,6 @@ impl Weights {
     /// Splats a 1 for every voxel.
     pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Self> {
         let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
-        let seen_by = |footprint: Footprint| Eye { footprint, lattice: None, ..eye.clone() };
         let sums = sums(eye, budget)?;
         let largest = sums.iter().copied().fold(0.0, f64::max);
         let mut weights = Self { size: eye.camera.size, threshold: BACKGROUND * largest, sums, ..Self::default() };
@@ -66,15 +65,16 @@ impl Weights {
             weights.judge(&Uncut::new(eye, &by(Method::EXACT)?), eye.stated_error);
         }
         if config.certify {
-            let whole = seen_by(by(certificate::WHOLE)?);
+            let whole = Eye { footprint: by(certificate::WHOLE)?, ..eye.clone() };
             weights.beyond = self::sums(&whole, budget)?;
             certificate::leave_beyond(&whole, &weights.sums, &mut weights.beyond);
         }
         Ok(weights)
     }
 
-    /// Sums that are off by less than this share of the largest become uncut ones where the difference may matter: for the
-    /// largest, and for those near what is then the threshold.
+    /// Sums that are off by less than this share of the largest anywhere become uncut ones where the difference may matter: for
+    /// the largest here, and for those near what is then the threshold. Where others are as large but for such a share, the
+    /// largest may be one of these, and the threshold off by a hundredth of that.
     fn judge(&mut self, uncut: &Uncut<'_>, off: f64) {
         let pixel = |at: usize| [at % self.size[0], at / self.size[0]];
         let brightest =

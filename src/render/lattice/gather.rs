@@ -3,7 +3,6 @@
 use super::cells::Cells;
 use super::kernel::Weights;
 use super::picture::Lattice;
-use crate::codec::buffer::Buffer;
 use crate::render::splat::Place;
 use crate::wavelet::{LANES, Lane};
 use multiversion::multiversion;
@@ -20,9 +19,14 @@ pub(in crate::render) struct Gather<'a> {
     used: Vec<usize>,
     /// For every so many planes their sums side by side, cell by cell.
     together: usize,
-    bundles: Vec<Buffer<f64>>,
+    bundles: Vec<Vec<f64>>,
     /// Of [`LANES`] pixels.
     weights: Vec<Weights>,
+}
+
+/// How many of so many planes a bundle has.
+pub(super) fn side_by_side(planes: usize) -> usize {
+    planes.next_power_of_two().min(TOGETHER)
 }
 
 /// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
@@ -33,7 +37,7 @@ impl<'a> Gather<'a> {
         let (first, size) = lattice.seen_by(&place.x, &place.y);
         let seen = Seen::of(cells, first, size);
         let planes: Vec<(usize, &[f64])> = cells.touched().filter(|(_, plane)| seen.any(plane)).collect();
-        let together = planes.len().next_power_of_two().min(TOGETHER);
+        let together = side_by_side(planes.len());
         let bundles = planes.chunks(together).map(|planes| seen.bundle(planes, together)).collect();
         let weights = (0..LANES).map(|_| Weights::of(&lattice.kernel)).collect();
         let used = planes.into_iter().map(|(number, _)| number).collect();
@@ -114,9 +118,8 @@ impl Seen {
     }
 
     /// Some planes side by side, cell by cell, with zeros up to so many.
-    fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Buffer<f64> {
-        let mut bundle = Buffer::of(self.size[0] * self.size[1] * together);
-        bundle.fill(0.0);
+    fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Vec<f64> {
+        let mut bundle = vec![0.0; self.size[0] * self.size[1] * together];
         for (to, row) in bundle.chunks_exact_mut(self.size[0] * together).zip(&self.rows) {
             let Some(row) = row else { continue };
             for (n, (_, plane)) in planes.iter().enumerate() {

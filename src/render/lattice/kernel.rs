@@ -182,7 +182,7 @@ impl Kernel {
             best = best.min(most * c.iter().sum::<f64>());
             c.iter_mut().zip(blurred(&quotients)).for_each(|(c, q)| *c *= q);
         }
-        MARGIN * best + BEYOND
+        MARGIN * best + BEYOND + SINGLES
     }
 
     /// The largest difference of both weights at a place, in sigma, whatever the phase of the lattice.
@@ -280,8 +280,10 @@ const PHASES: usize = 6;
 const LEAST: f64 = 3e-3;
 /// Times that the c_j are made to fit better.
 const ROUNDS: usize = 12;
-/// For what lies between places and between phases.
+/// For what lies between places and between phases: several times what finer ones have shown.
 const MARGIN: f64 = 1.25;
+/// For the weights' rounding to singles.
+pub(super) const SINGLES: f64 = 1e-6;
 /// For what lies beyond all places: 4 exp(-R^2 / 2), as of a cut footprint.
 const BEYOND: f64 = 3e-10;
 

@@ -1,7 +1,8 @@
 //! The lattice of one view as a way of splatting: when it is used, the sums of blocks, and from sums to pixels.
 
 use super::cells::{Cells, Frame, LINE};
-use super::kernel::Kernel;
+use super::gather::side_by_side;
+use super::kernel::{Kernel, SINGLES};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
@@ -24,7 +25,7 @@ pub(in crate::render) struct Lattice {
     bounds: ([isize; 2], [usize; 2]),
 }
 
-/// Cells per voxel and degrees of splines, from the cheapest.
+/// Cells per voxel and degrees of splines, about from the cheapest.
 const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
 /// What amounts grow by from one voxel to the next, at most, as an exponent: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
@@ -43,7 +44,7 @@ impl Lattice {
     ) -> Option<(Self, Method)> {
         let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
         let radius = (2.0 * libm::log(20.0 / error)).sqrt(); // half of the error is left for the lattice
-        for (fineness, degree) in CHOICES.into_iter().filter(|_| error > SMALLEST) {
+        for (fineness, degree) in CHOICES.into_iter().filter(|_| error > SINGLES) {
             let shear = Shear::new(camera, grid, fineness);
             let kernel = Kernel::new(&shear, sigma, degree, radius);
             let Some(kernel) = kernel else { continue };
@@ -51,7 +52,7 @@ impl Lattice {
             let (reach, peak) = (radius * sigma, footprint.at_depth(0.0));
             let mut lattice = Self { spreading, kernel, reach, peak, bounds: Default::default() };
             if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
-                return None; // nor do finer ones
+                continue;
             }
             lattice.bounds = lattice.rectangle(clip);
             let stated_error = lattice.kernel.error(&shear, sigma, error);
@@ -89,10 +90,13 @@ impl Lattice {
             + SPREADING * voxels * (degree + 1.0) * (q + 1.0)
     }
 
-    /// Cells of a tile's planes.
-    pub(in crate::render) fn tile_cells(&self) -> usize {
+    /// Numbers that a thread holds while it splats a block, or gathers a tile of so many planes.
+    pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
+        const AMOUNTS: usize = 3; // in their type, as singles, as doubles
         let side = self.tile();
-        area(self.seen_by(&(0..side), &(0..side)).1.map(|n| n + 2)) // as rounding and the tile's place have it
+        let tile = area(self.seen_by(&(0..side), &(0..side)).1.map(|n| n + 2)); // as rounding and the tile's place have it
+        let bundles = planes.next_multiple_of(side_by_side(planes).max(1));
+        self.block_cells(block) + AMOUNTS * block.voxels() + bundles * tile
     }
 
     /// The cells that voxels of a region reach: the first ones, and how many.
@@ -107,7 +111,7 @@ impl Lattice {
             let first = shear.place(voxel).map(|place| spread(degree, place).0);
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
         }
-        // A cell more than rounding could move.
+        // A cell more than rounding could move, and for cells beyond the cut that count as well.
         let pad = 1;
         let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + degree + 1;
         (low.map(|first| first - pad as isize), [size(0), size(1)])
@@ -180,7 +184,7 @@ impl Lattice {
     }
 
     /// Cells of a plane of a block.
-    pub(in crate::render) fn block_cells(&self, region: &Region) -> usize {
+    fn block_cells(&self, region: &Region) -> usize {
         let size = self.rectangle(region).1;
         self.held(size.map(|n| n + MOST_DEGREE + self.spreading.shear.fineness))
     }
@@ -198,8 +202,6 @@ const SPREADING: f64 = 0.15;
 
 /// Nothing cheaper has larger errors.
 const LARGEST: f64 = 0.05;
-/// Errors that no lattice reaches.
-const SMALLEST: f64 = 1e-7;
 
 fn area([width, height]: [usize; 2]) -> usize {
     width * height

@@ -7,7 +7,7 @@ use std::iter::successors;
 use wavesplat::bound::Bound;
 use wavesplat::error::{Error, Result};
 use wavesplat::footprint::Method;
-use wavesplat::render::{Quantity, splat_method};
+use wavesplat::render::{Quantity, default_splat_error, splat_method};
 use wavesplat::wavelet::Basis;
 
 /// A basis, and the window it is measured with.
@@ -51,8 +51,6 @@ pub const BOUNDS: [BoundRow; 4] = [
 pub const TEXTBOOK_CUT: f64 = 3.0;
 /// Frames that the conventional method with shared footprints splats together.
 const SHARED_GROUP: usize = 32;
-/// The program's default: what splatting may add, as a share of the tolerance.
-const SPLAT_SHARE: f64 = 0.1;
 
 /// What to measure.
 #[derive(Debug, Clone, PartialEq)]
@@ -116,7 +114,8 @@ impl Sweep {
         self.tolerances.iter().map(move |tolerance| {
             let coefficients = BOUNDS.iter().flat_map(|bound| BASES.iter().map(|b| Contender::Coefficients(b, bound)));
             let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(TEXTBOOK_CUT)]).collect();
-            Group { kind, tolerance: *tolerance, splat_error: SPLAT_SHARE * tolerance, splat: None, contenders }
+            let splat_error = default_splat_error(Some(*tolerance));
+            Group { kind, tolerance: *tolerance, splat_error, splat: None, contenders }
         })
     }
 

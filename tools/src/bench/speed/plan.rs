@@ -6,6 +6,7 @@ use super::work::{Task, Work};
 use crate::bench::look::{Look, compared_frames};
 use crate::bench::size::Data;
 use std::path::{Path, PathBuf};
+use wavesplat::render::default_splat_error;
 
 /// A way of converting, and how closely.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +23,7 @@ impl Coded {
 
     /// What the program lets splatting add by default.
     fn splat_error(&self) -> f64 {
-        self.tolerance / 10.0
+        default_splat_error(Some(self.tolerance))
     }
 }
 

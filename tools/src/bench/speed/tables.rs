@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 
 const HEAD: &str = "\
 All pictures of a view: the weighted mean, 32-bit, seen from 30 degrees about z and 30 above the horizon, kernel of 0.75
-voxels, no attenuation. Coefficient files keep every sample within the tolerance x value range; splatting may add a tenth
-of the tolerance. With one thread, times are seconds of the processor on one core, else of the clock; each the least of
+voxels, no attenuation. Coefficient files keep every sample within the tolerance x value range; splatting may add half
+of the tolerance, at most 1e-3. With one thread, times are seconds of the processor on one core, else of the clock; each the least of
 all rounds, every measurement in a process of its own, in turns. *Textbook*: a table of footprints, frame by frame.
 *Best conventional*: that, or the library's own method for frames (*direct*), whichever is faster; frames are in the
 system's cache. *View of decoded codes*: a view less bare decoding of what it read. *Splat stage*: what the library reports
