@@ -39,7 +39,8 @@ impl<'a> Gather<'a> {
         let planes: Vec<(usize, &[f64])> = cells.touched().filter(|(_, plane)| seen.any(plane)).collect();
         let together = side_by_side(planes.len());
         let bundles = planes.chunks(together).map(|planes| seen.bundle(planes, together)).collect();
-        let weights = (0..LANES).map(|_| Weights::of(&lattice.kernel)).collect();
+        let lanes = if planes.is_empty() { 0 } else { LANES }; // nothing is weighed where there is nothing
+        let weights = (0..lanes).map(|_| Weights::of(&lattice.kernel)).collect();
         let used = planes.into_iter().map(|(number, _)| number).collect();
         Self { lattice, place, first, size, used, together, bundles, weights }
     }

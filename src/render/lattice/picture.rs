@@ -82,12 +82,16 @@ impl Lattice {
         per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64)) && places.iter().all(|n| within(n, 1e9))
     }
 
-    /// Products for a plane, about.
+    /// Products of footprints that a plane takes as long as, about.
     fn work(&self, camera: &Camera, clip: &Region) -> f64 {
         let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
-        let voxels = clip.voxels() as f64;
-        GATHERING * self.kernel.cells() as f64 * (camera.size[0] * camera.size[1]) as f64
-            + SPREADING * voxels * (degree + 1.0) * (q + 1.0)
+        let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
+        let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
+        let (pixels, side) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
+        let copied = area(self.seen_by(&(0..side), &(0..side)).1) as f64 * pixels / (side * side) as f64;
+        GATHERING * self.kernel.cells() as f64 * pixels
+            + COPYING * copied
+            + SPREADING * clip.voxels() as f64 * (degree + 1.0) * (q + 1.0)
     }
 
     /// Numbers that a thread holds while it splats a block, or gathers a tile of so many planes.
@@ -195,9 +199,10 @@ impl Lattice {
     }
 }
 
-/// What a product takes from cells to pixels, weights included, and from voxels to cells, in units of one of a footprint; as
-/// measured.
+/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product from
+/// voxels to cells; in units of a product of a footprint, as measured.
 const GATHERING: f64 = 0.5;
+const COPYING: f64 = 5.0;
 const SPREADING: f64 = 0.15;
 
 /// Nothing cheaper has larger errors.
