@@ -232,6 +232,13 @@ impl<'a> CoefficientGroup<'a> {
         Ok(last.clone())
     }
 
+    /// Reads a block, and what its samples may be off by.
+    fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
+        let leaf = self.leaf_of(block as u32)?;
+        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
+        Ok((self.file.block(&self.codec, &entry, &self.wanted)?, errors))
+    }
+
     /// The samples of the group's frames out of those of the whole window.
     fn of_frames(&self, samples: &[u8]) -> Vec<u8> {
         let frame_bytes = samples.len() / self.codec.frames();
@@ -313,9 +320,7 @@ impl Group for CoefficientGroup<'_> {
     }
 
     fn terms(&self, block: usize) -> Result<Terms> {
-        let leaf = self.leaf_of(block as u32)?;
-        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        let block = self.file.block(&self.codec, &entry, &self.wanted)?;
+        let (block, errors) = self.read(block)?;
         Ok(match (&block.exact, self.what) {
             (Some(exact), _) => self.terms_of_samples(&block, exact, &errors),
             (None, What::Samples) => self.terms_of_samples(&block, &block.samples(&self.codec), &errors),
@@ -324,9 +329,7 @@ impl Group for CoefficientGroup<'_> {
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        let leaf = self.leaf_of(block as u32)?;
-        let kept = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        let block = self.file.block(&self.codec, &kept.entry, &self.wanted)?;
+        let (block, _) = self.read(block)?;
         Ok(Box::new(CodedBlock::new(self, block)))
     }
 
@@ -393,14 +396,15 @@ impl<'a> CodedBlock<'a> {
 
     fn add_overrides(&mut self) {
         let Self { group, block, .. } = self;
-        self.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
         if !block.overrides() {
+            self.coefficients = block.codes.iter().filter(|c| **c != 0).count() as u64;
             return;
         }
         let terms = match &self.field {
             Some(field) => group.terms_of_codes(block, field, &[], false),
             None => group.terms_of_codes(block, &block.field(&group.codec), &[], false),
         };
+        self.coefficients = terms.coefficients;
         self.few.resize_with(group.layout.planes() - group.layout.coefficients, Vec::new);
         for voxel in 0..block.voxels {
             let (planes, amounts) = terms.of_voxel(voxel);

@@ -59,9 +59,10 @@ impl Eye {
                 Lattice::within(error, config.kernel, (&grid, &clip), &camera, &footprint)
             })
             .flatten();
-        let method = lattice.as_ref().map_or(method, |(_, method)| *method);
+        let (lattice, instead) = lattice.unzip();
+        let method = instead.unwrap_or(method);
         let (tau, stated_error) = (config.kernel.tau, method.stated_error);
-        let (lattice, deepest) = (lattice.map(|l| l.0), f64::INFINITY);
+        let deepest = f64::INFINITY;
         let eye = Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest };
         let left = most_splat_error(config.quantity, config.splat_error) - stated_error;
         if config.certify || tau == 0.0 || left <= 0.0 { Ok(eye) } else { eye.without_what_is_dim(config.kernel, left) }

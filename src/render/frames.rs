@@ -134,9 +134,9 @@ impl Group for FrameGroup<'_> {
         let frames = self.frames.iter().copied();
         let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
         let declared = self.missing_value;
-        let mut values = vec![0.0; samples.len() / archive.sample.size()];
-        sample::load(archive.sample, &samples, &mut values);
-        self.note_missing(&values);
+        if self.unexpected.is_some() {
+            sample::for_each_run(archive.sample, &samples, |_, values| self.note_missing(values));
+        }
         Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
     }
 

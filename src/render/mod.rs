@@ -282,7 +282,7 @@ fn render_group(
     let blocks = blocks_to_read(group, eye, report)?;
     let mut pictures = vec![f32::NAN; finish.planes() * eye.pixels()];
     for rows in budget.bands(&layout) {
-        let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.sees(*b, &rows)).collect();
+        let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.reaches(*b, &rows)).collect();
         report.blocks_read += seen.len() as u64;
         let mut canvas = Canvas::new(eye, rows.clone(), &layout);
         canvas.splat(&seen, budget.batch(&layout, rows.len()), &group, report)?;

@@ -208,18 +208,20 @@ fn reach(spans: impl Iterator<Item = Range<usize>>) -> Range<usize> {
 /// The rows of the picture that any voxel of a block can reach; a block that reaches no column reaches no row.
 pub(super) fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
     let ends: [[f64; 3]; 2] = [grid.position(region.start), grid.position(region.end.map(|e| e - 1))];
-    let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for corner in 0..8 {
-        let projected = camera.project(std::array::from_fn(|a| ends[corner >> a & 1][a]));
-        for a in 0..2 {
-            lo[a] = lo[a].min(projected[a]);
-            hi[a] = hi[a].max(projected[a]);
-        }
+    let corner = |n: usize| camera.project(std::array::from_fn(|a| ends[n >> a & 1][a]));
+    rows_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
+}
+
+/// The rows of a picture of such a size that are within `reach` pixels of the box around some places; none if no column is.
+pub(super) fn rows_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, size: [usize; 2]) -> Range<usize> {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for place in places {
+        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
     }
     // A pixel more on each side than rounding could move an edge.
-    let span = |a: usize| {
-        let (from, to) = (lo[a] - footprint.reach - 1.0, hi[a] + footprint.reach + 1.0);
-        let end = to.clamp(0.0, camera.size[a] as f64).ceil() as usize;
+    let span = |i: usize| {
+        let (from, to) = (low[i] - reach - 1.0, high[i] + reach + 1.0);
+        let end = to.clamp(0.0, size[i] as f64).ceil() as usize;
         from.clamp(0.0, end as f64).floor() as usize..end
     };
     if span(0).is_empty() { 0..0 } else { span(1) }

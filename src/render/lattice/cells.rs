@@ -112,9 +112,9 @@ impl Frame {
         let phases = self.phases;
         let skipped = ((self.first[0] - u).max(0) as usize).div_ceil(phases);
         let wanted = count.div_ceil(phases).saturating_sub(skipped);
-        let start = self.in_row(u + (skipped * phases) as isize).unwrap_or(0);
-        let left = if self.in_row(u + (skipped * phases) as isize).is_some() { self.run - start % self.run } else { 0 };
-        (skipped * phases, start..start + wanted.min(left))
+        let here = self.in_row(u + (skipped * phases) as isize);
+        let run = here.map_or(0..0, |start| start..start + wanted.min(self.run - start % self.run));
+        (skipped * phases, run)
     }
 
     /// The cells of row v in a plane; none if it is not here.

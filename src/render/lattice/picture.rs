@@ -8,7 +8,7 @@ use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
 use crate::camera::Camera;
 use crate::footprint::{Footprint, Kernel as Gaussian, Method};
-use crate::render::splat::{Place, TILE};
+use crate::render::splat::{Place, TILE, rows_around};
 use crate::volume::{Grid, Region};
 use std::ops::Range;
 
@@ -142,18 +142,8 @@ impl Lattice {
     /// The rows of the picture that a block can reach; one that reaches no column reaches no row.
     pub(in crate::render) fn rows_reached(&self, region: &Region, size: [usize; 2]) -> Range<usize> {
         let (first, cells) = self.rectangle(region);
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in 0..4 {
-            let cell = [0, 1].map(|i| (first[i] + (corner >> i & 1) * cells[i] as isize) as f64);
-            let pixel = self.spreading.shear.pixel(cell);
-            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(pixel[i]), high[i].max(pixel[i])));
-        }
-        let span = |i: usize| {
-            let (from, to) = (low[i] - self.reach - 1.0, high[i] + self.reach + 1.0);
-            let end = to.clamp(0.0, size[i] as f64).ceil() as usize;
-            from.clamp(0.0, end as f64).floor() as usize..end
-        };
-        if span(0).is_empty() { 0..0 } else { span(1) }
+        let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
+        rows_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
     /// Where the voxels of a block that lie in `clip` are in cells.
