@@ -37,7 +37,7 @@ impl<'a> Truth<'a> {
         config.kernel.sigma = sigma.unwrap_or(config.kernel.sigma);
         config.certify = true;
         let (_, report) = pictures(&mut coefficients(trial), &RenderConfig { certify: false, ..config.clone() });
-        let images = truth(&trial.grid(), &config, report.scale, &samples, Some(&missing));
+        let images = truth(&trial.grid(), &config, report.views[0].scale, &samples, Some(&missing));
         Self { trial, config, images, masked: missing.contains(&true) }
     }
 
@@ -75,7 +75,7 @@ impl<'a> Truth<'a> {
     /// What is missing is splatted with the cut, so that the border of the background moves by what lies beyond.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let share = self.images.weight[at] / self.images.largest_weight;
-        self.masked && (share - BACKGROUND).abs() < report.stated_splat_error
+        self.masked && (share - BACKGROUND).abs() < report.views[0].stated_splat_error
     }
 }
 
@@ -200,7 +200,7 @@ fn a_certificate_grows_by_just_what_is_left_out() {
             let loose = RenderConfig { allowed: Some(allowed), ..config.clone() };
             let (_, errors, seen) = rendered(&mut coefficients(&trial), &loose);
             assert!((1..5).contains(&seen.left_out.parts), "{:?}", seen.left_out);
-            let growth = growth(&trial, &config, report.scale, allowed);
+            let growth = growth(&trial, &config, report.views[0].scale, allowed);
             for ((error, whole), growth) in errors.iter().zip(&whole).zip(&growth) {
                 // Certificates are singles, rounded up, and hold the rounding of their pixels.
                 let off = (f64::from(*error) - f64::from(*whole) - growth).abs();

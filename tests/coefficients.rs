@@ -174,7 +174,7 @@ fn check_within_the_bound(trial: &Trial, region: Option<Region>) {
         let (g, report) = pictures(&mut scene, &mean);
         let (i, _) = pictures(&mut scene, &emission);
         let (g_found, i_found) = (trial.of(What::Coefficients, &mean), trial.of(What::Coefficients, &emission));
-        let truth = truth(&trial.grid(), &mean, report.scale, &vec![0.0; missing.len()], Some(&missing));
+        let truth = truth(&trial.grid(), &mean, report.views[0].scale, &vec![0.0; missing.len()], Some(&missing));
         let left = if missing.contains(&true) { 1e-15 * largest(&samples) * truth.largest_weight } else { 0.0 };
         let weights = truth.weight;
         let pixels = view.size[0] * view.size[1];

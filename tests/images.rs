@@ -40,7 +40,7 @@ fn the_exact_method_is_within_a_millionth_of_brute_force() {
             let mut scene = direct(&memory, None);
             let config = looking(view, tau, Quantity::Emission, &grid, frames);
             let (emission, report) = pictures(&mut scene, &config);
-            let expected = truth(&grid, &config, report.scale, &values(&memory, SampleType::F64), None);
+            let expected = truth(&grid, &config, report.views[0].scale, &values(&memory, SampleType::F64), None);
             let most = 1e-6 * largest(&expected.emission);
             for (found, expected) in emission.iter().zip(&expected.emission) {
                 assert!((f64::from(*found) - expected).abs() <= most, "scene {n}: {found} for {expected}");
@@ -70,8 +70,8 @@ fn every_footprint_keeps_the_error_that_it_states() {
                 let plain = looking(view, tau, quantity, &grid, 2);
                 let config = RenderConfig { splat_error: error, ..plain };
                 let (found, report) = pictures(&mut scene, &config);
-                assert!(report.stated_splat_error <= config.splat_error || error == 0.0);
-                let truth = truth(&grid, &config, report.scale, &samples, None);
+                assert!(report.views[0].stated_splat_error <= config.splat_error || error == 0.0);
+                let truth = truth(&grid, &config, report.views[0].scale, &samples, None);
                 let (expected, unit) = match quantity {
                     Quantity::Emission => (&truth.emission, largest(&samples) * truth.largest_weight),
                     Quantity::Mean => (&truth.mean, hi - lo),
@@ -80,14 +80,18 @@ fn every_footprint_keeps_the_error_that_it_states() {
                     let off = (f64::from(*found) - expected).abs();
                     let share = truth.weight[at] / truth.largest_weight;
                     let less = if quantity == Quantity::Mean { 1.0 / share } else { 1.0 };
-                    let most = report.stated_splat_error * unit * less + rounding(*found);
-                    assert!(found.is_nan() || off <= most, "scene {n}, {}: {found} for {expected}", report.method);
+                    let most = report.views[0].stated_splat_error * unit * less + rounding(*found);
+                    assert!(
+                        found.is_nan() || off <= most,
+                        "scene {n}, {}: {found} for {expected}",
+                        report.views[0].method
+                    );
                 }
                 if quantity == Quantity::Mean {
                     let nan: Vec<bool> = found.iter().map(|v| v.is_nan()).collect();
-                    assert_eq!(background.get_or_insert(nan.clone()), &nan, "scene {n}, {}", report.method);
+                    assert_eq!(background.get_or_insert(nan.clone()), &nan, "scene {n}, {}", report.views[0].method);
                 }
-                names.push(report.method);
+                names.push(report.views[0].method);
             }
         }
     }
@@ -107,12 +111,15 @@ fn a_narrow_kernel_on_a_turned_lattice_keeps_the_stated_error() {
             let mut config = looking(view, 0.0, Quantity::Emission, &grid, 1);
             (config.kernel.sigma, config.splat_error) = (sigma, error);
             let (found, report) = pictures(&mut direct(&memory, None), &config);
-            let truth = truth(&grid, &config, report.scale, &[1.0; 4], None);
+            let truth = truth(&grid, &config, report.views[0].scale, &[1.0; 4], None);
             // The brightest place is a voxel's own, whatever pixels are near it.
             let brightest = 1.0 / (2.0 * std::f64::consts::PI * sigma * sigma);
             for (found, expected) in found.iter().zip(&truth.emission) {
                 let off = (f64::from(*found) - expected).abs();
-                assert!(off <= report.stated_splat_error * brightest + rounding(*found), "{found} for {expected}");
+                assert!(
+                    off <= report.views[0].stated_splat_error * brightest + rounding(*found),
+                    "{found} for {expected}"
+                );
             }
         }
     }
@@ -134,7 +141,7 @@ fn missing_samples_are_in_neither_sum() {
         for quantity in [Quantity::Emission, Quantity::Mean] {
             let config = looking(view(azimuth, elevation, [40, 30]), tau, quantity, &grid, 4);
             let (found, report) = pictures(&mut direct(&memory, Some(-999.0)), &config);
-            let truth = truth(&grid, &config, report.scale, &samples, Some(&missing));
+            let truth = truth(&grid, &config, report.views[0].scale, &samples, Some(&missing));
             let expected = if quantity == Quantity::Mean { &truth.mean } else { &truth.emission };
             for (found, e) in found.iter().zip(expected) {
                 assert_eq!(found.is_nan(), e.is_nan(), "view {n}");
@@ -161,7 +168,7 @@ fn a_region_is_splatted_alone_and_in_its_place() {
     let plain = looking(view(40.0, 20.0, [40, 30]), 0.1, Quantity::Emission, &grid, 3);
     let config = RenderConfig { region: Some(region), ..plain };
     let (emission, report) = pictures(&mut direct(&memory, None), &config);
-    let truth = truth(&grid, &config, report.scale, &samples, Some(&outside));
+    let truth = truth(&grid, &config, report.views[0].scale, &samples, Some(&outside));
     for (found, e) in emission.iter().zip(&truth.emission) {
         assert!((f64::from(*found) - e).abs() <= 1e-6 * largest(&truth.emission));
     }

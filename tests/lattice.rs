@@ -70,11 +70,11 @@ fn keeps_its_error(
             Quantity::Mean => range * seen.largest_weight / weight,
             Quantity::Emission => magnitude * seen.largest_weight,
         };
-        let most = (report.stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
+        let most = (report.views[0].stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
         let off = f64::from(*found) - f64::from(*expected);
         assert!(found.is_nan() || off.abs() <= most, "{what}: {found} for {expected}");
     }
-    usize::from(report.method == "lattice")
+    usize::from(report.views[0].method == "lattice")
 }
 
 /// Along an axis, nearly so, along a diagonal, and where two axes are as much along the view.
@@ -120,7 +120,7 @@ fn frames_on_a_lattice_keep_the_error_that_they_state() {
         let constant = masked(&vec![3.0; samples.len()], missing);
         let mean = RenderConfig { quantity: Quantity::Mean, splat_error: 1e-3, ..emission };
         let (means, report) = pictures(&mut direct(&archive(grid, SampleType::F64, &constant), None), &mean);
-        found += usize::from(report.method == "lattice");
+        found += usize::from(report.views[0].method == "lattice");
         assert!(means.iter().all(|v| v.is_nan() || (v - 3.0).abs() < 1e-5), "means of a constant");
     }
     assert!(found >= 36, "{found} were splatted on a lattice");
@@ -142,10 +142,10 @@ fn memory_changes_no_bit_of_a_lattice() {
     let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
     let view = View { size: [150, 140], scale: Some(3.0), ..view };
     let config = RenderConfig { splat_error: 5e-3, ..looking(view, tau, Quantity::Emission, &grid, FRAMES) };
-    assert_eq!(pictures(&mut scene, &config).1.method, "lattice");
+    assert_eq!(pictures(&mut scene, &config).1.views[0].method, "lattice");
     assert!(under_less_memory(&mut scene, &config) > 2);
     let mut frames = direct(&memory, None);
-    assert_eq!(pictures(&mut frames, &config).1.method, "lattice");
+    assert_eq!(pictures(&mut frames, &config).1.views[0].method, "lattice");
     assert!(under_less_memory(&mut frames, &config) > 2);
 }
 
@@ -168,7 +168,7 @@ fn what_is_too_deep_to_be_seen_is_left_out_within_the_stated_error() {
             let (all, some) = (pictures(&mut scene, &exact).1, pictures(&mut scene, &quick).1);
             assert!((tau == 0.0) == (some.blocks_dimmed == 0) && all.blocks_dimmed == 0, "{tau}");
             assert!(some.blocks_dimmed == 0 || some.bytes_read < all.bytes_read);
-            assert!(some.stated_splat_error <= 5e-3);
+            assert!(some.views[0].stated_splat_error <= 5e-3);
             dimmed.push(some.blocks_dimmed);
         }
     }

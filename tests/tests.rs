@@ -24,4 +24,5 @@ mod sampled;
 mod scenes;
 mod specification;
 mod truncation;
+mod views;
 mod wavelets;

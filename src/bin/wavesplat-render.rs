@@ -13,7 +13,7 @@ use wavesplat::footprint::Kernel;
 use wavesplat::output::STANDARD;
 use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
-use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
+use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
@@ -30,6 +30,7 @@ Examples:
   wavesplat-render run.wspl -o frame_%04d.png
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
   wavesplat-render run.wspl -o values.npy --size 800x600
+  wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render frames/ --method direct -o frame_%04d.png
@@ -41,15 +42,24 @@ struct Cli {
     /// Coefficient file; for --method direct also frames
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// File to write, a pattern as frame_%04d.png, or - for standard output
+    /// File to write, a pattern as frame_%04d.png, or - for standard output; %v or %03v is the number of the view
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Replace existing files
     #[arg(long)]
     force: bool,
-    /// Azimuth and elevation in degrees
-    #[arg(long, value_name = "AZ,EL", default_value = "30,30", allow_hyphen_values = true, help_heading = "View")]
-    view: Pair,
+    /// Azimuth and elevation in degrees; several views of one run share its reading, and take a name with %v
+    #[arg(
+        long = "view",
+        value_name = "AZ,EL",
+        default_value = "30,30",
+        allow_hyphen_values = true,
+        help_heading = "View"
+    )]
+    views: Vec<Pair>,
+    /// Instead of each view so many, evenly around the vertical axis, beginning with it
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
+    orbit: u32,
     /// Degrees by which the picture turns counter-clockwise
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "View")]
     roll: f64,
@@ -164,16 +174,15 @@ impl Cli {
         self.common.start()?;
         let (mut scene, file) = self.scene()?;
         let config = self.config(scene.as_ref(), file.as_ref())?;
-        let (mut sink, mut errors) = self.sinks(scene.as_mut(), &config)?;
-        let progress = self.common.progress("frames");
+        let (mut pictures, mut errors) = self.sinks(scene.as_mut(), &config)?;
+        let progress = self.common.progress("pictures");
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
-            if let (Some(sink), Some(error)) = (&mut errors, rendered.error) {
+            if let (Some(sink), Some(error)) = (errors.get_mut(rendered.view), rendered.error) {
                 sink.picture(rendered.frame, error)?;
             }
-            sink.picture(rendered.frame, rendered.picture)
+            pictures[rendered.view].picture(rendered.frame, rendered.picture)
         })?;
-        errors.map_or(Ok(()), Sink::finish)?;
-        sink.finish()?;
+        errors.into_iter().chain(pictures).try_for_each(Sink::finish)?;
         self.common.detail(summary(&report));
         if self.tolerance.is_some() {
             let RenderReport { certified_sample_error, expected_error, left_out, .. } = &report;
@@ -189,8 +198,8 @@ impl Cli {
         self.common.report(&report, self.output == Path::new(STANDARD))
     }
 
-    /// Where pictures go, and where those of their errors go.
-    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Sink, Option<Sink>)> {
+    /// Where the pictures of each view go, and where those of their errors go, if anywhere.
+    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>)> {
         let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
         let mut outputs = [Some(&self.output), self.error_image.as_ref()].into_iter().flatten();
         outputs.try_for_each(|output| spare_inputs(&self.inputs, output))?;
@@ -208,14 +217,16 @@ impl Cli {
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
         }
-        let sink = |path: &Path, format, range, coloured_array| {
+        let sinks = |path: &Path, format, range, coloured_array| {
             let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
-            let (size, frames, fps, force) = (config.view.size, config.frames.clone(), self.fps, self.force);
-            Sink::open(path, SinkConfig { format, size, frames, fps, colours, coloured_array, force })
+            let (size, frames, fps, force) = (self.size.0, config.frames.clone(), self.fps, self.force);
+            let names = names_of_views(path, config.views.len())?;
+            let config = SinkConfig { format, size, frames, fps, colours, coloured_array, force };
+            names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
         };
-        let errors = of_errors.map(|(path, format)| sink(path, format, seen.errors, false)).transpose()?;
-        let pictures = sink(&self.output, format, range, coloured_array)?;
-        if errors.as_ref().is_some_and(|e| e.path() == pictures.path()) {
+        let errors = of_errors.map_or(Ok(Vec::new()), |(path, format)| sinks(path, format, seen.errors, false))?;
+        let pictures = sinks(&self.output, format, range, coloured_array)?;
+        if errors.first().is_some_and(|e| e.path() == pictures[0].path()) {
             return Err(Error::usage(NOT_ITS_OWN));
         }
         Ok((pictures, errors))
@@ -256,14 +267,7 @@ impl Cli {
         }
         let all = scene.frames().unwrap_or(0);
         Ok(RenderConfig {
-            view: View {
-                azimuth: self.view.0[0],
-                elevation: self.view.0[1],
-                roll: self.roll,
-                size: self.size.0,
-                scale: self.scale,
-                center: self.center.map(|c| c.0),
-            },
+            views: self.views(),
             kernel: Kernel::new(self.sigma, self.tau, grid)?,
             quantity: match self.quantity {
                 QuantityName::Mean => Quantity::Mean,
@@ -277,6 +281,24 @@ impl Cli {
             certify: self.error_image.is_some(),
             memory: self.common.memory.0,
         })
+    }
+
+    /// All views, each with those of its orbit.
+    fn views(&self) -> Vec<View> {
+        let orbit = |first: &Pair| {
+            let [azimuth, elevation] = first.0;
+            let steps = (0..self.orbit).map(|n| f64::from(n) * 360.0 / f64::from(self.orbit));
+            steps.map(move |turned| (azimuth + turned, elevation))
+        };
+        let view = |(azimuth, elevation)| View {
+            azimuth,
+            elevation,
+            roll: self.roll,
+            size: self.size.0,
+            scale: self.scale,
+            center: self.center.map(|c| c.0),
+        };
+        self.views.iter().flat_map(orbit).map(view).collect()
     }
 
     /// The error that samples may have under a looser tolerance, in their unit.
@@ -329,9 +351,11 @@ impl Ranges {
     fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
         const PIXELS: f64 = 64.0;
         const FRAMES: usize = 16;
-        let shrink = (PIXELS / small.view.size[0].max(small.view.size[1]) as f64).min(1.0);
-        small.view.size = small.view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
-        small.view.scale = small.view.scale.map(|s| s * shrink);
+        for view in &mut small.views {
+            let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
+            view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+            view.scale = view.scale.map(|s| s * shrink);
+        }
         let last = scene.frames().unwrap_or(1).saturating_sub(1);
         small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
         small.frames.dedup();
@@ -352,10 +376,17 @@ impl Ranges {
 fn summary(r: &RenderReport) -> String {
     let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
     let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
+    let mut methods: Vec<&str> = r.views.iter().map(|view| view.method).collect();
+    methods.dedup();
     format!(
-        "{} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
+        "{} views of {} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
          {} coefficients, {} left out",
-        r.frames, r.method, r.seconds, r.coefficients, r.left_out.coefficients
+        r.views.len(),
+        r.frames,
+        methods.join(" and "),
+        r.seconds,
+        r.coefficients,
+        r.left_out.coefficients
     )
 }
 

@@ -4,7 +4,7 @@ use super::RenderReport;
 use super::amounts::{BlockPlanes, Room};
 use super::eye::Eye;
 use super::lap;
-use super::lattice::{Cells, Gather, Lattice, Placed, Work};
+use super::lattice::{CellPlane, Cells, Gather, Lattice, Placed, Work};
 use super::splat::{Place, Splats, TILE, Tile};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
@@ -25,10 +25,23 @@ pub(super) trait Blocks: Sync {
 
 /// A band of a picture.
 pub(super) struct Canvas<'a> {
-    eye: &'a Eye,
-    rows: Range<usize>,
+    band: Band<'a>,
     planes: usize,
     sums: Sums<'a>,
+}
+
+/// Some rows of the picture of a view.
+#[derive(Clone)]
+struct Band<'a> {
+    eye: &'a Eye,
+    rows: Range<usize>,
+}
+
+impl Band<'_> {
+    /// Whether a block is to be splatted here.
+    fn sees(&self, block: usize) -> bool {
+        self.eye.sees(block, &self.rows)
+    }
 }
 
 enum Sums<'a> {
@@ -45,29 +58,15 @@ impl<'a> Canvas<'a> {
             Some(lattice) => Sums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
             None => Sums::Tiles(Place::cover(width, rows.clone(), TILE).into_iter().map(tile).collect()),
         };
-        Self { eye, rows, planes, sums }
-    }
-
-    /// Splats blocks in order, `batch` at a time.
-    pub(super) fn splat(
-        &mut self,
-        blocks: &[usize],
-        batch: usize,
-        source: &dyn Blocks,
-        report: &mut RenderReport,
-    ) -> Result<()> {
-        match &mut self.sums {
-            Sums::Tiles(tiles) => splat_into_tiles(self.eye, tiles, (blocks, batch), source, report),
-            Sums::Cells(lattice, cells) => splat_into_cells(self.eye, lattice, cells, (blocks, batch), source, report),
-        }
+        Self { band: Band { eye, rows }, planes, sums }
     }
 
     /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
     pub(super) fn finish<T: Send>(&self, pictures: &mut [T], finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync) {
-        let width = self.eye.camera.size[0];
-        let side = self.eye.lattice.as_ref().map_or(TILE, Lattice::tile);
+        let width = self.band.eye.camera.size[0];
+        let side = self.band.eye.lattice.as_ref().map_or(TILE, Lattice::tile);
         let columns = width.div_ceil(side);
-        let places = Place::cover(width, self.rows.clone(), side);
+        let places = Place::cover(width, self.band.rows.clone(), side);
         let bands = self.by_rows_of_tiles(pictures, side);
         places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
             let mut pixels = Pixels { planes, width, top: places[0].y.start };
@@ -83,11 +82,11 @@ impl<'a> Canvas<'a> {
 
     /// For every row of tiles its rows of every picture.
     fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
-        let [width, height] = self.eye.camera.size;
+        let [width, height] = self.band.eye.camera.size;
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
-        bands.resize_with(self.rows.len().div_ceil(side), Vec::new);
+        bands.resize_with(self.band.rows.len().div_ceil(side), Vec::new);
         for picture in pictures.chunks_exact_mut(width * height) {
-            let rows = picture[self.rows.start * width..self.rows.end * width].chunks_mut(side * width);
+            let rows = picture[self.band.rows.start * width..self.band.rows.end * width].chunks_mut(side * width);
             bands.iter_mut().zip(rows).for_each(|(band, rows)| band.push(rows));
         }
         bands
@@ -148,78 +147,135 @@ impl<T: Copy> Pixels<'_, T> {
     }
 }
 
+/// Splats blocks in order, `batch` at a time, each into all canvases that see it. It is decoded once for those that take
+/// footprints, and once for those that have a lattice.
+pub(super) fn splat(
+    canvases: &mut [Canvas<'_>],
+    blocks: &[usize],
+    batch: usize,
+    source: &dyn Blocks,
+    report: &mut RenderReport,
+) -> Result<()> {
+    let (mut tiles, mut cells) = (Vec::new(), Vec::new());
+    for Canvas { band, sums, .. } in canvases {
+        match sums {
+            Sums::Tiles(of_band) => tiles.push((band.clone(), of_band)),
+            Sums::Cells(lattice, of_band) => cells.push((band.clone(), (*lattice, of_band))),
+        }
+    }
+    let (bands, tiles): (Vec<_>, Vec<_>) = tiles.into_iter().unzip();
+    splat_into_tiles(&bands, tiles, (blocks, batch), source, report)?;
+    let (bands, cells): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
+    splat_into_cells(&bands, cells, (blocks, batch), source, report)
+}
+
 /// Footprints of all voxels, tile by tile.
 fn splat_into_tiles(
-    eye: &Eye,
-    tiles: &mut [Tile],
+    bands: &[Band<'_>],
+    mut tiles: Vec<&mut Vec<Tile>>,
     blocks: (&[usize], usize),
     source: &dyn Blocks,
     report: &mut RenderReport,
 ) -> Result<()> {
-    let Eye { grid, camera, footprint, clip, .. } = eye;
     let project = |block: usize| {
         let terms = source.terms(block)?;
-        let held = [terms.coefficients, terms.bytes_read];
-        Ok((Splats::new(terms, &eye.blocks.region(block), clip, grid, camera, footprint), held))
+        let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.eye));
+        let (seen, held) = (bands.iter().map(splats).collect(), [terms.coefficients, terms.bytes_read]);
+        Ok(BlockInBands { block: terms, seen, held })
     };
-    in_batches(blocks, report, project, |splats| {
-        tiles.par_iter_mut().for_each(|tile| splats.iter().for_each(|(s, _)| tile.splat(s, footprint)));
+    in_batches(bands, blocks, report, project, |blocks| {
+        for (n, tiles) in tiles.iter_mut().enumerate() {
+            let footprint = &bands[n].eye.footprint;
+            tiles.par_iter_mut().for_each(|tile| {
+                for BlockInBands { block: terms, seen, .. } in blocks {
+                    seen[n].iter().for_each(|splats| tile.splat(splats, terms, footprint));
+                }
+            });
+        }
         Ok(())
     })
 }
 
 /// Amounts of all voxels, plane by plane.
 fn splat_into_cells(
-    eye: &Eye,
-    lattice: &Lattice,
-    cells: &mut Cells,
+    bands: &[Band<'_>],
+    cells: Vec<(&Lattice, &mut Cells)>,
     blocks: (&[usize], usize),
     source: &dyn Blocks,
     report: &mut RenderReport,
 ) -> Result<()> {
     // Used again: memory fresh from the system costs as much as what it is for.
     let spare = Mutex::default();
+    let (lattices, mut cells): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
     let place = |block: usize| {
         let planes = source.planes(block)?;
-        let held = planes.held();
-        Ok(((lattice.placed(&eye.blocks.region(block), &eye.clip), planes), held))
+        let placed = |(band, lattice): (&Band<'_>, &&Lattice)| {
+            band.sees(block).then(|| lattice.placed(&band.eye.blocks.region(block), &band.eye.clip))
+        };
+        let (seen, held) = (bands.iter().zip(&lattices).map(placed).collect(), planes.held());
+        Ok(BlockInBands { block: planes, seen, held })
     };
-    in_batches(blocks, report, place, |blocks| add_planes(cells, blocks, &spare))
+    in_batches(bands, blocks, report, place, |blocks| add_planes(&mut cells, blocks, &spare))
 }
 
-type BlockInCells<'a> = ((Placed, Box<dyn BlockPlanes + 'a>), [u64; 2]);
+/// A block that has been read, where it is in every band that sees it, its coefficients and the bytes read for them.
+struct BlockInBands<B, S> {
+    block: B,
+    seen: Vec<Option<S>>,
+    held: [u64; 2],
+}
 
 /// Adds blocks to every plane of cells.
-fn add_planes(cells: &mut Cells, blocks: &[BlockInCells<'_>], spare: &Mutex<Vec<(Room, Work)>>) -> Result<()> {
+fn add_planes(
+    cells: &mut [&mut Cells],
+    blocks: &[BlockInBands<Box<dyn BlockPlanes + '_>, Placed>],
+    spare: &Mutex<Vec<(Room, Work)>>,
+) -> Result<()> {
     let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
-    cells.planes_mut().into_par_iter().enumerate().try_for_each(|(plane, mut sums)| {
+    by_planes(cells).into_par_iter().enumerate().try_for_each(|(plane, mut bands)| {
         let (mut room, mut work) = spare().pop().unwrap_or_default();
-        for ((placed, block), _) in blocks {
-            placed.add(block.plane(plane, &mut room)?, &mut sums, &mut work);
+        for BlockInBands { block, seen, .. } in blocks {
+            let amounts = block.plane(plane, &mut room)?;
+            for (sums, placed) in bands.iter_mut().zip(seen) {
+                placed.iter().for_each(|placed| placed.add(amounts, sums, &mut work));
+            }
         }
         spare().push((room, work));
         Ok(())
     })
 }
 
-/// Makes something of every block, in order and `batch` at a time, each with its coefficients and the bytes read for them,
-/// and adds it.
-fn in_batches<T: Send>(
+/// For every plane its cells in all bands.
+fn by_planes<'a>(cells: &'a mut [&mut Cells]) -> Vec<Vec<CellPlane<'a>>> {
+    let mut planes: Vec<Vec<CellPlane<'_>>> = Vec::new();
+    for of_band in cells {
+        let of_band = of_band.planes_mut();
+        planes.resize_with(of_band.len(), Vec::new);
+        planes.iter_mut().zip(of_band).for_each(|(plane, sums)| plane.push(sums));
+    }
+    planes
+}
+
+/// Makes something of every block that a band sees, in order and `batch` at a time, and adds it.
+fn in_batches<B: Send, S: Send>(
+    bands: &[Band<'_>],
     (blocks, batch): (&[usize], usize),
     report: &mut RenderReport,
-    make: impl Fn(usize) -> Result<(T, [u64; 2])> + Sync,
-    mut add: impl FnMut(&[(T, [u64; 2])]) -> Result<()>,
+    make: impl Fn(usize) -> Result<BlockInBands<B, S>> + Sync,
+    mut add: impl FnMut(&[BlockInBands<B, S>]) -> Result<()>,
 ) -> Result<()> {
     let mut clock = Instant::now();
-    for blocks in blocks.chunks(batch) {
+    let seen: Vec<usize> = blocks.iter().copied().filter(|b| bands.iter().any(|band| band.sees(*b))).collect();
+    for blocks in seen.chunks(batch) {
         let made = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
         lap(&mut clock, &mut report.decode_seconds);
         add(&made)?;
-        for (_, [coefficients, bytes_read]) in &made {
+        for BlockInBands { held: [coefficients, bytes_read], .. } in &made {
             report.coefficients += coefficients;
             report.bytes_read += bytes_read;
         }
         lap(&mut clock, &mut report.splat_seconds);
     }
+    report.blocks_read += seen.len() as u64;
     Ok(())
 }

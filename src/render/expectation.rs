@@ -13,16 +13,22 @@
 //! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
 //! voxels, and what is missing to be there.
 
-use super::weights::Weights;
-use super::{Eye, Quantity};
-use crate::volume::Region;
+use super::{Look, Quantity, RenderConfig};
+use crate::volume::{Grid, Region};
 use std::f64::consts::PI;
+
+/// Views that errors are seen in, their pixels counted as those of one picture.
+#[derive(Debug, Clone)]
+pub struct Expectation<'a> {
+    views: Vec<InView<'a>>,
+    /// n.
+    footprint: f64,
+}
 
 /// A view that errors are seen in.
 #[derive(Debug, Clone, Copy)]
-pub struct Expectation<'a> {
-    eye: &'a Eye,
-    weights: &'a Weights,
+struct InView<'a> {
+    look: &'a Look,
     quantity: Quantity,
     /// Pixels that are not background.
     pixels: f64,
@@ -30,8 +36,6 @@ pub struct Expectation<'a> {
     unit: f64,
     /// a / w.
     area: f64,
-    /// n.
-    footprint: f64,
 }
 
 /// What a block's errors, of a mean square of 1, come to in the mean square over pixels.
@@ -56,23 +60,16 @@ impl Seen {
 }
 
 impl<'a> Expectation<'a> {
-    pub(super) fn new(eye: &'a Eye, quantity: Quantity, weights: &'a Weights) -> Self {
-        let (mut pixels, mut squares) = (0.0, 0.0);
-        for sum in weights.shown() {
-            pixels += 1.0;
-            squares += sum * sum;
-        }
-        let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
-        let unit = if quantity == Quantity::Mean { 1.0 } else { squares / pixels };
-        let cell: f64 = eye.grid.spacing.iter().product();
-        let (area, sigma) = (eye.footprint.area(), eye.footprint.deviation() / eye.camera.scale);
+    pub(super) fn new(looks: &'a [Look], config: &RenderConfig, grid: &Grid) -> Self {
+        let cell: f64 = grid.spacing.iter().product();
+        let sigma = config.kernel.sigma;
         let footprint = 4.0 * PI * sigma * sigma / libm::cbrt(cell * cell);
-        Self { eye, weights, quantity, pixels, unit, area, footprint }
+        Self { views: looks.iter().map(|look| InView::new(look, config.quantity)).collect(), footprint }
     }
 
     /// The mean square over pixels that samples come to which all are off by `error`.
     pub(super) fn allowed(&self, error: f64) -> f64 {
-        error * error * self.unit
+        error * error * self.views.iter().map(|view| view.unit).sum::<f64>() / self.views.len() as f64
     }
 
     /// F of boxes of `side` voxels.
@@ -83,7 +80,26 @@ impl<'a> Expectation<'a> {
 
     /// What the errors of the block at `region` come to.
     pub(super) fn of_block(&self, region: &Region) -> Seen {
-        let clip = region.intersect(&self.eye.clip);
+        let seen: Vec<Seen> = self.views.iter().map(|view| view.of_block(region)).collect();
+        let mean = |of: fn(&Seen) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
+        Seen { together: mean(|s| s.together), apart: mean(|s| s.apart) }
+    }
+}
+
+impl<'a> InView<'a> {
+    fn new(look: &'a Look, quantity: Quantity) -> Self {
+        let (mut pixels, mut squares) = (0.0, 0.0);
+        for sum in look.weights.shown() {
+            pixels += 1.0;
+            squares += sum * sum;
+        }
+        let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
+        let unit = if quantity == Quantity::Mean { 1.0 } else { squares / pixels };
+        Self { look, quantity, pixels, unit, area: look.eye.footprint.area() }
+    }
+
+    fn of_block(&self, region: &Region) -> Seen {
+        let clip = region.intersect(&self.look.eye.clip);
         let mut seen = Seen::default();
         let mut points = 0.0;
         for voxel in spread(&clip) {
@@ -98,9 +114,10 @@ impl<'a> Expectation<'a> {
 
     /// Summed over pixels.
     fn of_voxel(&self, voxel: [usize; 3]) -> Seen {
-        let [x, y, z] = self.eye.camera.project(self.eye.grid.position(voxel));
-        let Some(sum) = self.weights.near([x, y], self.eye.footprint.reach) else { return Seen::default() };
-        let weight = self.eye.footprint.at_depth(z);
+        let Look { eye, weights } = self.look;
+        let [x, y, z] = eye.camera.project(eye.grid.position(voxel));
+        let Some(sum) = weights.near([x, y], eye.footprint.reach) else { return Seen::default() };
+        let weight = eye.footprint.at_depth(z);
         let unit = if self.quantity == Quantity::Mean { 1.0 } else { sum * sum };
         let together = self.area * weight / sum * unit;
         Seen { together, apart: together * (0.5 * weight / sum) }

@@ -6,7 +6,7 @@ use super::splat::{overlap, rows_reached};
 use super::uncut::Uncut;
 use super::weights::BACKGROUND;
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
-use crate::camera::Camera;
+use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
 use crate::footprint::{Footprint, Kernel, Method};
 use crate::volume::{BlockGrid, Grid, Region};
@@ -36,7 +36,7 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    pub(super) fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<Self> {
+    pub(super) fn new(scene: &dyn Scene, config: &RenderConfig, view: &View) -> Result<Self> {
         let (grid, blocks) = (*scene.grid(), scene.blocks());
         let clip = config.region.unwrap_or(grid.whole());
         if !grid.whole().contains(&clip) || clip.is_empty() {
@@ -46,7 +46,7 @@ impl Eye {
         // Where weights are small, certificates would say little of looser cuts.
         let share = if config.certify && config.quantity == Quantity::Mean { BACKGROUND } else { 1.0 };
         let method = splat_method(config.quantity, share * config.splat_error);
-        let camera = Camera::new(&config.view, &grid)?;
+        let camera = Camera::new(view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, method)?;
         let nearest = camera.nearest_of(&grid.crop(&clip));
         if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {

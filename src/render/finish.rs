@@ -1,23 +1,29 @@
 //! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
 
-use super::Quantity;
 use super::canvas::{Finished, Pixels};
 use super::certificate::Certificate;
 use super::scene::{Group, Inverse};
 use super::terms::Layout;
 use super::weights::{PixelWeight, Weights};
+use super::{Look, Quantity, RenderConfig};
 use crate::wavelet::{LANES, Lane};
 
 /// What turns the planes of a group into pixels.
 pub(super) struct Finish<'a> {
-    pub(super) group: &'a dyn Group,
-    pub(super) layout: Layout,
-    pub(super) quantity: Quantity,
-    pub(super) weights: &'a Weights,
-    pub(super) certificate: Option<Certificate>,
+    group: &'a dyn Group,
+    layout: Layout,
+    quantity: Quantity,
+    weights: &'a Weights,
+    certificate: Option<Certificate>,
 }
 
-impl Finish<'_> {
+impl<'a> Finish<'a> {
+    /// For pictures of a view.
+    pub(super) fn new(group: &'a dyn Group, look: &'a Look, config: &RenderConfig) -> Self {
+        let certificate = config.certify.then(|| Certificate::new(&look.eye, config.quantity));
+        Self { group, layout: group.layout(), quantity: config.quantity, weights: &look.weights, certificate }
+    }
+
     /// Planes that a finished tile has: the frames, then their errors if they are certified.
     pub(super) fn planes(&self) -> usize {
         self.layout.frames * (1 + usize::from(self.certificate.is_some()))

@@ -39,13 +39,12 @@ pub use frames::FrameScene;
 pub use scene::{LeftOut, Scene};
 
 use crate::camera::View;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::footprint::{Kernel, Method};
 use crate::progress::Progress;
 use crate::volume::Region;
 use amounts::BlockPlanes;
 use canvas::{Blocks, Canvas};
-use certificate::Certificate;
 use eye::Eye;
 use finish::Finish;
 use plan::Budget;
@@ -67,8 +66,8 @@ pub enum Quantity {
 /// How to render.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
-    /// From where.
-    pub view: View,
+    /// From where; pictures of all views are equally large.
+    pub views: Vec<View>,
     /// The kernel.
     pub kernel: Kernel,
     /// What a pixel means.
@@ -98,28 +97,43 @@ pub enum Limit {
     /// The largest of any sample, and so of any pixel of a mean.
     #[default]
     Certified,
-    /// The root mean square over the pixels of a window's pictures, as it is estimated.
+    /// The root mean square over the pixels of a window's pictures of a view, as it is estimated.
     Expected,
+}
+
+impl RenderConfig {
+    /// Width and height of the pictures.
+    fn size(&self) -> [usize; 2] {
+        self.views[0].size
+    }
+
+    /// Whether it depends on the view what is read of a file.
+    fn chooses_by_view(&self) -> bool {
+        self.allowed.is_some() && self.limited == Limit::Expected
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
+            return Err(Error::usage("takes one view or more, with pictures of one size"));
+        }
+        Ok(())
+    }
 }
 
 /// What a rendering did.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RenderReport {
-    /// Frames rendered.
+    /// Frames rendered, of every view.
     pub frames: usize,
-    /// The splat method.
-    pub method: &'static str,
-    /// Its stated error, in the terms of the splat error that was asked for.
-    pub stated_splat_error: f64,
-    /// Pixels per world unit.
-    pub scale: f64,
+    /// How each view was splatted.
+    pub views: Vec<ViewReport>,
     /// Blocks that the scene holds, over all windows touched.
     pub blocks: u64,
     /// Blocks that were decoded, each time counted.
     pub blocks_read: u64,
     /// Blocks left out because they hold nothing in the region.
     pub blocks_empty: u64,
-    /// Blocks left out because no pixel sees them.
+    /// Blocks left out because no pixel of any view sees them.
     pub blocks_outside: u64,
     /// Blocks left out because they lie so deep that what they add is within the splat error.
     pub blocks_dimmed: u64,
@@ -150,13 +164,38 @@ pub struct RenderReport {
     pub seconds: f64,
 }
 
+/// How a view was splatted.
+#[derive(Debug, Clone, Serialize)]
+pub struct ViewReport {
+    /// Degrees, as asked for.
+    pub azimuth: f64,
+    /// Degrees, as asked for.
+    pub elevation: f64,
+    /// Pixels per world unit.
+    pub scale: f64,
+    /// The splat method.
+    pub method: &'static str,
+    /// Its stated error, in the terms of the splat error that was asked for.
+    pub stated_splat_error: f64,
+}
+
+impl ViewReport {
+    fn new(view: &View, eye: &Eye) -> Self {
+        let &View { azimuth, elevation, .. } = view;
+        let (scale, method, stated_splat_error) = (eye.camera.scale, eye.method.name, eye.stated_error);
+        Self { azimuth, elevation, scale, method, stated_splat_error }
+    }
+}
+
 /// A finished picture: `width * height` numbers, row by row.
 pub type Picture<'a> = &'a [f32];
 
 /// A frame as it was rendered.
 #[derive(Debug, Clone, Copy)]
 pub struct Rendered<'a> {
-    /// Its number.
+    /// The number of the view.
+    pub view: usize,
+    /// That of the frame.
     pub frame: usize,
     /// The quantity asked for.
     pub picture: Picture<'a>,
@@ -165,7 +204,7 @@ pub struct Rendered<'a> {
     pub error: Option<Picture<'a>>,
 }
 
-/// Renders frames in order, giving each to `sink`.
+/// Renders all frames from all views, giving each to `sink`; those of one view come in order.
 pub fn render(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -173,44 +212,65 @@ pub fn render(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
+    config.check()?;
+    let eyes = config.views.iter().map(|view| Eye::new(scene, config, view)).collect::<Result<Vec<_>>>()?;
+    eyes.iter().try_for_each(|eye| Budget::new(config, scene, std::slice::from_ref(eye)).map(|_| ()))?;
+    progress.start(Some((eyes.len() * config.frames.len()) as u64));
+    let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
+    report.views = config.views.iter().zip(&eyes).map(|(view, eye)| ViewReport::new(view, eye)).collect();
     let mut sink_time = Duration::ZERO;
-    let eye = Eye::new(scene, config)?;
-    let method = eye.method;
-    let budget = Budget::new(config, scene, eye.lattice.as_ref())?;
-    progress.start(Some(config.frames.len() as u64));
-    let mut report = RenderReport { method: method.name, scale: eye.camera.scale, ..Default::default() };
-    report.stated_splat_error = eye.stated_error;
+    let mut sink = |rendered: Rendered<'_>| {
+        let writing = Instant::now();
+        sink(rendered)?;
+        sink_time += writing.elapsed();
+        progress.advance(1);
+        Ok(())
+    };
+    let mut first = 0;
+    while first < eyes.len() {
+        let budget = Budget::of_most(config, scene, &eyes[first..])?;
+        let of_round = |r: Rendered<'_>| sink(Rendered { view: first + r.view, ..r });
+        render_views(scene, config, &budget, &mut report, of_round)?;
+        first += budget.eyes().len();
+    }
+    progress.finish();
+    let pictures = eyes.len() * config.frames.len();
+    report.expected_error = (report.expected_error / pictures.max(1) as f64).sqrt();
+    report.seconds = (started.elapsed() - sink_time).as_secs_f64();
+    Ok(report)
+}
+
+/// Renders all frames from views that go together.
+fn render_views(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    budget: &Budget<'_>,
+    report: &mut RenderReport,
+    mut sink: impl FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
     let mut clock = Instant::now();
-    let weights = Weights::new(&eye, config, &budget)?;
-    let expectation = Expectation::new(&eye, config.quantity, &weights);
+    let looks = budget.eyes().iter().map(|eye| Look::new(eye, config, budget)).collect::<Result<Vec<_>>>()?;
+    let expectation = Expectation::new(&looks, config, scene.grid());
     lap(&mut clock, &mut report.weight_seconds);
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
-        let end = scene.group_end(*first);
-        let most = rest.partition_point(|f| *f < end);
+        let most = plan::in_group(scene, *first, rest);
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
         let pictures = loop {
             let before = report.clone();
             let group = scene.group(now, config, &expectation)?;
-            let pictures = render_group(group.as_ref(), &eye, config, &weights, &budget, &mut report)?;
+            let pictures = render_group(group.as_ref(), &looks, config, budget, report)?;
             match group.finish()? {
                 Read::AsExpected => break pictures,
-                Read::Otherwise => report = before,
+                Read::Otherwise => *report = before,
             }
         };
-        for rendered in pictures.frames(now) {
-            let writing = Instant::now();
-            sink(rendered)?;
-            sink_time += writing.elapsed();
-            progress.advance(1);
+        for (view, pictures) in pictures.iter().enumerate() {
+            pictures.frames(view, now).try_for_each(&mut sink)?;
         }
-        report.frames += now.len();
         rest = later;
     }
-    progress.finish();
-    report.expected_error = (report.expected_error / report.frames.max(1) as f64).sqrt();
-    report.seconds = (started.elapsed() - sink_time).as_secs_f64();
-    Ok(report)
+    Ok(())
 }
 
 /// What splatting may add by default to pictures of a file of such a tolerance, or of frames: half of that, at most 1e-3.
@@ -248,7 +308,20 @@ impl Blocks for &dyn Group {
     }
 }
 
-/// The pictures of a group.
+/// A view, and its sums of weights.
+#[derive(Debug)]
+struct Look {
+    eye: Eye,
+    weights: Weights,
+}
+
+impl Look {
+    fn new(eye: &Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
+        Ok(Self { weights: Weights::new(eye, config, budget)?, eye: eye.clone() })
+    }
+}
+
+/// The pictures of a group from one view.
 struct Pictures {
     pixels: usize,
     /// Those of the frames, and if they are certified, those of their errors.
@@ -256,10 +329,11 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn frames<'a>(&'a self, numbers: &'a [usize]) -> impl Iterator<Item = Rendered<'a>> {
+    fn frames<'a>(&'a self, view: usize, numbers: &'a [usize]) -> impl Iterator<Item = Rendered<'a>> {
         let (values, errors) = self.all.split_at(numbers.len() * self.pixels);
         let of = |all: &'a [f32], i: usize| all.get(i * self.pixels..(i + 1) * self.pixels);
         numbers.iter().enumerate().map(move |(i, frame)| Rendered {
+            view,
             frame: *frame,
             picture: of(values, i).unwrap_or_default(),
             error: of(errors, i),
@@ -267,43 +341,45 @@ impl Pictures {
     }
 }
 
-/// Renders all frames of a group.
+/// Renders all frames of a group from some views.
 fn render_group(
     group: &dyn Group,
-    eye: &Eye,
+    looks: &[Look],
     config: &RenderConfig,
-    weights: &Weights,
-    budget: &Budget,
+    budget: &Budget<'_>,
     report: &mut RenderReport,
-) -> Result<Pictures> {
+) -> Result<Vec<Pictures>> {
     let layout = group.layout();
-    let certificate = config.certify.then(|| Certificate::new(eye, config.quantity));
-    let finish = Finish { group, layout, quantity: config.quantity, weights, certificate };
-    let blocks = blocks_to_read(group, eye, report)?;
-    let mut pictures = vec![f32::NAN; finish.planes() * eye.pixels()];
+    let blocks = blocks_to_read(group, looks, report)?;
+    let finish: Vec<Finish<'_>> = looks.iter().map(|look| Finish::new(group, look, config)).collect();
+    let empty = |finish: &Finish<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
+    let mut pictures: Vec<Vec<f32>> = finish.iter().map(empty).collect();
     for rows in budget.bands(&layout) {
-        let seen: Vec<usize> = blocks.iter().copied().filter(|b| eye.reaches(*b, &rows)).collect();
-        report.blocks_read += seen.len() as u64;
-        let mut canvas = Canvas::new(eye, rows.clone(), &layout);
-        canvas.splat(&seen, budget.batch(&layout, rows.len()), &group, report)?;
+        let mut canvases: Vec<_> = looks.iter().map(|look| Canvas::new(&look.eye, rows.clone(), &layout)).collect();
+        canvas::splat(&mut canvases, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
         let mut clock = Instant::now();
-        canvas.finish(&mut pictures, |tile, pixels| finish.tile(tile, pixels));
+        for ((canvas, finish), pictures) in canvases.into_iter().zip(&finish).zip(&mut pictures) {
+            canvas.finish(pictures, |tile, pixels| finish.tile(tile, pixels));
+        }
         lap(&mut clock, &mut report.inverse_seconds);
     }
-    if certificate.is_some() {
-        let errors = pictures[layout.frames * eye.pixels()..].iter().map(|e| f64::from(*e));
-        report.certified_error = Some(errors.fold(report.certified_error.unwrap_or(0.0), f64::max));
+    if config.certify {
+        let of_errors = pictures.iter().flat_map(|all| &all[layout.frames * budget.pixels()..]);
+        let largest = of_errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
+        report.certified_error = Some(largest);
     }
-    Ok(Pictures { pixels: eye.pixels(), all: pictures })
+    Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
 }
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
-fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Vec<usize>> {
+fn blocks_to_read(group: &dyn Group, looks: &[Look], report: &mut RenderReport) -> Result<Vec<usize>> {
+    let eye = &looks[0].eye;
+    let all_rows = 0..eye.camera.size[1];
     let Contents { mut blocks, empty, left_out, other_frames, certified, expected } = group.blocks(&eye.clip)?;
     let held = blocks.len();
-    blocks.retain(|b| eye.reaches(*b, &(0..eye.camera.size[1])));
+    blocks.retain(|b| looks.iter().any(|look| look.eye.reaches(*b, &all_rows)));
     let reached = blocks.len();
-    blocks.retain(|b| !eye.is_too_deep(*b));
+    blocks.retain(|b| looks.iter().any(|look| look.eye.sees(*b, &all_rows)));
     report.blocks += eye.blocks.len() as u64;
     report.blocks_empty += empty;
     report.blocks_outside += (held - reached) as u64;
@@ -311,7 +387,7 @@ fn blocks_to_read(group: &dyn Group, eye: &Eye, report: &mut RenderReport) -> Re
     report.left_out += left_out;
     report.other_frames += other_frames;
     report.certified_sample_error = report.certified_sample_error.max(certified);
-    // Frame by frame, so that it is the same however frames are grouped.
-    (0..group.layout().frames).for_each(|_| report.expected_error += expected);
+    // Picture by picture, so that it is the same however frames are grouped.
+    (0..looks.len() * group.layout().frames).for_each(|_| report.expected_error += expected);
     Ok(blocks)
 }

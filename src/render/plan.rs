@@ -3,7 +3,7 @@
 //! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
 
 use super::RenderConfig;
-use super::lattice::Lattice;
+use super::eye::Eye;
 use super::scene::Scene;
 use super::splat::TILE;
 use super::terms::Layout;
@@ -12,9 +12,10 @@ use crate::memory;
 use crate::volume::Region;
 use std::ops::Range;
 
-/// What is allocated at once.
+/// What is allocated at once, for some views that are rendered together.
 #[derive(Debug)]
 pub(super) struct Budget<'a> {
+    eyes: &'a [Eye],
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
@@ -23,22 +24,21 @@ pub(super) struct Budget<'a> {
     /// The largest block.
     block: Region,
     block_bytes: usize,
-    lattice: Option<&'a Lattice>,
 }
 
 /// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
-    /// For pictures of a scene.
-    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, lattice: Option<&'a Lattice>) -> Result<Self> {
-        let size = config.view.size;
-        let fixed = memory::FIXED + size[0] * size[1] * WEIGHT_BYTES;
+    /// For pictures of a scene from these views.
+    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Result<Self> {
+        let size = config.size();
+        let fixed = memory::FIXED + eyes.len() * size[0] * size[1] * WEIGHT_BYTES;
         let numbers = 1 + usize::from(config.certify);
         let available = config.memory.saturating_sub(fixed);
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes(config));
-        let budget = Self { available, size, numbers, block, block_bytes, lattice };
-        let least = budget.picture_bytes(1) + budget.band_bytes(scene.most_planes(1, config), TILE) + block_bytes;
+        let budget = Self { eyes, available, size, numbers, block, block_bytes };
+        let least = budget.bytes(1, scene.most_planes(1, config), TILE);
         if least > budget.available {
             let mib = (fixed + least).div_ceil(1 << 20);
             let threads = rayon::current_num_threads();
@@ -51,49 +51,94 @@ impl<'a> Budget<'a> {
         Ok(budget)
     }
 
-    /// Finished pictures of a group, as f32.
-    fn picture_bytes(&self, frames: usize) -> usize {
-        frames * self.numbers * self.size[0] * self.size[1] * size_of::<f32>()
+    /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
+    /// alone. Where what is read is chosen by the view, that is one.
+    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Result<Self> {
+        let alone = Self::new(config, scene, &eyes[..1])?;
+        let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
+        let planes = scene.most_planes(frames, config);
+        let several = |count: usize| {
+            let budget = Self::new(config, scene, &eyes[..count]).ok()?;
+            (budget.bytes(frames, planes, budget.size[1]) <= budget.available).then_some(budget)
+        };
+        let most = if config.chooses_by_view() { 1 } else { eyes.len() };
+        Ok((2..=most).map_while(several).last().unwrap_or(alone))
     }
 
-    /// A band of so many rows with all planes.
+    /// The views.
+    pub(super) fn eyes(&self) -> &'a [Eye] {
+        self.eyes
+    }
+
+    /// Pixels of a picture.
+    pub(super) fn pixels(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Pictures of so many frames, bands of so many rows, and a block.
+    fn bytes(&self, frames: usize, planes: usize, rows: usize) -> usize {
+        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes
+    }
+
+    /// Finished pictures of a group, as f32.
+    fn picture_bytes(&self, frames: usize) -> usize {
+        self.eyes.len() * frames * self.numbers * self.size[0] * self.size[1] * size_of::<f32>()
+    }
+
+    /// Bands of so many rows with all planes, and what threads work with.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
-        let numbers = match self.lattice {
-            Some(lattice) => {
-                let scratch = lattice.scratch(&self.block, planes);
-                planes * lattice.band_cells(self.size[0], rows) + rayon::current_num_threads() * scratch
-            }
-            None => planes * self.size[0] * rows.next_multiple_of(TILE),
+        let band = |eye: &Eye| match &eye.lattice {
+            Some(lattice) => lattice.band_cells(self.size[0], rows),
+            None => self.size[0] * rows.next_multiple_of(TILE),
         };
+        let lattices = self.eyes.iter().filter_map(|eye| eye.lattice.as_ref());
+        let scratch = lattices.map(|lattice| lattice.scratch(&self.block, planes)).max().unwrap_or(0);
+        let numbers = planes * self.eyes.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
         numbers * size_of::<f64>()
     }
 
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
-        let fits = |f: &usize| {
-            let rows = self.size[1].min(FEW_ROWS * TILE);
-            let band = self.band_bytes(scene.most_planes(*f, config), rows);
-            self.picture_bytes(*f) + band + self.block_bytes <= self.available
-        };
+        let rows = self.size[1].min(FEW_ROWS * TILE);
+        let fits = |f: &usize| self.bytes(*f, scene.most_planes(*f, config), rows) <= self.available;
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
     /// The bands of rows to splat one after another, each as tall as fits.
     pub(super) fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
-        let left = self.available - self.picture_bytes(layout.frames) - self.block_bytes;
-        let fits = |tiles: &usize| self.band_bytes(layout.planes(), tiles * TILE) <= left;
+        let fits = |tiles: &usize| self.bytes(layout.frames, layout.planes(), tiles * TILE) <= self.available;
         let rows = TILE * (1..=self.size[1].div_ceil(TILE)).rev().find(fits).unwrap_or(1);
         (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
-        let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
+        let used = self.bytes(layout.frames, layout.planes(), rows) - self.block_bytes;
         // What a lattice takes in plane by plane had better be near.
-        let most = if self.lattice.is_some() { rayon::current_num_threads() } else { memory::MOST_BLOCKS };
+        let most = if self.eyes.iter().any(|eye| eye.lattice.is_some()) {
+            rayon::current_num_threads()
+        } else {
+            memory::MOST_BLOCKS
+        };
         (self.available.saturating_sub(used) / self.block_bytes).clamp(1, most)
     }
 }
 
 /// Tiles across a band, at least, if it can be: blocks that reach over a band's edge are decoded for both.
 const FEW_ROWS: usize = 4;
+
+/// The most frames of one group.
+fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {
+    let mut most = 0;
+    while let Some(first) = frames.first() {
+        let (group, later) = frames.split_at(in_group(scene, *first, frames));
+        (most, frames) = (most.max(group.len()), later);
+    }
+    most
+}
+
+/// How many of some frames are of the same group as the first.
+pub(super) fn in_group(scene: &dyn Scene, first: usize, frames: &[usize]) -> usize {
+    let end = scene.group_end(first);
+    frames.partition_point(|f| *f < end)
+}

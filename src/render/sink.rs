@@ -129,21 +129,19 @@ impl Numbered {
     /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one picture.
     fn new(path: &Path, frames: usize) -> Result<Self> {
         let name = path.to_string_lossy().into_owned();
-        let Some((before, rest)) = name.split_once('%') else {
+        let Some((before, digits, after)) = place_of_number(&name, 'd') else {
+            if name.contains('%') {
+                return Err(misplaced(&name));
+            }
             if frames != 1 {
                 let what = format!("{name}: {frames} frames need a numbered name, as frame_%04d.png");
                 return Err(Error::usage(what));
             }
             return Ok(Self { before: name, after: String::new(), digits: None });
         };
-        let place = rest.split_once('d').filter(|(digits, after)| digits.len() < 4 && !after.contains('%'));
-        let parsed = place.and_then(|(digits, after)| {
-            let number = if digits.is_empty() { Some(1) } else { digits.parse().ok() };
-            number.map(|n: usize| (n, after))
-        });
-        let Some((digits, after)) = parsed else {
-            return Err(Error::usage(format!("{name}: the number's place is %d or, with zeros, %04d")));
-        };
+        if before.contains('%') || after.contains('%') {
+            return Err(misplaced(&name));
+        }
         Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
     }
 
@@ -152,6 +150,32 @@ impl Numbered {
             Some(digits) => format!("{}{frame:0digits$}{}", self.before, self.after).into(),
             None => PathBuf::from(&self.before),
         }
+    }
+}
+
+fn misplaced(name: &str) -> Error {
+    Error::usage(format!("{name}: the number's place is %d or, with zeros, %04d; that of a view's %v or %03v"))
+}
+
+/// What is before and behind the first `%d` or `%0Nd` of a name, for another letter `%v` or `%0Nv`, and its N.
+fn place_of_number(name: &str, letter: char) -> Option<(&str, usize, &str)> {
+    name.match_indices('%').find_map(|(at, _)| {
+        let (digits, after) = name[at + 1..].split_once(letter).filter(|(digits, _)| digits.len() < 4)?;
+        let number = if digits.is_empty() { Some(1) } else { digits.parse().ok() };
+        number.map(|number| (&name[..at], number, after))
+    })
+}
+
+/// A name for the pictures of each of some views, whose number takes the place of `%v` or, with zeros, `%03v`.
+pub fn names_of_views(path: &Path, views: usize) -> Result<Vec<PathBuf>> {
+    let name = path.to_string_lossy();
+    match place_of_number(&name, 'v') {
+        Some((_, _, after)) if place_of_number(after, 'v').is_some() => Err(misplaced(&name)),
+        Some((before, digits, after)) => {
+            Ok((0..views).map(|view| format!("{before}{view:0digits$}{after}").into()).collect())
+        }
+        None if views == 1 => Ok(vec![path.into()]),
+        None => Err(Error::usage(format!("{name}: {views} views need a name with their number, as view%v_%04d.png"))),
     }
 }
 
@@ -229,6 +253,16 @@ mod tests {
             assert!(name(bad, 0).is_err(), "{bad}");
         }
         assert_eq!(Numbered::new(Path::new("a.png"), 1).expect("one picture").of(5), Path::new("a.png"));
+    }
+
+    #[test]
+    fn views_have_names_of_their_own() {
+        let names = |path: &str, views| names_of_views(Path::new(path), views).map_err(|e| e.to_string());
+        assert_eq!(names("v%02v_%04d.png", 2).expect("a pattern"), ["v00_%04d.png", "v01_%04d.png"].map(PathBuf::from));
+        assert_eq!(names("a_%d.npy", 1).expect("one view"), [PathBuf::from("a_%d.npy")]);
+        for bad in ["a.npy", "-", "a%dv.npy", "%v%v.npy"] {
+            assert!(names(bad, 2).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.
 
+use super::eye::Eye;
 use super::terms::Terms;
 use crate::camera::Camera;
 use crate::footprint::Footprint;
@@ -79,8 +80,8 @@ impl Tile {
         }
     }
 
-    /// Adds a block's voxels.
-    pub(super) fn splat(&mut self, voxels: &Splats, footprint: &Footprint) {
+    /// Adds a block's voxels, of which these are the terms.
+    pub(super) fn splat(&mut self, voxels: &Splats, terms: &Terms, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;
         }
@@ -96,7 +97,7 @@ impl Tile {
             footprint.weights(voxel.y, &full_y, &mut column);
             let row = (x.start, &row[x.start - full_x.start..x.end - full_x.start]);
             let column = (y.start, &column[y.start - full_y.start..y.end - full_y.start]);
-            let (planes, amounts) = voxels.terms.of_voxel(voxel.index);
+            let (planes, amounts) = terms.of_voxel(voxel.index);
             match self.order {
                 Order::Planes => {
                     for (plane, amount) in planes.iter().zip(amounts) {
@@ -157,7 +158,6 @@ fn add_to_pixels(sums: &mut [f64], width: usize, amounts: &[f64], row: &[f64], c
 #[derive(Debug)]
 pub(super) struct Splats {
     voxels: Vec<Splat>,
-    terms: Terms,
     size: [usize; 2],
     /// Columns and rows of the picture that they reach.
     x: Range<usize>,
@@ -175,15 +175,10 @@ struct Splat {
 }
 
 impl Splats {
-    /// Projects the voxels of the block at `region` that lie in `clip` and have terms.
-    pub(super) fn new(
-        terms: Terms,
-        region: &Region,
-        clip: &Region,
-        grid: &Grid,
-        camera: &Camera,
-        footprint: &Footprint,
-    ) -> Self {
+    /// Projects the voxels of a block that are splatted and have terms.
+    pub(super) fn new(terms: &Terms, block: usize, eye: &Eye) -> Self {
+        let Eye { camera, footprint, grid, clip, .. } = eye;
+        let region = eye.blocks.region(block);
         let mut voxels = Vec::new();
         for v in region.intersect(clip).iter() {
             let index = region.index(v);
@@ -195,7 +190,7 @@ impl Splats {
         let size = camera.size;
         let x = reach(voxels.iter().map(|v| footprint.span(v.x, size[0])));
         let y = reach(voxels.iter().map(|v| footprint.span(v.y, size[1])));
-        Self { voxels, terms, size, x, y }
+        Self { voxels, size, x, y }
     }
 }
 

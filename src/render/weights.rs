@@ -1,7 +1,7 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
 use super::amounts::{BlockPlanes, OnesOf};
-use super::canvas::{Blocks, Canvas, Finished, Pixels};
+use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
 use super::certificate;
 use super::eye::Eye;
 use super::plan::Budget;
@@ -118,10 +118,10 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
         Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
-        let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).filter(|b| eye.sees(*b, &rows)).collect();
+        let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).collect();
         let mut canvas = Canvas::new(eye, rows.clone(), &layout);
         let (batch, report) = (budget.batch(&layout, rows.len()), &mut RenderReport::default());
-        canvas.splat(&blocks, batch, &Ones(&eye.blocks), report)?;
+        canvas::splat(std::slice::from_mut(&mut canvas), &blocks, batch, &Ones(&eye.blocks), report)?;
         canvas.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
     }
     Ok(out)

@@ -118,13 +118,16 @@ fn depths_beyond_an_exponential_are_right_or_refused() {
                     other => drop(other.unwrap()),
                 }
                 let (found, errors, report) = crate::common::rendered(&mut direct(&memory, None), &config);
-                let expected = deep_means(&grid, &config, report.scale, &values);
+                let expected = deep_means(&grid, &config, report.views[0].scale, &values);
                 for ((found, error), expected) in found.iter().zip(errors).zip(expected) {
                     let what = format!("sigma {sigma}, tau times depth {depths}, elevation {elevation}, {region:?}");
                     assert_eq!(found.is_nan(), expected.is_none(), "{what}");
                     let Some(expected) = expected else { continue };
                     let off = (f64::from(*found) - expected).abs();
-                    assert!(off <= report.stated_splat_error + rounding(*found), "{what}: {found} for {expected}");
+                    assert!(
+                        off <= report.views[0].stated_splat_error + rounding(*found),
+                        "{what}: {found} for {expected}"
+                    );
                     assert!(off <= f64::from(error), "{what}: {found} for {expected}, certified {error}");
                 }
             }
@@ -152,7 +155,7 @@ fn pixels_that_nothing_reaches_are_background_or_nothing() {
             let config = RenderConfig { certify: true, ..looking(view, 0.0, quantity, &SKEWED, 3) };
             let scene = &mut CoefficientScene::new(file.open(), What::Coefficients);
             let (found, errors, report) = crate::common::rendered(scene, &config);
-            let truth = truth(&SKEWED, &config, report.scale, &vec![1.0; 945], None);
+            let truth = truth(&SKEWED, &config, report.views[0].scale, &vec![1.0; 945], None);
             for (at, (found, error)) in found.iter().zip(&errors).enumerate().filter(|(at, _)| truth.weight[*at] == 0.0)
             {
                 match quantity {
@@ -178,7 +181,7 @@ fn voxels_far_smaller_than_a_pixel_are_numbers() {
             let truth = truth(&grid, &config, scale, &samples, None);
             for (at, found) in found.iter().enumerate() {
                 let unit = largest(&samples) * truth.largest_weight;
-                let most = report.stated_splat_error * unit + rounding(*found);
+                let most = report.views[0].stated_splat_error * unit + rounding(*found);
                 let right = match quantity {
                     Quantity::Emission => (f64::from(*found) - truth.emission[at]).abs() <= most,
                     Quantity::Mean => found.is_nan() != truth.mean[at].is_finite(),
@@ -199,11 +202,11 @@ fn pictures_of_the_largest_samples_are_numbers() {
         let file = stored(&mut memory.clone(), &settings(Basis::Haar, 4, tolerance));
         let config = looking(view(30.0, 20.0, [24, 20]), 0.0, Quantity::Mean, &SKEWED, 3);
         let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &config);
-        let truth = truth(&SKEWED, &config, report.scale, &values, None);
+        let truth = truth(&SKEWED, &config, report.views[0].scale, &values, None);
         let range = f64::from(f32::MAX) - f64::from(f32::MIN);
         for (found, expected) in found.iter().zip(&truth.mean) {
             assert_eq!(found.is_nan(), expected.is_nan());
-            let most = file.report.delta + report.stated_splat_error * range + rounding(*found);
+            let most = file.report.delta + report.views[0].stated_splat_error * range + rounding(*found);
             assert!(found.is_nan() || (f64::from(*found) - expected).abs() <= most, "{found} for {expected}");
         }
         // What a single cannot hold is infinite, never background.

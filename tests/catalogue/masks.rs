@@ -104,12 +104,12 @@ fn masks_that_touch_every_border_are_kept_and_not_shown() {
             assert!((0..holes.len()).all(|i| !holes[i] || same(i)), "border {n}");
             let look = looking(view(30.0, 25.0, [30, 24]), 0.1, Quantity::Mean, &SKEWED, FRAMES);
             let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
-            let truth = truth(&SKEWED, &look, report.scale, &values, Some(&holes));
+            let truth = truth(&SKEWED, &look, report.views[0].scale, &values, Some(&holes));
             let range = values.iter().fold((0.0_f64, 0.0_f64), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
             for (at, (found, expected)) in found.iter().zip(&truth.mean).enumerate() {
                 assert_eq!(found.is_nan(), expected.is_nan(), "border {n}");
                 let unit = (range.1 - range.0) * truth.largest_weight / truth.weight[at % truth.weight.len()];
-                let most = file.report.delta + report.stated_splat_error * unit + rounding(*found);
+                let most = file.report.delta + report.views[0].stated_splat_error * unit + rounding(*found);
                 assert!(found.is_nan() || (f64::from(*found) - expected).abs() <= most, "border {n}: {found}");
             }
         }

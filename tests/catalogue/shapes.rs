@@ -19,11 +19,11 @@ fn an_axis_of_length_1_is_like_any_other() {
         assert_eq!(extracted(&file.open()), *memory.frames);
         let look = looking(view(40.0, 35.0, [20, 20]), 0.1, Quantity::Mean, &grid, 6);
         let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
-        let truth = truth(&grid, &look, report.scale, &values, None);
+        let truth = truth(&grid, &look, report.views[0].scale, &values, None);
         let (lo, hi) = file.report.range;
         for (at, (found, expected)) in found.iter().zip(&truth.mean).enumerate() {
             let weight = truth.weight[at % truth.weight.len()] / truth.largest_weight;
-            let most = report.stated_splat_error * (hi - lo) / weight + rounding(*found);
+            let most = report.views[0].stated_splat_error * (hi - lo) / weight + rounding(*found);
             assert_eq!(found.is_nan(), expected.is_nan(), "{dims:?}");
             assert!(found.is_nan() || (f64::from(*found) - expected).abs() <= most, "{dims:?}");
         }

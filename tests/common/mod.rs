@@ -112,7 +112,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
     let kernel = Kernel::new(None, tau, grid).unwrap();
     let frames = (0..frames).collect();
     RenderConfig {
-        view,
+        views: vec![view],
         kernel,
         quantity,
         frames,

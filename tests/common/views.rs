@@ -52,7 +52,7 @@ pub(crate) fn truth(
 
 /// The lattice and the view in the reference's own terms.
 pub(crate) fn of_reference(grid: &Grid, config: &RenderConfig, scale: f64) -> (Lattice, camera::View) {
-    let View { azimuth, elevation, roll, size: [width, height], center, .. } = config.view;
+    let View { azimuth, elevation, roll, size: [width, height], center, .. } = config.views[0];
     let (sigma, tau) = (config.kernel.sigma, config.kernel.tau);
     let lattice = Lattice { dims: grid.dims, spacing: grid.spacing, origin: grid.origin };
     (lattice, camera::View { azimuth, elevation, roll, width, height, scale, center, sigma, tau })

@@ -100,7 +100,7 @@ impl Scene {
         let file = stored.open();
         let deltas: Vec<f64> = self.look.frames.iter().map(|f| self.delta(&file, *f)).collect();
         let (found, errors, report) = rendered(&mut CoefficientScene::new(file, self.what), &self.look);
-        let truth = self.truth(report.scale);
+        let truth = self.truth(report.views[0].scale);
         let (promised, quantity) = (self.look.allowed.is_none(), self.look.quantity);
         let pixels = found.len() / deltas.len();
         let mut compared = Compared { pixels: found.len(), ..Compared::default() };
@@ -161,7 +161,7 @@ impl Truth {
     /// the cut; and where the cut can leave out all that there is, as far from the volume, there is no mean.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let weight = self.images.weight[at];
-        let stated = report.stated_splat_error;
+        let stated = report.views[0].stated_splat_error;
         let share = if self.masked { stated } else { Method::EXACT.stated_error };
         (weight - BACKGROUND * self.largest_weight).abs() <= share * self.brightest || weight <= stated * self.brightest
     }
@@ -181,9 +181,11 @@ impl Truth {
             Quantity::Emission => {
                 // What sums in f64 leave of coefficients where samples are missing.
                 let left = if self.masked { 1e-15 * self.largest * self.brightest } else { 0.0 };
-                delta * self.images.weight[at] + report.stated_splat_error * magnitude * self.brightest + left
+                delta * self.images.weight[at] + report.views[0].stated_splat_error * magnitude * self.brightest + left
             }
-            Quantity::Mean => delta + report.stated_splat_error * (hi - lo) * self.brightest / self.images.weight[at],
+            Quantity::Mean => {
+                delta + report.views[0].stated_splat_error * (hi - lo) * self.brightest / self.images.weight[at]
+            }
         }
     }
 }

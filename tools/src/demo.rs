@@ -114,7 +114,7 @@ fn by_coefficients(files: &Files, name: &'static str, basis: Basis, window: usiz
 /// All frames of a scene, seen obliquely from above; attenuation lets the near face stand out.
 fn pictures(scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        view: View { azimuth: 25.0, elevation: 55.0, roll: 0.0, size: SIZE, scale: None, center: None },
+        views: vec![View { azimuth: 25.0, elevation: 55.0, roll: 0.0, size: SIZE, scale: None, center: None }],
         kernel: Kernel::new(None, 20.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: (0..FRAMES).collect(),

@@ -152,7 +152,7 @@ fn pictures(
     allowed: Option<(f64, Limit)>,
 ) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        view: Look::first(task.dims, SIZE).view(),
+        views: vec![Look::first(task.dims, SIZE).view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: (0..task.frames).collect(),

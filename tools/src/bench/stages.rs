@@ -137,7 +137,7 @@ fn by_library(
     sink: &mut dyn FnMut(wavesplat::render::Rendered<'_>),
 ) -> Result<Viewed> {
     let config = RenderConfig {
-        view: look.view(),
+        views: vec![look.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: (0..step.frames).collect(),
@@ -152,8 +152,8 @@ fn by_library(
         sink(rendered);
         Ok(())
     })?;
-    let stated_error = Some(report.stated_splat_error);
-    Ok(Viewed { seconds: report.seconds, splat: report.method.into(), stated_error })
+    let stated_error = Some(report.views[0].stated_splat_error);
+    Ok(Viewed { seconds: report.seconds, splat: report.views[0].method.into(), stated_error })
 }
 
 fn by_textbook(

@@ -174,7 +174,7 @@ fn region(view: &View, grid: &Grid) -> Region {
 
 fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[f32])) -> Result<Shown> {
     let config = RenderConfig {
-        view: view.look.view(),
+        views: vec![view.look.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: view.frames.clone(),
@@ -190,5 +190,5 @@ fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[
         Ok(())
     })?;
     let splatting = Some((report.decode_seconds + report.splat_seconds) / report.seconds);
-    Ok(Shown { splatting, method: report.method.into(), bytes: report.bytes_read })
+    Ok(Shown { splatting, method: report.views[0].method.into(), bytes: report.bytes_read })
 }
