@@ -1,8 +1,10 @@
 //! What a block adds to the planes of a picture, as amounts of its voxels and one plane at a time.
 
 use crate::codec::field::Plane;
+use crate::codec::real::Real;
 use crate::error::Result;
 use crate::sample::{SampleType, load_as};
+use multiversion::multiversion;
 
 /// The amounts of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +19,36 @@ pub enum Amounts<'a> {
     Few(&'a [(u32, f64)]),
 }
 
+impl Amounts<'_> {
+    /// Calls `visit(voxel, amount)` for all that are not zero, ascending.
+    pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
+        let mut all = |amounts: &mut dyn Iterator<Item = f64>| {
+            amounts.enumerate().filter(|(_, amount)| *amount != 0.0).for_each(|(voxel, amount)| visit(voxel, amount));
+        };
+        match self {
+            Self::Nothing => {}
+            Self::Single(amounts) => all(&mut amounts.iter().map(|amount| f64::from(*amount))),
+            Self::Double(amounts) => all(&mut amounts.iter().copied()),
+            Self::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| visit(*voxel as usize, *amount)),
+        }
+    }
+
+    /// Adds `factor` times each to the sums of the voxels.
+    pub(super) fn add_to(&self, factor: f64, sums: &mut [f64]) {
+        match self {
+            Self::Nothing => {}
+            Self::Single(amounts) => add_scaled(amounts, factor, sums),
+            Self::Double(amounts) => add_scaled(amounts, factor, sums),
+            Self::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| sums[*voxel as usize] += factor * amount),
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn add_scaled<R: Real>(amounts: &[R], factor: f64, sums: &mut [f64]) {
+    sums.iter_mut().zip(amounts).for_each(|(sum, amount)| *sum += factor * amount.to_f64());
+}
+
 impl<'a> From<Plane<'a>> for Amounts<'a> {
     fn from(plane: Plane<'a>) -> Self {
         match plane {
@@ -29,6 +61,9 @@ impl<'a> From<Plane<'a>> for Amounts<'a> {
 
 /// A block that has been read.
 pub trait BlockPlanes: Send + Sync {
+    /// Voxels of the block.
+    fn voxels(&self) -> usize;
+
     /// The amounts of a plane, which may be in `room`.
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>>;
 
@@ -84,6 +119,10 @@ impl Room {
 pub(super) struct OnesOf(pub(super) usize);
 
 impl BlockPlanes for OnesOf {
+    fn voxels(&self) -> usize {
+        self.0
+    }
+
     fn plane<'a>(&'a self, _: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
         room.single.clear();
         room.single.resize(self.0, 1.0);

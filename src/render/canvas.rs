@@ -4,7 +4,7 @@ use super::RenderReport;
 use super::amounts::{BlockPlanes, Room};
 use super::eye::Eye;
 use super::lap;
-use super::lattice::{CellPlane, Cells, Gather, Lattice, Placed, Work};
+use super::lattice::{CellPlane, Cells, Frame, Gather, Lattice, Placed, Work};
 use super::splat::{Place, Splats, TILE, Tile};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
@@ -16,10 +16,7 @@ use std::time::Instant;
 
 /// Where blocks come from.
 pub(super) trait Blocks: Sync {
-    /// The terms of a block.
-    fn terms(&self, block: usize) -> Result<Terms>;
-
-    /// The same, plane by plane.
+    /// What a block adds to the planes.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
 
@@ -157,6 +154,7 @@ pub(super) fn splat(
     report: &mut RenderReport,
 ) -> Result<()> {
     let (mut tiles, mut cells) = (Vec::new(), Vec::new());
+    let count = canvases.first().map_or(0, |canvas| canvas.planes);
     for Canvas { band, sums, .. } in canvases {
         match sums {
             Sums::Tiles(of_band) => tiles.push((band.clone(), of_band)),
@@ -164,23 +162,24 @@ pub(super) fn splat(
         }
     }
     let (bands, tiles): (Vec<_>, Vec<_>) = tiles.into_iter().unzip();
-    splat_into_tiles(&bands, tiles, (blocks, batch), source, report)?;
+    splat_into_tiles((&bands, count), tiles, (blocks, batch), source, report)?;
     let (bands, cells): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
     splat_into_cells(&bands, cells, (blocks, batch), source, report)
 }
 
-/// Footprints of all voxels, tile by tile.
+/// Footprints of all voxels, tile by tile with so many planes.
 fn splat_into_tiles(
-    bands: &[Band<'_>],
+    (bands, count): (&[Band<'_>], usize),
     mut tiles: Vec<&mut Vec<Tile>>,
     blocks: (&[usize], usize),
     source: &dyn Blocks,
     report: &mut RenderReport,
 ) -> Result<()> {
     let project = |block: usize| {
-        let terms = source.terms(block)?;
+        let planes = source.planes(block)?;
+        let terms = Terms::of(planes.as_ref(), count)?;
         let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.eye));
-        let (seen, held) = (bands.iter().map(splats).collect(), [terms.coefficients, terms.bytes_read]);
+        let (seen, held) = (bands.iter().map(splats).collect(), planes.held());
         Ok(BlockInBands { block: terms, seen, held })
     };
     in_batches(bands, blocks, report, project, |blocks| {
@@ -207,12 +206,14 @@ fn splat_into_cells(
     // Used again: memory fresh from the system costs as much as what it is for.
     let spare = Mutex::default();
     let (lattices, mut cells): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
+    let frames: Vec<Frame> = cells.iter().map(|cells| cells.frame()).collect();
     let place = |block: usize| {
         let planes = source.planes(block)?;
-        let placed = |(band, lattice): (&Band<'_>, &&Lattice)| {
-            band.sees(block).then(|| lattice.placed(&band.eye.blocks.region(block), &band.eye.clip))
+        let placed = |n: usize| {
+            let (eye, seen) = (bands[n].eye, bands[n].sees(block));
+            seen.then(|| lattices[n].placed(&eye.blocks.region(block), &eye.clip, &frames[n]))
         };
-        let (seen, held) = (bands.iter().zip(&lattices).map(placed).collect(), planes.held());
+        let (seen, held) = ((0..bands.len()).map(placed).collect(), planes.held());
         Ok(BlockInBands { block: planes, seen, held })
     };
     in_batches(bands, blocks, report, place, |blocks| add_planes(&mut cells, blocks, &spare))

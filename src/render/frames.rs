@@ -4,11 +4,11 @@ use super::RenderConfig;
 use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
 use super::scene::{Contents, FrameBounds, Group, Inverse, Read, SampleErrors, Scene};
-use super::terms::{Layout, Order, Terms};
+use super::terms::{Layout, Order};
 use crate::error::Result;
 use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};
-use crate::source::{Archive, FrameSource, FrameWindow, read_frames};
+use crate::source::{Archive, FrameSource, FrameWindow};
 use crate::volume::{BlockGrid, Grid, Region};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -56,9 +56,9 @@ impl Scene for FrameScene {
         2 * frames + 1
     }
 
-    fn block_bytes(&self, _config: &RenderConfig) -> usize {
-        // Samples in their type and as f64, and a term of ten bytes for each.
-        self.blocks().region(0).voxels() * GROUP * (self.archive.sample.size() + 8 + 10)
+    fn block_bytes(&self) -> usize {
+        // A plane of it, in the samples' type and as f64.
+        self.blocks().region(0).voxels() * (self.archive.sample.size() + 8)
     }
 
     fn group<'a>(
@@ -129,17 +129,6 @@ impl Group for FrameGroup<'_> {
         Ok(Contents { blocks, empty, ..Contents::default() })
     }
 
-    fn terms(&self, block: usize) -> Result<Terms> {
-        let (archive, region) = (self.archive, self.blocks.region(block));
-        let frames = self.frames.iter().copied();
-        let samples = read_frames(self.window.as_ref(), frames, &region, archive.sample)?;
-        let declared = self.missing_value;
-        if self.unexpected.is_some() {
-            sample::for_each_run(archive.sample, &samples, |_, values| self.note_missing(values));
-        }
-        Ok(Terms::of_samples(&self.layout, archive.sample, &samples, &[], |_, v| is_missing(v, declared)))
-    }
-
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         Ok(Box::new(FrameBlock { group: self, region: self.blocks.region(block) }))
     }
@@ -174,6 +163,10 @@ struct FrameBlock<'a> {
 }
 
 impl BlockPlanes for FrameBlock<'_> {
+    fn voxels(&self) -> usize {
+        self.region.voxels()
+    }
+
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
         let FrameGroup { archive, layout, window, frames, missing_value, .. } = self.group;
         let Some((frame, absent)) = layout.samples(plane) else { return Ok(Amounts::Nothing) };

@@ -17,6 +17,7 @@
 mod amounts;
 mod canvas;
 mod certificate;
+mod coded;
 mod coefficients;
 pub mod colour;
 mod expectation;
@@ -51,7 +52,6 @@ use plan::Budget;
 use scene::{Contents, Group, Read};
 use serde::Serialize;
 use std::time::{Duration, Instant};
-use terms::Terms;
 use weights::Weights;
 
 /// What a pixel means (method.md section 2).
@@ -299,10 +299,6 @@ fn lap(clock: &mut Instant, stage: &mut f64) {
 }
 
 impl Blocks for &dyn Group {
-    fn terms(&self, block: usize) -> Result<Terms> {
-        Group::terms(*self, block)
-    }
-
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         Group::planes(*self, block)
     }

@@ -6,7 +6,7 @@ use super::RenderConfig;
 use super::eye::Eye;
 use super::scene::Scene;
 use super::splat::TILE;
-use super::terms::Layout;
+use super::terms::{Layout, Terms};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::volume::Region;
@@ -36,7 +36,7 @@ impl<'a> Budget<'a> {
         let fixed = memory::FIXED + eyes.len() * size[0] * size[1] * WEIGHT_BYTES;
         let numbers = 1 + usize::from(config.certify);
         let available = config.memory.saturating_sub(fixed);
-        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes(config));
+        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
         let budget = Self { eyes, available, size, numbers, block, block_bytes };
         let least = budget.bytes(1, scene.most_planes(1, config), TILE);
         if least > budget.available {
@@ -77,7 +77,13 @@ impl<'a> Budget<'a> {
 
     /// Pictures of so many frames, bands of so many rows, and a block.
     fn bytes(&self, frames: usize, planes: usize, rows: usize) -> usize {
-        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes
+        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes)
+    }
+
+    /// A block, and its terms if there are tiles to splat.
+    fn block_bytes(&self, planes: usize) -> usize {
+        let tiles = self.eyes.iter().any(|eye| eye.lattice.is_none());
+        self.block_bytes + if tiles { self.block.voxels() * planes * Terms::BYTES } else { 0 }
     }
 
     /// Finished pictures of a group, as f32.
@@ -113,14 +119,14 @@ impl<'a> Budget<'a> {
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
-        let used = self.bytes(layout.frames, layout.planes(), rows) - self.block_bytes;
+        let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
         // What a lattice takes in plane by plane had better be near.
         let most = if self.eyes.iter().any(|eye| eye.lattice.is_some()) {
             rayon::current_num_threads()
         } else {
             memory::MOST_BLOCKS
         };
-        (self.available.saturating_sub(used) / self.block_bytes).clamp(1, most)
+        (self.available.saturating_sub(used) / self.block_bytes(layout.planes())).clamp(1, most)
     }
 }
 

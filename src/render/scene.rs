@@ -6,7 +6,7 @@
 use super::RenderConfig;
 use super::amounts::BlockPlanes;
 use super::expectation::Expectation;
-use super::terms::{Layout, Terms};
+use super::terms::Layout;
 use crate::error::Result;
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
@@ -29,8 +29,8 @@ pub trait Scene {
     /// An upper bound of the planes that `frames` frames of a group need.
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
 
-    /// An upper bound of the bytes that one block takes while its terms are made.
-    fn block_bytes(&self, config: &RenderConfig) -> usize;
+    /// An upper bound of the bytes that one block takes.
+    fn block_bytes(&self) -> usize;
 
     /// Opens some frames of one group, ascending.
     fn group<'a>(
@@ -49,10 +49,7 @@ pub trait Group: Sync {
     /// The blocks that touch `region` and have terms.
     fn blocks(&self, region: &Region) -> Result<Contents>;
 
-    /// The terms of a block.
-    fn terms(&self, block: usize) -> Result<Terms>;
-
-    /// The same terms, plane by plane; without those of error planes.
+    /// What a block adds to the planes.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 
     /// What gives the frames at some pixels from their planes, of which all but `used` are zero: the inverse transform (eq 8).

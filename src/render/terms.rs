@@ -1,7 +1,8 @@
 //! What a block adds to a picture: for each voxel some amounts in planes, and how the planes are used.
 
+use super::amounts::{BlockPlanes, Room};
 pub(super) use super::splat::Order;
-use crate::sample::{self, SampleType};
+use crate::error::Result;
 
 /// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
 /// missing in single frames and of what is missing in all of them, and last errors.
@@ -61,96 +62,55 @@ impl Layout {
 }
 
 /// What a block adds to the planes: for each voxel in array order, some (plane, amount).
-#[derive(Debug, Default)]
-pub struct Terms {
+#[derive(Debug)]
+pub(super) struct Terms {
+    /// Where those of each voxel end.
     ends: Vec<u32>,
     planes: Vec<u16>,
     amounts: Vec<f64>,
-    /// Nonzero coefficients among them.
-    pub coefficients: u64,
-    /// Stored bytes that were read for them.
-    pub bytes_read: u64,
 }
 
 impl Terms {
-    /// Without a voxel yet.
-    pub fn new(bytes_read: u64) -> Self {
-        Self { bytes_read, ..Self::default() }
-    }
+    /// What a term takes, as it is found and in its voxel's place.
+    pub(super) const BYTES: usize = 16 + 10;
 
-    /// One term of 1 in plane 0 for every voxel: what the weights are made of.
-    pub fn ones(voxels: usize) -> Self {
-        let mut terms = Self::default();
-        for _ in 0..voxels {
-            terms.add(0, 1.0);
-            terms.end_voxel();
+    /// What a block has in so many planes.
+    pub(super) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
+        let (mut found, mut room) = (Vec::new(), Room::default());
+        let mut ends = vec![0_u32; block.voxels() + 1];
+        for plane in 0..planes {
+            block.plane(plane, &mut room)?.for_each(|voxel, amount| {
+                found.push((voxel as u32, plane as u16, amount));
+                ends[voxel + 1] += 1;
+            });
         }
-        terms
+        for voxel in 1..ends.len() {
+            ends[voxel] += ends[voxel - 1];
+        }
+        let mut terms = Self { planes: vec![0; found.len()], amounts: vec![0.0; found.len()], ends };
+        found.into_iter().for_each(|(voxel, plane, amount)| terms.put(voxel as usize, plane, amount));
+        terms.ends.pop();
+        Ok(terms)
     }
 
-    /// Adds a term to the current voxel.
-    pub fn add(&mut self, plane: usize, amount: f64) {
-        self.planes.push(plane as u16);
-        self.amounts.push(amount);
-    }
-
-    /// Adds errors of the current voxel, one for each error plane.
-    pub(super) fn add_errors(&mut self, layout: &Layout, errors: &[f64]) {
-        let planes = layout.first_error()..layout.planes();
-        planes.zip(errors).filter(|(_, e)| **e > 0.0).for_each(|(plane, e)| self.add(plane, *e));
-    }
-
-    /// Goes on to the next voxel.
-    pub fn end_voxel(&mut self) {
-        self.ends.push(self.planes.len() as u32);
+    /// Puts a term behind those of its voxel; until all are there, a voxel ends where its next term comes.
+    fn put(&mut self, voxel: usize, plane: u16, amount: f64) {
+        let at = &mut self.ends[voxel];
+        (self.planes[*at as usize], self.amounts[*at as usize]) = (plane, amount);
+        *at += 1;
     }
 
     /// The planes and amounts of a voxel.
-    pub fn of_voxel(&self, voxel: usize) -> (&[u16], &[f64]) {
+    pub(super) fn of_voxel(&self, voxel: usize) -> (&[u16], &[f64]) {
         let start = if voxel == 0 { 0 } else { self.ends[voxel - 1] as usize };
         let range = start..self.ends[voxel] as usize;
         (&self.planes[range.clone()], &self.amounts[range])
-    }
-
-    /// Weights that are missing: in all frames of the window, or in those of the group that `absent` names.
-    pub(super) fn add_absent(&mut self, layout: &Layout, in_all: bool, absent: impl Fn(usize) -> bool) {
-        if in_all {
-            self.add(layout.absent_in_all(), 1.0);
-        } else {
-            (0..layout.frames).filter(|f| absent(*f)).for_each(|f| self.add(layout.absent(f), 1.0));
-        }
-    }
-
-    /// The terms of samples that are splatted frame by frame, each off by `errors`: `samples` holds `layout.frames`
-    /// frames of as many voxels.
-    pub fn of_samples(
-        layout: &Layout,
-        ty: SampleType,
-        samples: &[u8],
-        errors: &[f64],
-        is_missing: impl Fn(usize, f64) -> bool,
-    ) -> Self {
-        let mut values = vec![0.0; samples.len() / ty.size()];
-        sample::load(ty, samples, &mut values);
-        let voxels = values.len() / layout.frames;
-        let mut terms = Self::default();
-        for voxel in 0..voxels {
-            let missing = |f: usize| is_missing(f * voxels + voxel, values[f * voxels + voxel]);
-            for f in (0..layout.frames).filter(|f| !missing(*f) && values[f * voxels + voxel] != 0.0) {
-                terms.add(layout.value(f), values[f * voxels + voxel]);
-            }
-            if layout.absent {
-                terms.add_absent(layout, false, missing);
-            }
-            terms.add_errors(layout, errors);
-            terms.end_voxel();
-        }
-        terms
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::amounts::Amounts;
     use super::*;
 
     #[test]
@@ -164,12 +124,22 @@ mod tests {
     }
 
     #[test]
-    fn missing_samples_take_weights_instead_of_values() {
-        let layout =
-            Layout { coefficients: 0, frames: 2, values: true, absent: true, error_planes: 0, order: Order::Planes };
-        let samples: Vec<u8> = [f32::NAN, 1.0, 3.0, 2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let terms = Terms::of_samples(&layout, SampleType::F32, &samples, &[], |_, v| v.is_nan());
-        assert_eq!(terms.of_voxel(0), (&[1u16, 2][..], &[3.0, 1.0][..]));
-        assert_eq!(terms.of_voxel(1), (&[0u16, 1][..], &[1.0, 2.0][..]));
+    fn every_voxel_has_the_terms_of_all_planes() {
+        struct Three;
+        impl BlockPlanes for Three {
+            fn voxels(&self) -> usize {
+                3
+            }
+            fn plane<'a>(&'a self, plane: usize, _: &'a mut Room) -> Result<Amounts<'a>> {
+                Ok([Amounts::Single(&[0.0, 1.5, 2.0]), Amounts::Nothing, Amounts::Few(&[(2, -1.0)])][plane])
+            }
+            fn held(&self) -> [u64; 2] {
+                [0; 2]
+            }
+        }
+        let terms = Terms::of(&Three, 3).expect("no block fails here");
+        assert_eq!(terms.of_voxel(0), (&[][..], &[][..]));
+        assert_eq!(terms.of_voxel(1), (&[0][..], &[1.5][..]));
+        assert_eq!(terms.of_voxel(2), (&[0, 2][..], &[2.0, -1.0][..]));
     }
 }

@@ -6,7 +6,7 @@ use super::certificate;
 use super::eye::Eye;
 use super::plan::Budget;
 use super::splat::Order;
-use super::terms::{Layout, Terms};
+use super::terms::Layout;
 use super::uncut::Uncut;
 use super::{Quantity, RenderConfig, RenderReport};
 use crate::error::Result;
@@ -131,10 +131,6 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
 struct Ones<'a>(&'a BlockGrid);
 
 impl Blocks for Ones<'_> {
-    fn terms(&self, block: usize) -> Result<Terms> {
-        Ok(Terms::ones(self.0.region(block).voxels()))
-    }
-
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         Ok(Box::new(OnesOf(self.0.region(block).voxels())))
     }

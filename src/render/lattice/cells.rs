@@ -9,14 +9,14 @@ use std::ops::Range;
 /// of voxels adds to them then is side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
-    pub(super) frame: Frame,
+    frame: Frame,
     /// Those that nothing was added to take no room.
     planes: Vec<Option<Aligned>>,
 }
 
 /// Where the cells of a rectangle are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(in crate::render) struct Frame {
     /// The first cell along u and v; that along u begins a cache line, wherever rectangles begin.
     pub(super) first: [isize; 2],
     /// Cells along u and v.
@@ -88,6 +88,16 @@ impl Frame {
         self.size[0] * self.size[1]
     }
 
+    /// Of so many voxels a whole number of cells apart along an axis, each of which reaches the cell where it is, the first
+    /// at `cell`, and `degree` more: those that reach any that is here.
+    pub(super) fn seen_from(&self, axis: usize, cell: isize, degree: usize, count: usize) -> Range<usize> {
+        let (before, phases) = (self.first[axis] - cell, self.phases as isize);
+        let within = |n: isize| n.clamp(0, count as isize) as usize;
+        let start = within((before - degree as isize + phases - 1).div_euclid(phases));
+        let end = within((before + self.size[axis] as isize + phases - 1).div_euclid(phases));
+        start..end.max(start)
+    }
+
     /// Where so many cache lines of a row are, of which cell u lies in the first.
     pub(super) fn run_of(&self, u: isize, lines: usize) -> Run {
         let (u, size, line) = (u - self.first[0], self.run as isize, LINE as isize);
@@ -125,6 +135,11 @@ impl Frame {
 }
 
 impl Cells {
+    /// Where they are.
+    pub(in crate::render) fn frame(&self) -> Frame {
+        self.frame
+    }
+
     /// With all planes at zero.
     pub(super) fn new(frame: Frame, planes: usize) -> Self {
         Self { frame, planes: (0..planes).map(|_| None).collect() }

@@ -103,7 +103,7 @@ struct Seen {
 
 impl Seen {
     fn of(cells: &Cells, first: [isize; 2], size: [usize; 2]) -> Self {
-        let (frame, phases) = (&cells.frame, cells.frame.phases);
+        let (frame, phases) = (cells.frame(), cells.frame().phases);
         let run = |phase: usize| {
             let (u, run) = frame.first_in_row(first[0] + phase as isize, size[0].saturating_sub(phase));
             (phase + u, run)

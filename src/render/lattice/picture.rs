@@ -146,9 +146,9 @@ impl Lattice {
         rows_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Where the voxels of a block that lie in `clip` are in cells.
-    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region) -> Placed {
-        Placed::new(&self.spreading, region, clip)
+    /// Where the voxels of a block that lie in `clip` are in cells, for planes of `seen`.
+    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, seen: &Frame) -> Placed {
+        Placed::new(&self.spreading, region, clip, seen)
     }
 
     /// The cells that a band of a picture sees, with so many planes at zero.

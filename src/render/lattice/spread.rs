@@ -38,6 +38,8 @@ struct Slice {
     along: Spread,
     /// Times exp(-tau z) of its first voxel.
     across: Spread,
+    /// The voxels along b and along c that reach cells that are there.
+    seen: [Range<usize>; 2],
 }
 
 /// Room for a slice that is being spread.
@@ -55,8 +57,8 @@ pub(in crate::render) struct Work {
 }
 
 impl Placed {
-    /// Of the block at `region`, of which the voxels in `clip` count.
-    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region) -> Self {
+    /// Of the block at `region`, of which the voxels in `clip` count, for planes of some cells.
+    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, seen: &Frame) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
@@ -65,7 +67,8 @@ impl Placed {
             let depth = spreading.tau * shear.depths[i];
             (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
         });
-        let slices: Vec<Slice> = (0..count[2]).map(|k| Slice::new(clip.start, spreading, k)).collect();
+        let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], seen);
+        let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
             spreading: *spreading,
             frame: frame_of(&slices, spreading, [count[0], count[1]]),
@@ -122,13 +125,15 @@ impl Placed {
 }
 
 impl Slice {
-    /// Of the `k`-th slice of voxels from `start` on.
-    fn new(start: [usize; 3], spreading: &Spreading, k: usize) -> Self {
+    /// Of the `k`-th slice of so many voxels from `start` on.
+    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], seen: &Frame) -> Self {
         let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
         let [u, v] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
         let fading = libm::exp(-spreading.tau * spreading.shear.depth(voxel));
-        Self { cell: [u.0, v.0], along: u.1, across: v.1.map(|w| w * fading) }
+        let cell = [u.0, v.0];
+        let seen = [0, 1].map(|i| seen.seen_from(i, cell[i], spreading.degree, count[i]));
+        Self { cell, along: u.1, across: v.1.map(|w| w * fading), seen }
     }
 }
 
@@ -171,8 +176,13 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
     for first in (0..placed.count[1]).step_by(ROWS) {
         let rows = first..placed.count[1].min(first + ROWS);
         for (k, slice) in placed.slices.iter().enumerate() {
+            let rows = rows.start.max(slice.seen[1].start)..rows.end.min(slice.seen[1].end);
+            if rows.is_empty() {
+                continue;
+            }
             let amounts = &amounts[placed.first + k * placed.steps[2]..];
-            let live = fade_rows(placed, amounts, &rows, work);
+            let (live, seen) = (fade_rows(placed, amounts, &rows, work), &slice.seen[0]);
+            let live = live.start.max(seen.start / LINE)..live.end.min(seen.end.div_ceil(LINE));
             if !live.is_empty() {
                 add_rows::<Q, TAPS>((slice, &placed.frame), (&rows, &live), work, sums);
             }

@@ -83,12 +83,16 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let cells = || expected.keys().copied();
         let low = [0, 1].map(|i| cells().map(|c| c[i]).min().unwrap_or(0));
         let high = [0, 1].map(|i| cells().map(|c| c[i]).max().unwrap_or(0));
-        // Some cells more on each side, or less.
-        let more = [0; 4].map(|_| random.below(9) as isize - 3);
+        // Some cells more on each side, or less, or most of them less on one side.
+        let mut more = [0; 4].map(|_| random.below(9) as isize - 3);
+        let side = random.below(8);
+        if side < 4 {
+            more[side] = -((high[side % 2] - low[side % 2]).max(0) * 3 / 4);
+        }
         cut += usize::from(more.iter().any(|n| *n < 0));
         let size = [0, 1].map(|i| (high[i] - low[i] + 1 + more[i] + more[2 + i]).max(1) as usize);
         let frame = Frame::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
-        let placed = Placed::new(&spreading, &block, &clip);
+        let placed = Placed::new(&spreading, &block, &clip, &frame);
         let single: Vec<f32> = amounts.iter().map(|v| *v as f32).collect();
         let few: Vec<(u32, f64)> = (0..).zip(amounts.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways = [Amounts::Double(&amounts), Amounts::Single(&single), Amounts::Few(&few), Amounts::Nothing];
@@ -97,6 +101,20 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         into.for_each(|(mut plane, amounts)| placed.add(amounts, &mut plane, &mut work));
         let touched: Vec<usize> = planes.touched().map(|(number, _)| number).collect();
         assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // few may all be elsewhere
+        let whole = Frame::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
+        let mut all = Cells::new(whole, 1);
+        let placed = Placed::new(&spreading, &block, &clip, &whole);
+        placed.add(Amounts::Double(&amounts), &mut all.planes_mut()[0], &mut work);
+        let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
+        for (number, plane) in planes.touched().take(2) {
+            for (cell, sum) in cells_of(&frame, plane) {
+                assert_eq!(
+                    sum,
+                    all.get(&cell).copied().unwrap_or(0.0),
+                    "{seed}, {number}: where else is looked matters"
+                );
+            }
+        }
         for (number, plane) in planes.touched() {
             for (cell, sum) in cells_of(&frame, plane) {
                 let expected = expected.get(&cell).copied().unwrap_or(0.0);
