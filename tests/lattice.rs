@@ -197,3 +197,31 @@ fn parts_of_other_frames_are_counted_and_not_read() {
     }
     assert!(even.other_frames.bytes > 0 && odd.other_frames == LeftOut::default(), "{:?}", even.other_frames);
 }
+
+#[test]
+fn few_frames_by_their_values_are_as_in_all() {
+    let (grid, view, tau) = scenes()[1];
+    let voxels = grid.whole().voxels();
+    let samples: Vec<f64> = field(&grid, 33, 7).into_iter().map(|v| v + 20.0).collect();
+    let holes = masked(&samples, |i| i % 11 == 0 || i % voxels < 300);
+    for (samples, (basis, window)) in [&samples, &holes].into_iter().zip([(Basis::Haar, 32), (Basis::Learned, 33)]) {
+        let mut memory = archive(grid, SampleType::F64, samples);
+        let stored = stored(&mut memory, &settings(basis, window, 0.05));
+        let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+        for splat_error in [0.0, 5e-3] {
+            let plain = looking(view, tau, Quantity::Mean, &grid, 33);
+            let config = RenderConfig { splat_error, ..plain };
+            let (all, _) = pictures(&mut scene, &config);
+            for frames in [vec![0], vec![7, 30], vec![31]] {
+                let (some, _) = pictures(&mut scene, &RenderConfig { frames: frames.clone(), ..config.clone() });
+                for (frame, picture) in frames.iter().zip(some.chunks_exact(50 * 45)) {
+                    for (a, b) in picture.iter().zip(&all[frame * 50 * 45..]) {
+                        let same = a.is_nan() && b.is_nan();
+                        let off = (f64::from(*a) - f64::from(*b)).abs();
+                        assert!(same || off <= 2.0 * (rounding(*a) + rounding(*b)), "{basis:?}, {frame}: {a} for {b}");
+                    }
+                }
+            }
+        }
+    }
+}
