@@ -108,7 +108,7 @@ impl<'a> Passes<'a> {
 
     fn changes_of<R: Real>(&self, wanted: &[bool], field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
-        for nodes in field.chunks_exact(self.slice()).filter(|nodes| nodes.iter().any(|v| *v != R::default())) {
+        for nodes in field.chunks_exact(self.slice()).filter(|nodes| !rows::is_zero(nodes)) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
                 self.leave_out(part, nodes, rest, change);
             }

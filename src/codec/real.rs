@@ -27,8 +27,9 @@ pub(crate) trait Real:
     /// Whether it is not a number.
     fn is_nan(self) -> bool;
 
-    /// A whole number in the range of `i32`; 0 of what is not a number.
-    fn to_code(self) -> i32;
+    /// What a code less than [`Self::MOST_CODE`] and [`Self::BIG`] sum to, back to the code: the last digits of such a sum
+    /// count. A conversion of any number would not be vector code.
+    fn less_big(self) -> i32;
 }
 
 impl Real for f32 {
@@ -52,8 +53,8 @@ impl Real for f32 {
         self.into()
     }
 
-    fn to_code(self) -> i32 {
-        self as i32
+    fn less_big(self) -> i32 {
+        self.to_bits().wrapping_sub(Self::BIG.to_bits()) as i32
     }
 }
 
@@ -78,7 +79,7 @@ impl Real for f64 {
         self
     }
 
-    fn to_code(self) -> i32 {
-        self as i32
+    fn less_big(self) -> i32 {
+        self.to_bits().wrapping_sub(Self::BIG.to_bits()) as i32
     }
 }

@@ -42,15 +42,15 @@ pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], s
 /// The codes of v - p, 0 for what is not a number, and v as the decoder has it. False if a code does not fit.
 #[inline(always)]
 pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32], step: R, inverse: R) -> bool {
-    let (zero, least) = (R::default(), R::default() - R::MOST_CODE);
+    let least = R::default() - R::MOST_CODE;
     let mut fits = true;
     for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
         let q = (*v - *p) * inverse;
         let small = (q < R::MOST_CODE) & (q > least);
         fits &= small | v.is_nan();
-        let q = if small { (q + R::BIG) - R::BIG } else { zero };
-        *code = q.to_code();
-        *v = *p + q * step;
+        let rounded = if small { q + R::BIG } else { R::BIG };
+        *code = rounded.less_big();
+        *v = *p + (rounded - R::BIG) * step;
     }
     fits
 }
@@ -63,6 +63,11 @@ pub(super) fn gather<R: Real>(nodes: &[R], distance: usize, out: &mut [R]) {
     } else {
         out.iter_mut().zip(nodes.iter().step_by(distance)).for_each(|(v, node)| *v = *node);
     }
+}
+
+/// Whether all nodes are zero.
+pub(super) fn is_zero<R: Real>(nodes: &[R]) -> bool {
+    nodes.chunks(64).all(|some| some.iter().fold(true, |all, node| all & (*node == R::default())))
 }
 
 /// Whether no code says anything.
