@@ -10,10 +10,11 @@ use std::process::Command;
 use wavesplat::bound::Bound;
 use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::progress::Silent;
-use wavesplat::render::{CoefficientScene, Quantity, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
 use wavesplat::sample::SampleType;
 use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
+use xxhash_rust::xxh3::xxh3_64;
 
 const GRID: Grid = Grid { dims: [40, 33, 20], spacing: [1.0; 3], origin: [0.0; 3] };
 
@@ -48,6 +49,49 @@ fn threads_change_no_byte_and_no_pixel() {
         assert!([2, 5].into_iter().all(|n| run(n) == one), "{basis:?}");
     }
 }
+
+/// Digests of files, samples and pictures, of every scheme: the same with every kind of vector code (`--cfg portable` has none),
+/// and on every machine. They change with what a file holds (the program's and zstd's version among that) and how it is
+/// splatted, and then have to be written anew.
+#[test]
+fn files_and_pictures_are_those_of_every_machine() {
+    let sample = |i: usize| {
+        let [x, y, z, t] = [i % 40, i / 40 % 33, i / 1320 % 20, i / 26_400].map(|n| n as f32);
+        let square = |a: f32, b: f32| (a - b) * (a - b);
+        let blob = 3.0 / (1.0 + 0.05 * (square(x, 2.0 * t) + square(y, 20.0 - t) + square(z, 9.0)));
+        if z < 4.0 { 0.0 } else { blob + 0.25 / (1.0 + t + x) }
+    };
+    let samples = (0..20 * 26_400).flat_map(|i| sample(i).to_le_bytes()).collect();
+    let memory = Memory::new(GRID, SampleType::F32, samples);
+    let look = looking(view(30.0, 20.0, [70, 60]), 0.01, Quantity::Mean, &GRID, 20);
+    let look = RenderConfig { splat_error: 1e-3, ..look };
+    let digest = |pictures: Vec<f32>| xxh3_64(&pictures.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    let mut found = vec![digest(pictures(&mut direct(&memory, None), &look).0)];
+    for basis in BASES {
+        let file = stored(&mut memory.clone(), &config(basis));
+        let (of_file, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+        found.extend([xxh3_64(&file.bytes()), xxh3_64(&extracted(&file.open())), digest(of_file)]);
+    }
+    assert_eq!(found, DIGESTS);
+}
+
+/// Frames as they are; then of each basis its file, samples and pictures.
+#[rustfmt::skip]
+const DIGESTS: [u64; 13] = [
+    0x7763_790b_0f46_3517,
+    0xed13_0871_e8a4_2881,
+    0xa91d_68b1_f90c_ea75,
+    0xe43e_632c_0f65_825d,
+    0xf040_e1b6_e39e_0713,
+    0xf853_f6f1_eee8_03a4,
+    0x3a2f_f744_8875_9370,
+    0x6d94_cede_d941_2748,
+    0x321b_b1c0_2892_bda3,
+    0xae84_68b3_35ac_40b2,
+    0xdcbf_69a3_aa21_a20b,
+    0xf28e_e0fe_247a_2dad,
+    0xe750_aa9a_d1d3_27dd,
+];
 
 #[test]
 fn memory_changes_no_byte_of_a_file() {

@@ -7,7 +7,6 @@
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::wavelet;
-use multiversion::multiversion;
 use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
@@ -155,12 +154,12 @@ struct Refined<'a> {
     pass: &'a Pass,
 }
 
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_pass<R: Real>(refined: &Refined<'_>, step: R, codes: &[i32], field: &mut [R]) {
     refined.for_each_row(field, |first, nodes, predicted| rows::decode(nodes, predicted, &codes[first..], step));
 }
 
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &mut [i32], field: &mut [R]) -> bool {
     let mut fits = true;
     refined.for_each_row(field, |first, nodes, predicted| {
@@ -170,7 +169,7 @@ fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &
 }
 
 /// Adds what leaving the pass out changes. Overwrites `field` by what is left.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &mut [R]) {
     refined.for_each_row(field, |_, nodes, predicted| {
         rows::replace(change, nodes, predicted);

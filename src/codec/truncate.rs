@@ -1,6 +1,7 @@
 //! Which coefficients to keep (method.md section 4): the smallest are dropped for as long as the promise holds.
 
 use super::WindowCodec;
+use super::real::Real;
 use crate::bound::Measure;
 use crate::wavelet::{LANES, Lane};
 
@@ -16,10 +17,10 @@ pub(super) struct Group {
     /// Quantised coefficients; those below their voxel's entry in `dropped` are not kept. K lanes.
     codes: Vec<[i32; LANES]>,
     /// The place of each coefficient in its voxel's order of dropping; K lanes.
-    rank: Vec<[u16; LANES]>,
-    dropped: [u16; LANES],
-    /// Scratch: sizes of one voxel's coefficients, and their numbers in the low bits.
-    order: Vec<u64>,
+    rank: Vec<[i32; LANES]>,
+    dropped: [i32; LANES],
+    /// The sizes of those coefficients k of which any code is not zero, with k in the low bits, [`NONE`] where one is zero.
+    sizes: Vec<(usize, [i64; LANES])>,
     /// What the decoder makes of the kept codes; `frames` lanes.
     pub(super) decoded: Vec<Lane>,
     work: Vec<Lane>,
@@ -35,7 +36,7 @@ impl Group {
             codes: vec![[0; LANES]; k],
             rank: vec![[0; LANES]; k],
             dropped: [0; LANES],
-            order: Vec::with_capacity(k),
+            sizes: Vec::with_capacity(k),
             decoded: vec![Lane::default(); frames],
             work: vec![Lane::default(); k],
         }
@@ -44,16 +45,7 @@ impl Group {
     /// Transforms and quantises the source. False if a code does not fit, so that the block must be stored exactly.
     pub(super) fn quantise(&mut self, codec: &WindowCodec, step: f64) -> bool {
         codec.basis.forward(&self.source, &mut self.coefficients);
-        let mut fits = true;
-        for (codes, coefficients) in self.codes.iter_mut().zip(&self.coefficients) {
-            for (code, c) in codes.iter_mut().zip(coefficients) {
-                let q = nearest(c / step);
-                // False for NaN, too, and for what the decoder would find infinite.
-                fits &= q.abs() < f64::from(i32::MAX) && (q * step).abs() < f64::INFINITY;
-                *code = q as i32;
-            }
-        }
-        fits
+        quantise(&self.coefficients, step, &mut self.codes)
     }
 
     /// The codes of coefficient k that are kept.
@@ -87,58 +79,120 @@ impl Group {
     }
 
     /// Ranks the coefficients of each lane by size, the finer first where equal; returns how many are not zero.
-    fn order(&mut self) -> [u16; LANES] {
-        std::array::from_fn(|l| {
-            self.order.clear();
-            for (k, _) in self.codes.iter().enumerate().filter(|(_, codes)| codes[l] != 0) {
+    fn order(&mut self) -> [i32; LANES] {
+        self.sizes.clear();
+        let mut counts = [0; LANES];
+        let coded =
+            self.codes.iter().zip(&self.coefficients).enumerate().filter(|(_, (codes, _))| **codes != [0; LANES]);
+        for (k, (codes, coefficients)) in coded {
+            let mut sizes = [NONE; LANES];
+            for l in 0..LANES {
                 // The bits of positive numbers are ordered as the numbers are; the lowest make room for k.
-                let size = self.coefficients[k][l].abs().to_bits() & !u64::from(u16::MAX);
-                self.order.push(size | u64::from(u16::MAX - k as u16));
+                let size = coefficients[l].abs().to_bits() & !u64::from(u16::MAX) | u64::from(u16::MAX - k as u16);
+                sizes[l] = if codes[l] == 0 { NONE } else { size as i64 };
+                counts[l] += i32::from(codes[l] != 0);
             }
-            self.order.sort_unstable();
-            for (rank, key) in self.order.iter().enumerate() {
-                self.rank[usize::from(u16::MAX - *key as u16)][l] = rank as u16;
-            }
-            self.order.len() as u16
-        })
+            self.sizes.push((k, sizes));
+        }
+        rank(&self.sizes, &mut self.rank);
+        counts
     }
 
     fn reconstruct(&mut self, codec: &WindowCodec, step: f64) {
-        for (k, c) in self.work.iter_mut().enumerate() {
-            *c = kept(&self.codes[k], &self.rank[k], &self.dropped).map(|code| f64::from(code) * step);
-        }
+        decode_kept((&self.codes, &self.rank), &self.dropped, step, &mut self.work);
         codec.basis.inverse(&mut self.work, &mut self.decoded);
     }
 
     /// The weighed error of each lane: the largest over the frames, or the root of the mean square.
     fn errors(&self, measure: Measure) -> Lane {
+        let errors = errors(&self.decoded, &self.source, &self.weight);
         match measure {
-            Measure::Largest => self.fold_errors(f64::max),
-            Measure::RootMeanSquare => {
-                let frames = self.source.len() as f64;
-                self.fold_errors(|sum, e| sum + e * e).map(|sum| (sum / frames).sqrt())
-            }
+            Measure::Largest => errors.largest,
+            Measure::RootMeanSquare => errors.squares.map(|sum| (sum / self.source.len() as f64).sqrt()),
         }
     }
+}
 
-    fn fold_errors(&self, add: impl Fn(f64, f64) -> f64) -> Lane {
-        let mut out = Lane::default();
-        for ((decoded, source), weight) in self.decoded.iter().zip(&self.source).zip(&self.weight) {
+/// Coefficients to codes. False if a code does not fit.
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> bool {
+    let mut fits = true;
+    for (codes, coefficients) in codes.iter_mut().zip(coefficients) {
+        for l in 0..LANES {
+            let rounded = coefficients[l] / step + f64::BIG;
+            let q = rounded - f64::BIG;
+            // False for NaN, too, and for what the decoder would find infinite.
+            let small = (q.abs() < f64::from(i32::MAX)) & ((q * step).abs() < f64::INFINITY);
+            fits &= small;
+            codes[l] = (if small { rounded } else { f64::BIG }).less_big();
+        }
+    }
+    fits
+}
+
+/// Larger than the size of any coefficient.
+const NONE: i64 = i64::MAX;
+
+/// The place of each size among those of its lane.
+fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
+    if sizes.len() <= MOST_COMPARED {
+        return rank_by_comparing(sizes, rank);
+    }
+    for l in 0..LANES {
+        let mut order: Vec<(i64, usize)> = sizes.iter().map(|(k, sizes)| (sizes[l], *k)).collect();
+        order.sort_unstable();
+        order.into_iter().enumerate().for_each(|(place, (_, k))| rank[k][l] = place as i32);
+    }
+}
+
+/// Most sizes of which each is compared with all others.
+const MOST_COMPARED: usize = 64;
+
+/// Vector code, but a square of comparisons.
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
+    for (k, size) in sizes {
+        let mut smaller = [0_i64; LANES];
+        for (_, other) in sizes {
             for l in 0..LANES {
-                out[l] = add(out[l], (decoded[l] - source[l]).abs() * weight[l]);
+                smaller[l] -= (other[l] - size[l]) >> 63; // neither is negative
             }
         }
-        out
+        rank[*k] = smaller.map(|n| n as i32);
     }
+}
+
+/// The kept coefficients as the decoder has them, zero where the lane drops one.
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn decode_kept((codes, rank): (&[[i32; LANES]], &[[i32; LANES]]), dropped: &[i32; LANES], step: f64, out: &mut [Lane]) {
+    for ((out, codes), rank) in out.iter_mut().zip(codes).zip(rank) {
+        for l in 0..LANES {
+            let keep = -i32::from(rank[l] >= dropped[l]); // all bits, or none
+            out[l] = f64::from(codes[l] & keep) * step;
+        }
+    }
+}
+
+/// Weighed errors of each lane.
+struct Errors {
+    largest: Lane,
+    squares: Lane,
+}
+
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn errors(decoded: &[Lane], source: &[Lane], weight: &[Lane]) -> Errors {
+    let mut errors = Errors { largest: Lane::default(), squares: Lane::default() };
+    for ((decoded, source), weight) in decoded.iter().zip(source).zip(weight) {
+        for l in 0..LANES {
+            let e = (decoded[l] - source[l]).abs() * weight[l];
+            errors.largest[l] = if e > errors.largest[l] { e } else { errors.largest[l] };
+            errors.squares[l] += e * e;
+        }
+    }
+    errors
 }
 
 /// The codes of one coefficient, zero where the lane drops it.
-fn kept(codes: &[i32; LANES], rank: &[u16; LANES], dropped: &[u16; LANES]) -> [i32; LANES] {
+fn kept(codes: &[i32; LANES], rank: &[i32; LANES], dropped: &[i32; LANES]) -> [i32; LANES] {
     std::array::from_fn(|l| if rank[l] >= dropped[l] { codes[l] } else { 0 })
-}
-
-/// The nearest whole number, for what fits a code. Adding and taking away 1.5 x 2^52 leaves no bits for a fraction.
-fn nearest(x: f64) -> f64 {
-    const BIG: f64 = 6_755_399_441_055_744.0;
-    (x + BIG) - BIG
 }

@@ -4,7 +4,6 @@ use crate::codec::field::Plane;
 use crate::codec::real::Real;
 use crate::error::Result;
 use crate::sample::{SampleType, load_as};
-use multiversion::multiversion;
 
 /// The amounts of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +43,7 @@ impl Amounts<'_> {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_scaled<R: Real>(amounts: &[R], factor: f64, sums: &mut [f64]) {
     sums.iter_mut().zip(amounts).for_each(|(sum, amount)| *sum += factor * amount.to_f64());
 }

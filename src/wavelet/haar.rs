@@ -10,7 +10,7 @@
 //! which for m1 = m2 is Haar's own (x1 +- x2) / sqrt 2. An odd one at the end is carried up as it is; its smaller
 //! weight there keeps constants in one coefficient, so that a last, short window needs no invented frames.
 
-use super::{Lane, TimeBasis};
+use super::{LANES, Lane, TimeBasis};
 
 /// Haar's basis for one window.
 #[derive(Debug)]
@@ -51,36 +51,46 @@ impl TimeBasis for Haar {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        let mut sums = series.to_vec();
-        let mut end = self.frames;
-        for step in &self.steps {
-            let details = &mut coefficients[end - step.len()..end];
-            for (i, ((a, b), detail)) in step.iter().zip(details).enumerate() {
-                let (x1, x2) = (sums[2 * i], sums[2 * i + 1]);
-                sums[i] = combine(*a, &x1, *b, &x2);
-                *detail = combine(*b, &x1, -*a, &x2);
-            }
-            carry_odd(&mut sums, step.len());
-            end -= step.len();
-        }
-        coefficients[..end].copy_from_slice(&sums);
+        forward(&self.steps, series, coefficients);
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        series[0] = coefficients[0];
-        let mut len = 1;
-        for step in self.steps.iter().rev() {
-            let details = &coefficients[len..len + step.len()];
-            if len > step.len() {
-                series[2 * step.len()] = series[step.len()];
-            }
-            for (i, ((a, b), detail)) in step.iter().zip(details).enumerate().rev() {
-                let sum = series[i];
-                series[2 * i] = combine(*a, &sum, *b, detail);
-                series[2 * i + 1] = combine(*b, &sum, -*a, detail);
-            }
-            len += step.len();
+        inverse(&self.steps, coefficients, series);
+    }
+}
+
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn forward(steps: &[Vec<(f64, f64)>], series: &[Lane], coefficients: &mut [Lane]) {
+    let mut sums = series.to_vec();
+    let mut end = series.len();
+    for step in steps {
+        let details = &mut coefficients[end - step.len()..end];
+        for (i, ((a, b), detail)) in step.iter().zip(details).enumerate() {
+            let (x1, x2) = (sums[2 * i], sums[2 * i + 1]);
+            sums[i] = combine(*a, &x1, *b, &x2);
+            *detail = combine(*b, &x1, -*a, &x2);
         }
+        carry_odd(&mut sums, step.len());
+        end -= step.len();
+    }
+    coefficients[..end].copy_from_slice(&sums);
+}
+
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn inverse(steps: &[Vec<(f64, f64)>], coefficients: &[Lane], series: &mut [Lane]) {
+    series[0] = coefficients[0];
+    let mut len = 1;
+    for step in steps.iter().rev() {
+        let details = &coefficients[len..len + step.len()];
+        if len > step.len() {
+            series[2 * step.len()] = series[step.len()];
+        }
+        for (i, ((a, b), detail)) in step.iter().zip(details).enumerate().rev() {
+            let sum = series[i];
+            series[2 * i] = combine(*a, &sum, *b, detail);
+            series[2 * i + 1] = combine(*b, &sum, -*a, detail);
+        }
+        len += step.len();
     }
 }
 
@@ -94,7 +104,11 @@ fn carry_odd(sums: &mut Vec<Lane>, pairs: usize) {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn combine(a: f64, x: &Lane, b: f64, y: &Lane) -> Lane {
-    std::array::from_fn(|l| a * x[l] + b * y[l])
+    let mut out = Lane::default();
+    for l in 0..LANES {
+        out[l] = a * x[l] + b * y[l];
+    }
+    out
 }

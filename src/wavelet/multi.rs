@@ -51,42 +51,52 @@ impl TimeBasis for Multi {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        let mut fine = series.to_vec();
-        fine.resize(self.coefficients(), series[self.frames - 1]);
-        prefilter(&mut fine);
-        let mut intervals = self.intervals;
-        while intervals > 1 {
-            let mut coarse = vec![Lane::default(); intervals + 1];
-            let wavelets = &mut coefficients[intervals + 1..2 * intervals + 1];
-            for_each_filter(intervals, |to, at, taps| {
-                let out = dot(taps, &fine[at..]);
-                match to {
-                    Target::Scaling(i) => coarse[i] = out,
-                    Target::Wavelet(i) => wavelets[i] = out,
-                }
-            });
-            fine = coarse;
-            intervals /= 2;
-        }
-        coefficients[..3].copy_from_slice(&fine);
+        forward(self.intervals, series, coefficients);
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        let mut coarse = coefficients[..3].to_vec();
-        let mut intervals = 2;
-        while intervals <= self.intervals {
-            let mut fine = vec![Lane::default(); 2 * intervals + 1];
-            let wavelets = &coefficients[intervals + 1..2 * intervals + 1];
-            for_each_filter(intervals, |from, at, taps| match from {
-                Target::Scaling(i) => add_scaled(taps, &coarse[i], &mut fine[at..]),
-                Target::Wavelet(i) => add_scaled(taps, &wavelets[i], &mut fine[at..]),
-            });
-            coarse = fine;
-            intervals *= 2;
-        }
-        undo_prefilter(&mut coarse);
-        series.copy_from_slice(&coarse[..self.frames]);
+        inverse(self.intervals, coefficients, series);
     }
+}
+
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
+    let mut fine = series.to_vec();
+    fine.resize(coefficients.len(), series[series.len() - 1]);
+    let mut coarse = vec![Lane::default(); intervals + 1];
+    prefilter(&mut fine);
+    while intervals > 1 {
+        let wavelets = &mut coefficients[intervals + 1..2 * intervals + 1];
+        for_each_filter(intervals, |to, at, taps| {
+            let out = dot(taps, &fine[at..]);
+            match to {
+                Target::Scaling(i) => coarse[i] = out,
+                Target::Wavelet(i) => wavelets[i] = out,
+            }
+        });
+        std::mem::swap(&mut fine, &mut coarse);
+        intervals /= 2;
+    }
+    coefficients[..3].copy_from_slice(&fine[..3]);
+}
+
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
+    let mut coarse = coefficients.to_vec();
+    let mut fine = coarse.clone();
+    let mut intervals = 2;
+    while intervals <= most {
+        let wavelets = &coefficients[intervals + 1..2 * intervals + 1];
+        fine[..2 * intervals + 1].fill(Lane::default());
+        for_each_filter(intervals, |from, at, taps| match from {
+            Target::Scaling(i) => add_scaled(taps, &coarse[i], &mut fine[at..]),
+            Target::Wavelet(i) => add_scaled(taps, &wavelets[i], &mut fine[at..]),
+        });
+        std::mem::swap(&mut fine, &mut coarse);
+        intervals *= 2;
+    }
+    undo_prefilter(&mut coarse);
+    series.copy_from_slice(&coarse[..series.len()]);
 }
 
 /// What a filter computes: a function of the next coarser level, or a wavelet.
@@ -96,6 +106,7 @@ enum Target {
 }
 
 /// Calls `apply(target, first fine index, taps)` for every filter of one level with `intervals` fine intervals.
+#[inline(always)]
 fn for_each_filter(intervals: usize, mut apply: impl FnMut(Target, usize, &[f64])) {
     let reversed = |taps: [f64; 4]| [taps[3], taps[2], taps[1], taps[0]];
     let last = intervals / 2; // the last coarse node
@@ -114,6 +125,7 @@ fn for_each_filter(intervals: usize, mut apply: impl FnMut(Target, usize, &[f64]
     apply(Target::Wavelet(intervals - 1), end, &reversed(END_WAVELET));
 }
 
+#[inline(always)]
 fn dot(taps: &[f64], values: &[Lane]) -> Lane {
     let mut out = Lane::default();
     for (tap, value) in taps.iter().zip(values) {
@@ -124,6 +136,7 @@ fn dot(taps: &[f64], values: &[Lane]) -> Lane {
     out
 }
 
+#[inline(always)]
 fn add_scaled(taps: &[f64], coefficient: &Lane, values: &mut [Lane]) {
     for (tap, value) in taps.iter().zip(values) {
         for l in 0..LANES {
@@ -139,6 +152,7 @@ const END_SCALE: f64 = 0.577_350_269_189_625_8; // sqrt(1 / 3)
 const MID_SCALE: f64 = 0.721_687_836_487_032_2; // 5 / (4 sqrt 3)
 
 /// Samples to the finest coefficients.
+#[inline(always)]
 fn prefilter(values: &mut [Lane]) {
     for m in (1..values.len()).step_by(2) {
         let (left, right) = (values[m - 1], values[m + 1]);
@@ -150,6 +164,7 @@ fn prefilter(values: &mut [Lane]) {
 }
 
 /// The finest coefficients to samples.
+#[inline(always)]
 fn undo_prefilter(values: &mut [Lane]) {
     for_each_node(values, |value, scale| *value /= scale);
     for m in (1..values.len()).step_by(2) {
@@ -160,6 +175,7 @@ fn undo_prefilter(values: &mut [Lane]) {
     }
 }
 
+#[inline(always)]
 fn for_each_node(values: &mut [Lane], mut apply: impl FnMut(&mut f64, f64)) {
     let last = values.len() - 1;
     for (i, lane) in values.iter_mut().enumerate().step_by(2) {

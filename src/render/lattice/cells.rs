@@ -1,6 +1,5 @@
 //! Planes of sums over the cells of a band of a picture.
 
-use multiversion::multiversion;
 use std::ops::Range;
 
 /// A rectangle of cells with some planes, one after another.
@@ -180,7 +179,7 @@ impl CellPlane<'_> {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_to(sums: &mut [f64], more: &[f64]) {
     sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }

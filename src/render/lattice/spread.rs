@@ -9,7 +9,6 @@ use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::codec::real::Real;
 use crate::render::amounts::Amounts;
 use crate::volume::Region;
-use multiversion::multiversion;
 use std::ops::Range;
 
 /// Where the voxels of a block are in cells: the same for all planes.
@@ -150,7 +149,7 @@ fn frame_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Frame
     Frame::holding([u.0, v.0], [u.1, v.1], q)
 }
 
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_block<R: Real>(placed: &Placed, amounts: &[R], sums: &mut [f64], work: &mut Work) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
