@@ -43,20 +43,23 @@ impl Drop for Part {
 }
 
 impl Output {
+    /// Bytes that are collected before they are written.
+    pub const BUFFER: usize = 256 << 10;
+
     /// Opens `path`, or standard output for `-`. An existing file is an error unless `force` replaces it.
     pub fn create(path: &Path, force: bool) -> Result<Self> {
         let target = if path == Path::new(STANDARD) {
             if io::stdout().is_terminal() {
                 return Err(Error::usage("-o -: binary data is not written to a terminal; redirect or pipe it"));
             }
-            Target::Stdout(BufWriter::with_capacity(BUFFER, io::stdout()))
+            Target::Stdout(BufWriter::with_capacity(Self::BUFFER, io::stdout()))
         } else if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
             let file = File::options().write(true).open(path).map_err(|e| Error::io(path, "opening", e))?;
-            Target::Special(BufWriter::with_capacity(BUFFER, file))
+            Target::Special(BufWriter::with_capacity(Self::BUFFER, file))
         } else {
             Self::check(path, force)?;
             let (file, part) = Part::create(path, force)?;
-            Target::File(BufWriter::with_capacity(BUFFER, file), part)
+            Target::File(BufWriter::with_capacity(Self::BUFFER, file), part)
         };
         Ok(Self { path: path.into(), target })
     }
@@ -94,9 +97,6 @@ impl Output {
         part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))
     }
 }
-
-/// Bytes that are collected before they are written.
-const BUFFER: usize = 256 << 10;
 
 impl Part {
     /// Creates and locks `NAME.part`; one that nobody holds is left over from a run that died.

@@ -206,14 +206,17 @@ fn few_frames_by_their_values_are_as_in_all() {
     let holes = masked(&samples, |i| i % 11 == 0 || i % voxels < 300);
     for (samples, (basis, window)) in [&samples, &holes].into_iter().zip([(Basis::Haar, 32), (Basis::Learned, 33)]) {
         let mut memory = archive(grid, SampleType::F64, samples);
-        let stored = stored(&mut memory, &settings(basis, window, 0.05));
+        let stored = stored(&mut memory, &ConvertConfig { block: Some(16), ..settings(basis, window, 0.05) });
         let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
         for splat_error in [0.0, 5e-3] {
             let plain = looking(view, tau, Quantity::Mean, &grid, 33);
             let config = RenderConfig { splat_error, ..plain };
             let (all, _) = pictures(&mut scene, &config);
+            let mut sufficed = 0;
             for frames in [vec![0], vec![7, 30], vec![31]] {
-                let (some, _) = pictures(&mut scene, &RenderConfig { frames: frames.clone(), ..config.clone() });
+                let few = RenderConfig { frames: frames.clone(), ..config.clone() };
+                sufficed += under_less_memory(&mut scene, &few);
+                let (some, _) = pictures(&mut scene, &few);
                 for (frame, picture) in frames.iter().zip(some.chunks_exact(50 * 45)) {
                     for (a, b) in picture.iter().zip(&all[frame * 50 * 45..]) {
                         let same = a.is_nan() && b.is_nan();
@@ -222,6 +225,7 @@ fn few_frames_by_their_values_are_as_in_all() {
                     }
                 }
             }
+            assert!(sufficed >= 6, "{sufficed} budgets sufficed");
         }
     }
 }

@@ -40,13 +40,15 @@ fn by_view(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Vec<u32>
     Ok((pictures, report))
 }
 
-/// Compares every view with itself alone, under less and less memory; how many budgets sufficed.
+/// Compares every view with itself alone, and what is said of its errors, under less and less memory; how many budgets
+/// sufficed.
 fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
     let alone = |view: &View| {
         let config = RenderConfig { views: vec![*view], ..config.clone() };
-        by_view(scene, &config).unwrap().0.remove(0)
+        let (mut pictures, report) = by_view(scene, &config).unwrap();
+        (pictures.remove(0), report.views[0].expected_error)
     };
-    let expected: Vec<Vec<u32>> = config.views.iter().map(alone).collect();
+    let (expected, errors): (Vec<_>, Vec<_>) = config.views.iter().map(alone).unzip();
     let mut sufficed = 0;
     for memory in [MEMORY, 24 << 20, 16 << 20, 12 << 20, 10 << 20] {
         match by_view(scene, &RenderConfig { memory, ..config.clone() }) {
@@ -55,7 +57,8 @@ fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
             Ok((found, report)) => {
                 let same: Vec<bool> = found.iter().zip(&expected).map(|(a, b)| a == b).collect();
                 assert_eq!(same, [true; 5], "{memory} bytes");
-                assert_eq!(report.views.len(), 5);
+                let errors_found: Vec<f64> = report.views.iter().map(|view| view.expected_error).collect();
+                assert_eq!(errors_found, errors, "{memory} bytes");
                 sufficed += 1;
             }
         }

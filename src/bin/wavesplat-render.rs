@@ -2,6 +2,7 @@
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 use clap::{Parser, ValueEnum};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use wavesplat::bound::range_bound;
@@ -10,7 +11,7 @@ use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, T
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
-use wavesplat::output::STANDARD;
+use wavesplat::output::{Output, STANDARD};
 use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
@@ -200,34 +201,45 @@ impl Cli {
 
     /// Where the pictures of each view go, and where those of their errors go, if anywhere.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>)> {
-        let format = self.format.map_or_else(|| format_of(&self.output), Ok)?;
-        let mut outputs = [Some(&self.output), self.error_image.as_ref()].into_iter().flatten();
-        outputs.try_for_each(|output| spare_inputs(&self.inputs, output))?;
-        let of_errors = self.error_image.as_deref().map(|path| Ok((path, format_of(path)?))).transpose()?;
-        let own = |path: &Path| path != self.output && path != Path::new(STANDARD);
-        if !self.error_image.as_deref().is_none_or(own) {
-            return Err(Error::usage(NOT_ITS_OWN));
-        }
+        let (pictures, errors) = self.targets(config)?;
         let coloured_array = self.colormap.is_some();
-        let certify = of_errors.is_some_and(|(_, format)| format != PictureFormat::Npy);
-        let needed = (format != PictureFormat::Npy || coloured_array) && self.range.is_none() || certify;
+        let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
+        let needed = (pictures.format != PictureFormat::Npy || coloured_array) && self.range.is_none() || certify;
         let looking = RenderConfig { certify, ..config.clone() };
         let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
         }
-        let sinks = |path: &Path, format, range, coloured_array| {
+        let open = |targets: Targets, range, coloured_array| {
             let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
             let (size, frames, fps, force) = (self.size.0, config.frames.clone(), self.fps, self.force);
-            let names = names_of_views(path, config.views.len())?;
-            let config = SinkConfig { format, size, frames, fps, colours, coloured_array, force };
-            names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
+            let config = SinkConfig { format: targets.format, size, frames, fps, colours, coloured_array, force };
+            targets.names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
         };
-        let errors = of_errors.map_or(Ok(Vec::new()), |(path, format)| sinks(path, format, seen.errors, false))?;
-        let pictures = sinks(&self.output, format, range, coloured_array)?;
-        if errors.first().is_some_and(|e| e.path() == pictures[0].path()) {
-            return Err(Error::usage(NOT_ITS_OWN));
+        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, seen.errors, false))?;
+        Ok((open(pictures, range, coloured_array)?, errors))
+    }
+
+    /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
+    fn targets(&self, config: &RenderConfig) -> Result<(Targets, Option<Targets>)> {
+        let views = config.views.len();
+        let pictures = Targets::new(&self.output, self.format, views)?;
+        let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, views)).transpose()?;
+        if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
+            return Err(Error::usage("--error-image: takes a file of its own"));
+        }
+        let mut written = HashSet::new();
+        for targets in [Some(&pictures), errors.as_ref()].into_iter().flatten() {
+            for name in &targets.names {
+                spare_inputs(&self.inputs, name)?;
+                let paths = Sink::paths(name, targets.format, &config.frames)?;
+                if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
+                    let what =
+                        "would be written twice: --error-image takes a file of its own, and every picture a name";
+                    return Err(Error::usage(format!("{}: {what}", twice.display())));
+                }
+            }
         }
         Ok((pictures, errors))
     }
@@ -279,8 +291,13 @@ impl Cli {
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
-            memory: self.common.memory.0,
+            memory: self.common.memory.0.saturating_sub(self.streams() * Output::BUFFER),
         })
+    }
+
+    /// Files that are open at a time, at most.
+    fn streams(&self) -> usize {
+        self.views().len() * (1 + usize::from(self.error_image.is_some()))
     }
 
     /// All views, each with those of its orbit.
@@ -320,7 +337,6 @@ impl Cli {
     }
 }
 
-const NOT_ITS_OWN: &str = "--error-image: takes a file of its own";
 const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
 
 /// Says what to do about a file that holds no coefficients.
@@ -331,6 +347,18 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
         return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
     }
     error
+}
+
+/// Where pictures go: a name for each view.
+struct Targets {
+    format: PictureFormat,
+    names: Vec<PathBuf>,
+}
+
+impl Targets {
+    fn new(path: &Path, format: Option<PictureFormat>, views: usize) -> Result<Self> {
+        Ok(Self { format: format.map_or_else(|| format_of(path), Ok)?, names: names_of_views(path, views)? })
+    }
 }
 
 /// The ranges of the pictures and of their errors.
@@ -377,9 +405,10 @@ fn summary(r: &RenderReport) -> String {
     let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
     let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
     let mut methods: Vec<&str> = r.views.iter().map(|view| view.method).collect();
+    methods.sort_unstable();
     methods.dedup();
     format!(
-        "{} views of {} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
+        "{} view(s) of {} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
          {} coefficients, {} left out",
         r.views.len(),
         r.frames,

@@ -27,8 +27,8 @@ pub(crate) trait Real:
     /// Whether it is not a number.
     fn is_nan(self) -> bool;
 
-    /// What a code less than [`Self::MOST_CODE`] and [`Self::BIG`] sum to, back to the code: the last digits of such a sum
-    /// count. A conversion of any number would not be vector code.
+    /// What a whole number (less than 2^31 in `f64`, than 2^22 in `f32`) and [`Self::BIG`] sum to, back to that: the last digits
+    /// of such a sum count. A conversion of any number would not be vector code.
     fn less_big(self) -> i32;
 }
 

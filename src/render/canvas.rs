@@ -4,7 +4,7 @@ use super::RenderReport;
 use super::amounts::{BlockPlanes, Room};
 use super::eye::Eye;
 use super::lap;
-use super::lattice::{CellPlane, Cells, Frame, Gather, Lattice, Placed, Work};
+use super::lattice::{CellPlane, Cells, Gather, Lattice, Placed, Rectangle, Work};
 use super::splat::{Place, Splats, TILE, Tile};
 use super::terms::{Layout, Terms};
 use crate::error::Result;
@@ -206,12 +206,12 @@ fn splat_into_cells(
     // Used again: memory fresh from the system costs as much as what it is for.
     let spare = Mutex::default();
     let (lattices, mut cells): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
-    let frames: Vec<Frame> = cells.iter().map(|cells| cells.frame()).collect();
+    let there: Vec<Rectangle> = cells.iter().map(|cells| cells.rectangle()).collect();
     let place = |block: usize| {
         let planes = source.planes(block)?;
         let placed = |n: usize| {
             let (eye, seen) = (bands[n].eye, bands[n].sees(block));
-            seen.then(|| lattices[n].placed(&eye.blocks.region(block), &eye.clip, &frames[n]))
+            seen.then(|| lattices[n].placed(&eye.blocks.region(block), &eye.clip, &there[n]))
         };
         let (seen, held) = ((0..bands.len()).map(placed).collect(), planes.held());
         Ok(BlockInBands { block: planes, seen, held })

@@ -153,7 +153,11 @@ impl<'a> CoefficientGroup<'a> {
             values: samples || by_values || exact || record.outliers > 0 || record.missing > 0,
             absent: record.missing > 0,
             error_planes: error_planes(config, codec.parts()),
-            order: if samples || is_dense(record, file.grid.whole().voxels()) { Order::Pixels } else { Order::Planes },
+            order: if samples || by_values || is_dense(record, file.grid.whole().voxels()) {
+                Order::Pixels
+            } else {
+                Order::Planes
+            },
         };
         let allowance = Allowance::new(&codec, expectation);
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
@@ -191,7 +195,7 @@ impl<'a> CoefficientGroup<'a> {
         let region = config.region.unwrap_or(self.file.grid.whole());
         let mut cheapest = Cheapest::new(&self.allowance);
         for entries in self.file.entries(self.window, &region) {
-            entries?.iter().for_each(|entry| cheapest.add(&self.place(entry)));
+            entries?.iter().for_each(|entry| cheapest.add(&self.place(entry, self.expectation)));
         }
         Ok(cheapest.within(self.expectation.allowed(allowed)))
     }
@@ -222,12 +226,12 @@ impl<'a> CoefficientGroup<'a> {
 
     /// What is read of a block.
     fn keep(&self, entry: &BlockEntry) -> Kept {
-        self.allowance.keep(&self.place(entry))
+        self.allowance.keep(&self.place(entry, self.expectation))
     }
 
-    fn place<'b>(&self, entry: &'b BlockEntry) -> Place<'b> {
+    fn place<'b>(&self, entry: &'b BlockEntry, view: &Expectation<'_>) -> Place<'b> {
         let region = self.file.blocks.region(entry.id.block as usize);
-        Place { entry, voxels: region.voxels(), seen: self.expectation.of_block(&region) }
+        Place { entry, voxels: region.voxels(), seen: view.of_block(&region) }
     }
 
     /// The parts that say nothing of the group's frames.
@@ -277,7 +281,6 @@ impl Group for CoefficientGroup<'_> {
                 found.left_out += kept.left_out;
                 found.other_frames += self.of_other_frames(&kept.entry);
                 found.certified = found.certified.max(kept.certified);
-                found.expected += kept.expected;
                 found.empty -= u64::from(!entry.parts.is_empty());
                 if !self.adds_nothing(&kept) {
                     found.blocks.push(entry.id.block as usize);
@@ -285,6 +288,14 @@ impl Group for CoefficientGroup<'_> {
             }
         }
         Ok(found)
+    }
+
+    fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64> {
+        let mut sum = 0.0;
+        for entries in self.file.entries(self.window, region) {
+            entries?.iter().for_each(|entry| sum += self.allowance.keep(&self.place(entry, view)).expected);
+        }
+        Ok(sum)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

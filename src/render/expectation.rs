@@ -17,18 +17,10 @@ use super::{Look, Quantity, RenderConfig};
 use crate::volume::{Grid, Region};
 use std::f64::consts::PI;
 
-/// Views that errors are seen in, their pixels counted as those of one picture.
-#[derive(Debug, Clone)]
-pub struct Expectation<'a> {
-    views: Vec<InView<'a>>,
-    /// n.
-    footprint: f64,
-}
-
 /// A view that errors are seen in.
 #[derive(Debug, Clone, Copy)]
-struct InView<'a> {
-    look: &'a Look,
+pub struct Expectation<'a> {
+    look: &'a Look<'a>,
     quantity: Quantity,
     /// Pixels that are not background.
     pixels: f64,
@@ -36,6 +28,8 @@ struct InView<'a> {
     unit: f64,
     /// a / w.
     area: f64,
+    /// n.
+    footprint: f64,
 }
 
 /// What a block's errors, of a mean square of 1, come to in the mean square over pixels.
@@ -60,19 +54,24 @@ impl Seen {
 }
 
 impl<'a> Expectation<'a> {
-    pub(super) fn new(looks: &'a [Look], config: &RenderConfig, grid: &Grid) -> Self {
-        let cell: f64 = grid.spacing.iter().product();
-        let sigma = config.kernel.sigma;
-        let footprint = 4.0 * PI * sigma * sigma / libm::cbrt(cell * cell);
-        Self { views: looks.iter().map(|look| InView::new(look, config.quantity)).collect(), footprint }
+    pub(super) fn new(look: &'a Look<'a>, config: &RenderConfig) -> Self {
+        let (mut pixels, mut squares) = (0.0, 0.0);
+        for sum in look.weights.shown() {
+            pixels += 1.0;
+            squares += sum * sum;
+        }
+        let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
+        let unit = if config.quantity == Quantity::Mean { 1.0 } else { squares / pixels };
+        let (area, footprint) = (look.eye.footprint.area(), footprint(config, &look.eye.grid));
+        Self { look, quantity: config.quantity, pixels, unit, area, footprint }
     }
 
     /// The mean square over pixels that samples come to which all are off by `error`.
     pub(super) fn allowed(&self, error: f64) -> f64 {
-        error * error * self.views.iter().map(|view| view.unit).sum::<f64>() / self.views.len() as f64
+        error * error * self.unit
     }
 
-    /// F of boxes of `side` voxels.
+    /// F of boxes of `side` voxels: the same for all views.
     pub(super) fn alike(&self, side: f64) -> f64 {
         let across = (1.0 + self.footprint) / (1.0 + self.footprint / (side * side));
         side * across
@@ -80,25 +79,6 @@ impl<'a> Expectation<'a> {
 
     /// What the errors of the block at `region` come to.
     pub(super) fn of_block(&self, region: &Region) -> Seen {
-        let seen: Vec<Seen> = self.views.iter().map(|view| view.of_block(region)).collect();
-        let mean = |of: fn(&Seen) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
-        Seen { together: mean(|s| s.together), apart: mean(|s| s.apart) }
-    }
-}
-
-impl<'a> InView<'a> {
-    fn new(look: &'a Look, quantity: Quantity) -> Self {
-        let (mut pixels, mut squares) = (0.0, 0.0);
-        for sum in look.weights.shown() {
-            pixels += 1.0;
-            squares += sum * sum;
-        }
-        let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
-        let unit = if quantity == Quantity::Mean { 1.0 } else { squares / pixels };
-        Self { look, quantity, pixels, unit, area: look.eye.footprint.area() }
-    }
-
-    fn of_block(&self, region: &Region) -> Seen {
         let clip = region.intersect(&self.look.eye.clip);
         let mut seen = Seen::default();
         let mut points = 0.0;
@@ -122,6 +102,12 @@ impl<'a> InView<'a> {
         let together = self.area * weight / sum * unit;
         Seen { together, apart: together * (0.5 * weight / sum) }
     }
+}
+
+/// n: the voxels of a footprint.
+fn footprint(config: &RenderConfig, grid: &Grid) -> f64 {
+    let (cell, sigma) = (grid.spacing.iter().product::<f64>(), config.kernel.sigma);
+    4.0 * PI * sigma * sigma / libm::cbrt(cell * cell)
 }
 
 /// Some voxels that stand for all of a region.

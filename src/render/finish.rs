@@ -19,8 +19,8 @@ pub(super) struct Finish<'a> {
 
 impl<'a> Finish<'a> {
     /// For pictures of a view.
-    pub(super) fn new(group: &'a dyn Group, look: &'a Look, config: &RenderConfig) -> Self {
-        let certificate = config.certify.then(|| Certificate::new(&look.eye, config.quantity));
+    pub(super) fn new(group: &'a dyn Group, look: &'a Look<'a>, config: &RenderConfig) -> Self {
+        let certificate = config.certify.then(|| Certificate::new(look.eye, config.quantity));
         Self { group, layout: group.layout(), quantity: config.quantity, weights: &look.weights, certificate }
     }
 

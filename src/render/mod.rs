@@ -1,13 +1,14 @@
 //! A scene to pictures (method.md section 6): splat the planes of a group of frames, then invert every pixel.
 //!
 //! ```text
-//! for each group of frames of a window         plan: as many as fit in memory
-//!   for each band of rows
-//!     for each batch of blocks                 scene: read, decode            (workers)
-//!       every plane takes in the batch         lattice: amounts -> cells      (one owner per plane)
-//!     every tile inverts its pixels            lattice: cells -> planes of pixels
+//! for some views                               plan: as many as fit in memory
+//!   for each group of frames of a window       plan: as many as fit
+//!     for each band of rows
+//!       for each batch of blocks               scene: read, decode            (workers)
+//!         every plane of every view takes it   lattice: amounts -> cells      (one owner per plane)
+//!       every tile inverts its pixels          lattice: cells -> planes of pixels
 //!                                              finish: planes -> frames, then / weights; certificate
-//!   give the finished frames to the sink
+//!     give the finished frames to the sink
 //! ```
 //!
 //! Where footprints are less work, where the lattice of the view is not near enough, and where pictures are certified, every
@@ -127,7 +128,8 @@ pub struct RenderReport {
     pub frames: usize,
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
-    /// Blocks that the scene holds, over all windows touched.
+    /// Blocks that the scene holds, over all windows touched; as what follows up to the parts, each time counted that frames
+    /// are rendered together, from views that are.
     pub blocks: u64,
     /// Blocks that were decoded, each time counted.
     pub blocks_read: u64,
@@ -143,8 +145,7 @@ pub struct RenderReport {
     pub other_frames: LeftOut,
     /// No sample that was splatted is further from the source's.
     pub certified_sample_error: f64,
-    /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
-    /// splatting; in the pictures' unit.
+    /// Of all views, the root mean square of what each view reports.
     pub expected_error: f64,
     /// The largest error that a pixel may have, if pictures are certified.
     pub certified_error: Option<f64>,
@@ -177,13 +178,26 @@ pub struct ViewReport {
     pub method: &'static str,
     /// Its stated error, in the terms of the splat error that was asked for.
     pub stated_splat_error: f64,
+    /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
+    /// splatting; in the pictures' unit.
+    pub expected_error: f64,
+}
+
+impl RenderReport {
+    /// Turns sums over the frames of each view into root mean squares, and all these into one.
+    fn sum_up_expected_errors(&mut self) {
+        let (frames, views) = (self.frames.max(1) as f64, self.views.len() as f64);
+        self.views.iter_mut().for_each(|view| view.expected_error = (view.expected_error / frames).sqrt());
+        let squares: f64 = self.views.iter().map(|view| view.expected_error * view.expected_error).sum();
+        self.expected_error = (squares / views).sqrt();
+    }
 }
 
 impl ViewReport {
     fn new(view: &View, eye: &Eye) -> Self {
         let &View { azimuth, elevation, .. } = view;
         let (scale, method, stated_splat_error) = (eye.camera.scale, eye.method.name, eye.stated_error);
-        Self { azimuth, elevation, scale, method, stated_splat_error }
+        Self { azimuth, elevation, scale, method, stated_splat_error, expected_error: 0.0 }
     }
 }
 
@@ -229,28 +243,26 @@ pub fn render(
     let mut first = 0;
     while first < eyes.len() {
         let budget = Budget::of_most(config, scene, &eyes[first..])?;
-        let of_round = |r: Rendered<'_>| sink(Rendered { view: first + r.view, ..r });
-        render_views(scene, config, &budget, &mut report, of_round)?;
+        render_views(scene, config, (&budget, first), &mut report, &mut sink)?;
         first += budget.eyes().len();
     }
     progress.finish();
-    let pictures = eyes.len() * config.frames.len();
-    report.expected_error = (report.expected_error / pictures.max(1) as f64).sqrt();
+    report.sum_up_expected_errors();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
 }
 
-/// Renders all frames from views that go together.
+/// Renders all frames from views that go together, the first of which is number `first_view`.
 fn render_views(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    budget: &Budget<'_>,
+    (budget, first_view): (&Budget<'_>, usize),
     report: &mut RenderReport,
-    mut sink: impl FnMut(Rendered<'_>) -> Result<()>,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
     let mut clock = Instant::now();
     let looks = budget.eyes().iter().map(|eye| Look::new(eye, config, budget)).collect::<Result<Vec<_>>>()?;
-    let expectation = Expectation::new(&looks, config, scene.grid());
+    let expectations: Vec<_> = looks.iter().map(|look| Expectation::new(look, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
@@ -258,15 +270,20 @@ fn render_views(
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
         let pictures = loop {
             let before = report.clone();
-            let group = scene.group(now, config, &expectation)?;
+            let group = scene.group(now, config, &expectations[0])?;
             let pictures = render_group(group.as_ref(), &looks, config, budget, report)?;
+            for (view, expectation) in report.views[first_view..].iter_mut().zip(&expectations) {
+                // Frame by frame, so that it is the same however frames are grouped.
+                let expected = group.expected(&looks[0].eye.clip, expectation)?;
+                now.iter().for_each(|_| view.expected_error += expected);
+            }
             match group.finish()? {
                 Read::AsExpected => break pictures,
                 Read::Otherwise => *report = before,
             }
         };
-        for (view, pictures) in pictures.iter().enumerate() {
-            pictures.frames(view, now).try_for_each(&mut sink)?;
+        for (view, pictures) in (first_view..).zip(&pictures) {
+            pictures.frames(view, now).try_for_each(&mut *sink)?;
         }
         rest = later;
     }
@@ -306,14 +323,14 @@ impl Blocks for &dyn Group {
 
 /// A view, and its sums of weights.
 #[derive(Debug)]
-struct Look {
-    eye: Eye,
+struct Look<'a> {
+    eye: &'a Eye,
     weights: Weights,
 }
 
-impl Look {
-    fn new(eye: &Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
-        Ok(Self { weights: Weights::new(eye, config, budget)?, eye: eye.clone() })
+impl<'a> Look<'a> {
+    fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
+        Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
     }
 }
 
@@ -340,7 +357,7 @@ impl Pictures {
 /// Renders all frames of a group from some views.
 fn render_group(
     group: &dyn Group,
-    looks: &[Look],
+    looks: &[Look<'_>],
     config: &RenderConfig,
     budget: &Budget<'_>,
     report: &mut RenderReport,
@@ -351,7 +368,7 @@ fn render_group(
     let empty = |finish: &Finish<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
     let mut pictures: Vec<Vec<f32>> = finish.iter().map(empty).collect();
     for rows in budget.bands(&layout) {
-        let mut canvases: Vec<_> = looks.iter().map(|look| Canvas::new(&look.eye, rows.clone(), &layout)).collect();
+        let mut canvases: Vec<_> = looks.iter().map(|look| Canvas::new(look.eye, rows.clone(), &layout)).collect();
         canvas::splat(&mut canvases, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
         let mut clock = Instant::now();
         for ((canvas, finish), pictures) in canvases.into_iter().zip(&finish).zip(&mut pictures) {
@@ -368,10 +385,10 @@ fn render_group(
 }
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
-fn blocks_to_read(group: &dyn Group, looks: &[Look], report: &mut RenderReport) -> Result<Vec<usize>> {
-    let eye = &looks[0].eye;
+fn blocks_to_read(group: &dyn Group, looks: &[Look<'_>], report: &mut RenderReport) -> Result<Vec<usize>> {
+    let eye = looks[0].eye;
     let all_rows = 0..eye.camera.size[1];
-    let Contents { mut blocks, empty, left_out, other_frames, certified, expected } = group.blocks(&eye.clip)?;
+    let Contents { mut blocks, empty, left_out, other_frames, certified } = group.blocks(&eye.clip)?;
     let held = blocks.len();
     blocks.retain(|b| looks.iter().any(|look| look.eye.reaches(*b, &all_rows)));
     let reached = blocks.len();
@@ -383,7 +400,5 @@ fn blocks_to_read(group: &dyn Group, looks: &[Look], report: &mut RenderReport) 
     report.left_out += left_out;
     report.other_frames += other_frames;
     report.certified_sample_error = report.certified_sample_error.max(certified);
-    // Picture by picture, so that it is the same however frames are grouped.
-    (0..looks.len() * group.layout().frames).for_each(|_| report.expected_error += expected);
     Ok(blocks)
 }

@@ -1,11 +1,12 @@
 //! How much of a picture is worked on at a time, so that memory stays within its budget.
 //!
-//! Neither the number of frames in a group, nor the rows in a band, nor the blocks in a batch changes a pixel.
+//! Neither the number of views and frames that are rendered together, nor the rows in a band, nor the blocks in a batch
+//! changes a pixel.
 
 use super::RenderConfig;
 use super::eye::Eye;
 use super::scene::Scene;
-use super::splat::TILE;
+use super::splat::{Splats, TILE};
 use super::terms::{Layout, Terms};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -57,12 +58,17 @@ impl<'a> Budget<'a> {
         let alone = Self::new(config, scene, &eyes[..1])?;
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
-        let several = |count: usize| {
-            let budget = Self::new(config, scene, &eyes[..count]).ok()?;
-            (budget.bytes(frames, planes, budget.size[1]) <= budget.available).then_some(budget)
-        };
-        let most = if config.chooses_by_view() { 1 } else { eyes.len() };
-        Ok((2..=most).map_while(several).last().unwrap_or(alone))
+        let fits = |budget: &Self| budget.bytes(frames, planes, budget.size[1]) <= budget.available;
+        let several = |count: usize| Self::new(config, scene, &eyes[..count]).ok().filter(fits);
+        let (mut best, mut least, mut most) = (alone, 1, if config.chooses_by_view() { 1 } else { eyes.len() });
+        while least < most {
+            let middle = least.midpoint(most + 1);
+            match several(middle) {
+                Some(budget) => (best, least) = (budget, middle),
+                None => most = middle - 1,
+            }
+        }
+        Ok(best)
     }
 
     /// The views.
@@ -80,10 +86,11 @@ impl<'a> Budget<'a> {
         self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes)
     }
 
-    /// A block, and its terms if there are tiles to splat.
+    /// A block, and if there are tiles to splat its terms and where they are in each view.
     fn block_bytes(&self, planes: usize) -> usize {
-        let tiles = self.eyes.iter().any(|eye| eye.lattice.is_none());
-        self.block_bytes + if tiles { self.block.voxels() * planes * Terms::BYTES } else { 0 }
+        let footprints = self.eyes.iter().filter(|eye| eye.lattice.is_none()).count();
+        let terms = if footprints > 0 { Terms::most_bytes(planes) } else { 0 };
+        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES)
     }
 
     /// Finished pictures of a group, as f32.
@@ -112,8 +119,9 @@ impl<'a> Budget<'a> {
 
     /// The bands of rows to splat one after another, each as tall as fits.
     pub(super) fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
-        let fits = |tiles: &usize| self.bytes(layout.frames, layout.planes(), tiles * TILE) <= self.available;
-        let rows = TILE * (1..=self.size[1].div_ceil(TILE)).rev().find(fits).unwrap_or(1);
+        let rows = |tiles: usize| (tiles * TILE).min(self.size[1]);
+        let fits = |tiles: &usize| self.bytes(layout.frames, layout.planes(), rows(*tiles)) <= self.available;
+        let rows = rows((1..=self.size[1].div_ceil(TILE)).rev().find(fits).unwrap_or(1));
         (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
     }
 

@@ -32,7 +32,7 @@ pub trait Scene {
     /// An upper bound of the bytes that one block takes.
     fn block_bytes(&self) -> usize;
 
-    /// Opens some frames of one group, ascending.
+    /// Opens some frames of one group, ascending. What is read, where that is chosen by the view, is chosen by `expectation`.
     fn group<'a>(
         &'a mut self,
         frames: &[usize],
@@ -48,6 +48,9 @@ pub trait Group: Sync {
 
     /// The blocks that touch `region` and have terms.
     fn blocks(&self, region: &Region) -> Result<Contents>;
+
+    /// What the errors of all samples in `region` are expected to come to in a view, in the mean square over its pixels.
+    fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64>;
 
     /// What a block adds to the planes.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
@@ -87,8 +90,6 @@ pub struct Contents {
     pub other_frames: LeftOut,
     /// No sample of them is further off.
     pub certified: f64,
-    /// What the errors of their samples are expected to come to in the mean square over pixels.
-    pub expected: f64,
 }
 
 /// What need not be read of blocks.

@@ -69,9 +69,9 @@ impl Sink {
     /// Opens `path`: `-`, a file, or a pattern as `frame_%04d.png` that numbers PNG files.
     pub fn open(path: &Path, config: SinkConfig) -> Result<Self> {
         let target = if config.format == PictureFormat::Png && path != Path::new(STANDARD) {
-            let names = Numbered::new(path, config.frames.len())?;
-            config.frames.iter().try_for_each(|frame| Output::check(&names.of(*frame), config.force))?;
-            Target::Many(names)
+            let paths = Self::paths(path, config.format, &config.frames)?;
+            paths.iter().try_for_each(|path| Output::check(path, config.force))?;
+            Target::Many(Numbered::new(path, config.frames.len())?)
         } else if path != Path::new(STANDARD) && Numbered::new(path, 1)?.digits.is_some() {
             let what = format!("{}: a pattern numbers .png files; other formats hold all frames", path.display());
             return Err(Error::usage(what));
@@ -81,12 +81,13 @@ impl Sink {
         Ok(Self { target, config })
     }
 
-    /// Where the first picture goes.
-    pub fn path(&self) -> PathBuf {
-        match &self.target {
-            Target::One { out, .. } => out.path().into(),
-            Target::Many(names) => names.of(self.config.frames.first().copied().unwrap_or(0)),
+    /// The files that pictures of some frames go to.
+    pub fn paths(path: &Path, format: PictureFormat, frames: &[usize]) -> Result<Vec<PathBuf>> {
+        if format != PictureFormat::Png || path == Path::new(STANDARD) {
+            return Ok(vec![path.into()]);
         }
+        let names = Numbered::new(path, frames.len())?;
+        Ok(frames.iter().map(|frame| names.of(*frame)).collect())
     }
 
     /// Writes the picture of a frame.

@@ -174,6 +174,9 @@ struct Splat {
 }
 
 impl Splats {
+    /// What a voxel takes.
+    pub(super) const BYTES: usize = size_of::<Splat>();
+
     /// Projects the voxels of a block that are splatted and have terms.
     pub(super) fn new(terms: &Terms, block: usize, eye: &Eye) -> Self {
         let Eye { camera, footprint, grid, clip, .. } = eye;

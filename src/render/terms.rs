@@ -71,8 +71,10 @@ pub(super) struct Terms {
 }
 
 impl Terms {
-    /// What a term takes, as it is found and in its voxel's place.
-    pub(super) const BYTES: usize = 16 + 10;
+    /// What those of a voxel take in so many planes, at most: as they are found, in a vector that grows, and in place.
+    pub(super) const fn most_bytes(planes: usize) -> usize {
+        planes * (2 * size_of::<(u32, u16, f64)>() + 2 + 8) + 2 * size_of::<u32>()
+    }
 
     /// What a block has in so many planes.
     pub(super) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {

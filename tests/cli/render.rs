@@ -50,6 +50,14 @@ fn each_view_has_a_name_of_its_own() {
     run.fails(2, &["x%d.png", "2 views", "%v"]);
     work.render(&format!("a.wspl {SIZE} --orbit 2 -o -")).fails(2, &["2 views"]);
     work.render(&format!("a.wspl {SIZE} --orbit 0 -o x%v.npy")).fails(2, &["--orbit"]);
+    // Nothing is written twice, nor over what is read.
+    let twice = work.render(&format!("a.wspl {SIZE} --frames 1,11 --orbit 12 -o x%v%d.png --force"));
+    twice.fails(2, &["x111.png", "twice"]);
+    let twice = work.render(&format!("a.wspl {SIZE} --orbit 11 -o p%v.npy --error-image p%02v.npy --force"));
+    twice.fails(2, &["p10.npy", "--error-image"]);
+    std::fs::copy(work.path("a.npy"), work.path("a0.npy")).unwrap();
+    let replaced = work.render(&format!("a0.npy {SIZE} --method direct --orbit 2 -o a%v.npy --force"));
+    replaced.fails(2, &["a0.npy", "would replace"]);
 }
 
 #[test]

@@ -8,14 +8,14 @@ use std::ops::Range;
 /// of voxels adds to them then is side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
-    frame: Frame,
+    rectangle: Rectangle,
     /// Those that nothing was added to take no room.
     planes: Vec<Option<Aligned>>,
 }
 
 /// Where the cells of a rectangle are.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::render) struct Frame {
+pub(in crate::render) struct Rectangle {
     /// The first cell along u and v; that along u begins a cache line, wherever rectangles begin.
     pub(super) first: [isize; 2],
     /// Cells along u and v.
@@ -72,7 +72,7 @@ impl std::ops::DerefMut for Aligned {
     }
 }
 
-impl Frame {
+impl Rectangle {
     /// The smallest one that holds so many cells from some first ones on.
     pub(super) fn holding(first: [isize; 2], size: [usize; 2], phases: usize) -> Self {
         let before = first[0].rem_euclid((phases * LINE) as isize);
@@ -135,13 +135,13 @@ impl Frame {
 
 impl Cells {
     /// Where they are.
-    pub(in crate::render) fn frame(&self) -> Frame {
-        self.frame
+    pub(in crate::render) fn rectangle(&self) -> Rectangle {
+        self.rectangle
     }
 
     /// With all planes at zero.
-    pub(super) fn new(frame: Frame, planes: usize) -> Self {
-        Self { frame, planes: (0..planes).map(|_| None).collect() }
+    pub(super) fn new(rectangle: Rectangle, planes: usize) -> Self {
+        Self { rectangle, planes: (0..planes).map(|_| None).collect() }
     }
 
     /// The planes that something was added to, and their numbers.
@@ -152,27 +152,27 @@ impl Cells {
 
     /// All planes, where to add.
     pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
-        let frame = self.frame;
-        self.planes.iter_mut().map(|sums| CellPlane { frame, sums }).collect()
+        let rectangle = self.rectangle;
+        self.planes.iter_mut().map(|sums| CellPlane { rectangle, sums }).collect()
     }
 }
 
 impl CellPlane<'_> {
     /// Its sums, at zero if nothing was added yet.
     pub(super) fn sums(&mut self) -> &mut [f64] {
-        let area = self.frame.area();
+        let area = self.rectangle.area();
         self.sums.get_or_insert_with(|| Aligned::of(area))
     }
 
     /// Adds the cells of another rectangle.
-    pub(super) fn add(&mut self, frame: &Frame, sums: &[f64]) {
-        let own = self.frame;
+    pub(super) fn add(&mut self, rectangle: &Rectangle, sums: &[f64]) {
+        let own = self.rectangle;
         let own_sums = self.sums();
-        for (v, from) in (frame.first[1]..).zip(sums.chunks_exact(frame.size[0])) {
+        for (v, from) in (rectangle.first[1]..).zip(sums.chunks_exact(rectangle.size[0])) {
             let Some(row) = own.row(v) else { continue };
             let to = &mut own_sums[row];
-            for (phase, from) in from.chunks_exact(frame.run).enumerate() {
-                let run = own.run_of(frame.first[0] + phase as isize, frame.run / LINE);
+            for (phase, from) in from.chunks_exact(rectangle.run).enumerate() {
+                let run = own.run_of(rectangle.first[0] + phase as isize, rectangle.run / LINE);
                 add_to(&mut to[run.start..][..run.here.len() * LINE], &from[run.here.start * LINE..]);
             }
         }
@@ -187,7 +187,7 @@ fn add_to(sums: &mut [f64], more: &[f64]) {
 /// One plane.
 #[derive(Debug)]
 pub(in crate::render) struct CellPlane<'a> {
-    pub(super) frame: Frame,
+    pub(super) rectangle: Rectangle,
     sums: &'a mut Option<Aligned>,
 }
 
@@ -197,8 +197,8 @@ mod tests {
 
     #[test]
     fn runs_are_the_cells_that_are_there() {
-        let frame = Frame::holding([-3, 2], [14, 2], 2);
-        assert_eq!((frame.first, frame.size, frame.run), ([-16, 2], [32, 2], 16));
+        let rectangle = Rectangle::holding([-3, 2], [14, 2], 2);
+        assert_eq!((rectangle.first, rectangle.size, rectangle.run), ([-16, 2], [32, 2], 16));
         let run = |start, here, inside| Run { start, here, inside };
         // Even cells first: -16, -14, ... 14, then -15, -13, ... 15.
         for (u, lines, expected) in [
@@ -208,14 +208,14 @@ mod tests {
             (15, 3, run(24, 0..1, 7)),
             (16, 3, run(16, 0..0, 0)),
         ] {
-            assert_eq!(frame.run_of(u, lines), expected, "{u}");
+            assert_eq!(rectangle.run_of(u, lines), expected, "{u}");
         }
         for (u, count, expected) in
             [(-16, 4, (0, 0..2)), (-19, 8, (4, 16..18)), (13, 9, (0, 30..32)), (16, 3, (0, 0..0))]
         {
-            assert_eq!(frame.first_in_row(u, count), expected, "{u}");
+            assert_eq!(rectangle.first_in_row(u, count), expected, "{u}");
         }
-        assert_eq!([1, 2, 3, 4].map(|v| frame.row(v)), [None, Some(0..32), Some(32..64), None]);
-        assert_eq!([-17, -16, 1, 15, 16].map(|u| frame.in_row(u)), [None, Some(0), Some(24), Some(31), None]);
+        assert_eq!([1, 2, 3, 4].map(|v| rectangle.row(v)), [None, Some(0..32), Some(32..64), None]);
+        assert_eq!([-17, -16, 1, 15, 16].map(|u| rectangle.in_row(u)), [None, Some(0), Some(24), Some(31), None]);
     }
 }

@@ -102,12 +102,12 @@ struct Seen {
 
 impl Seen {
     fn of(cells: &Cells, first: [isize; 2], size: [usize; 2]) -> Self {
-        let (frame, phases) = (cells.frame(), cells.frame().phases);
+        let (rectangle, phases) = (cells.rectangle(), cells.rectangle().phases);
         let run = |phase: usize| {
-            let (u, run) = frame.first_in_row(first[0] + phase as isize, size[0].saturating_sub(phase));
+            let (u, run) = rectangle.first_in_row(first[0] + phase as isize, size[0].saturating_sub(phase));
             (phase + u, run)
         };
-        let rows = (first[1]..).take(size[1]).map(|v| frame.row(v)).collect();
+        let rows = (first[1]..).take(size[1]).map(|v| rectangle.row(v)).collect();
         Self { size, phases, rows, runs: (0..phases).map(run).collect() }
     }
 

@@ -21,7 +21,7 @@ mod spread;
 #[cfg(test)]
 mod tests;
 
-pub(super) use cells::{CellPlane, Cells, Frame};
+pub(super) use cells::{CellPlane, Cells, Rectangle};
 pub(super) use gather::Gather;
 pub(super) use picture::Lattice;
 pub(super) use shear::Shear;

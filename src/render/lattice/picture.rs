@@ -1,6 +1,6 @@
 //! The lattice of one view as a way of splatting: when it is used, the sums of blocks, and from sums to pixels.
 
-use super::cells::{Cells, Frame, LINE};
+use super::cells::{Cells, LINE, Rectangle};
 use super::gather::side_by_side;
 use super::kernel::{Kernel, SINGLES};
 use super::shear::Shear;
@@ -147,7 +147,7 @@ impl Lattice {
     }
 
     /// Where the voxels of a block that lie in `clip` are in cells, for planes of `seen`.
-    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, seen: &Frame) -> Placed {
+    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, seen: &Rectangle) -> Placed {
         Placed::new(&self.spreading, region, clip, seen)
     }
 
@@ -157,7 +157,7 @@ impl Lattice {
         let start = [0, 1].map(|i| first[i].max(low[i]));
         let end = |i: usize| (first[i] + size[i] as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
-        Cells::new(Frame::holding(first, size, self.spreading.shear.fineness), planes)
+        Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
     }
 
     /// The cells of a tile of a band, as far as its pixels see them.

@@ -4,7 +4,7 @@
 //! the weights along u, once for each phase, and rows of cells are sums of such rows times the weights along v.
 
 use super::Spreading;
-use super::cells::{Aligned, CellPlane, Frame, LINE};
+use super::cells::{Aligned, CellPlane, LINE, Rectangle};
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::codec::real::Real;
 use crate::render::amounts::Amounts;
@@ -20,7 +20,7 @@ pub(in crate::render) struct Placed {
     clip: Region,
     slices: Vec<Slice>,
     /// The cells that they reach.
-    frame: Frame,
+    rectangle: Rectangle,
     /// Voxels that count along b, c and a; the first of them, and from one to the next, in an array of all.
     count: [usize; 3],
     first: usize,
@@ -57,7 +57,7 @@ pub(in crate::render) struct Work {
 
 impl Placed {
     /// Of the block at `region`, of which the voxels in `clip` count, for planes of some cells.
-    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, seen: &Frame) -> Self {
+    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, seen: &Rectangle) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
@@ -70,7 +70,7 @@ impl Placed {
         let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
             spreading: *spreading,
-            frame: frame_of(&slices, spreading, [count[0], count[1]]),
+            rectangle: rectangle_of(&slices, spreading, [count[0], count[1]]),
             slices,
             count,
             first: region.index(clip.start),
@@ -93,14 +93,14 @@ impl Placed {
 
     /// By way of the block's own cells, which stay in the second cache.
     fn add_all<R: Real>(&self, amounts: &[R], plane: &mut CellPlane<'_>, work: &mut Work) {
-        if work.sums.len() < self.frame.area() {
-            work.sums = Aligned::of(self.frame.area());
+        if work.sums.len() < self.rectangle.area() {
+            work.sums = Aligned::of(self.rectangle.area());
         }
         let mut sums = std::mem::take(&mut work.sums);
-        let own = &mut sums[..self.frame.area()];
+        let own = &mut sums[..self.rectangle.area()];
         own.fill(0.0);
         add_block(self, amounts, own, work);
-        plane.add(&self.frame, own);
+        plane.add(&self.rectangle, own);
         work.sums = sums;
     }
 
@@ -113,9 +113,9 @@ impl Placed {
         let amount = amount * libm::exp(-tau * shear.depth(voxel));
         let [(u, along), (v, across)] = shear.place(voxel).map(|place| spread(*degree, place));
         for (v, across) in (v..).zip(&across[..=*degree]) {
-            let Some(row) = plane.frame.row(v) else { continue };
+            let Some(row) = plane.rectangle.row(v) else { continue };
             for (u, along) in (u..).zip(&along[..=*degree]) {
-                if let Some(at) = plane.frame.in_row(u) {
+                if let Some(at) = plane.rectangle.in_row(u) {
                     plane.sums()[row.start + at] += amount * across * along;
                 }
             }
@@ -125,7 +125,7 @@ impl Placed {
 
 impl Slice {
     /// Of the `k`-th slice of so many voxels from `start` on.
-    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], seen: &Frame) -> Self {
+    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], seen: &Rectangle) -> Self {
         let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
         let [u, v] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
@@ -137,7 +137,7 @@ impl Slice {
 }
 
 /// The cells that slices of so many voxels along b and c reach.
-fn frame_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Frame {
+fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Rectangle {
     let q = spreading.shear.fineness;
     let range = |i: usize| {
         let cells = || slices.iter().map(|s| s.cell[i]);
@@ -146,7 +146,7 @@ fn frame_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Frame
         (low, (high - low) as usize + q * count[i].saturating_sub(1) + spreading.degree.max(MOST_DEGREE) + 1 + q)
     };
     let (u, v) = (range(0), range(1));
-    Frame::holding([u.0, v.0], [u.1, v.1], q)
+    Rectangle::holding([u.0, v.0], [u.1, v.1], q)
 }
 
 #[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
@@ -183,7 +183,7 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
             let (live, seen) = (fade_rows(placed, amounts, &rows, work), &slice.seen[0]);
             let live = live.start.max(seen.start / LINE)..live.end.min(seen.end.div_ceil(LINE));
             if !live.is_empty() {
-                add_rows::<Q, TAPS>((slice, &placed.frame), (&rows, &live), work, sums);
+                add_rows::<Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
             }
         }
     }
@@ -246,21 +246,21 @@ fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row
 /// spread along u stays in registers for all rows of cells that it reaches.
 #[inline(always)]
 fn add_rows<const Q: usize, const TAPS: usize>(
-    (slice, frame): (&Slice, &Frame),
+    (slice, rectangle): (&Slice, &Rectangle),
     (rows, live): (&Range<usize>, &Range<usize>),
     work: &Work,
     sums: &mut [f64],
 ) {
     let across = by_phase::<Q, TAPS>(&slice.across);
-    let top = (slice.cell[1] - frame.first[1]) as usize + rows.start * Q;
+    let top = (slice.cell[1] - rectangle.first[1]) as usize + rows.start * Q;
     for (phase, along) in by_phase::<Q, TAPS>(&slice.along).into_iter().enumerate() {
-        let run = frame.run_of(slice.cell[0] + phase as isize, work.lines);
+        let run = rectangle.run_of(slice.cell[0] + phase as isize, work.lines);
         let reached = live.start..live.end + (run.inside + TAPS - 2) / LINE + 1;
         for n in reached.start.max(run.here.start)..reached.end.min(run.here.end) {
             let column = run.start + (n - run.here.start) * LINE;
             let from = n * LINE + work.before - run.inside + 1 - TAPS;
             let faded = work.faded[from..].chunks(work.width).take(rows.len() + TAPS - 1);
-            let mut sums = sums[top * frame.size[0] + column..].chunks_mut(frame.size[0]);
+            let mut sums = sums[top * rectangle.size[0] + column..].chunks_mut(rectangle.size[0]);
             let mut window = [[0.0; LINE]; TAPS];
             for row in faded {
                 for m in (1..TAPS).rev() {

@@ -1,6 +1,6 @@
 //! Amounts of blocks, spread slice by slice, against each by itself.
 
-use super::cells::Frame;
+use super::cells::Rectangle;
 use super::spline::spread;
 use super::*;
 use crate::camera::{Camera, View};
@@ -91,23 +91,23 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         }
         cut += usize::from(more.iter().any(|n| *n < 0));
         let size = [0, 1].map(|i| (high[i] - low[i] + 1 + more[i] + more[2 + i]).max(1) as usize);
-        let frame = Frame::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
-        let placed = Placed::new(&spreading, &block, &clip, &frame);
+        let rectangle = Rectangle::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
+        let placed = Placed::new(&spreading, &block, &clip, &rectangle);
         let single: Vec<f32> = amounts.iter().map(|v| *v as f32).collect();
         let few: Vec<(u32, f64)> = (0..).zip(amounts.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways = [Amounts::Double(&amounts), Amounts::Single(&single), Amounts::Few(&few), Amounts::Nothing];
-        let (mut planes, mut work) = (Cells::new(frame, ways.len()), Work::default());
+        let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
         let into = planes.planes_mut().into_iter().zip(ways);
         into.for_each(|(mut plane, amounts)| placed.add(amounts, &mut plane, &mut work));
         let touched: Vec<usize> = planes.touched().map(|(number, _)| number).collect();
         assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // few may all be elsewhere
-        let whole = Frame::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
+        let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
         let placed = Placed::new(&spreading, &block, &clip, &whole);
         placed.add(Amounts::Double(&amounts), &mut all.planes_mut()[0], &mut work);
         let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.touched().take(2) {
-            for (cell, sum) in cells_of(&frame, plane) {
+            for (cell, sum) in cells_of(&rectangle, plane) {
                 assert_eq!(
                     sum,
                     all.get(&cell).copied().unwrap_or(0.0),
@@ -116,7 +116,7 @@ fn amounts_of_blocks_are_as_each_by_itself() {
             }
         }
         for (number, plane) in planes.touched() {
-            for (cell, sum) in cells_of(&frame, plane) {
+            for (cell, sum) in cells_of(&rectangle, plane) {
                 let expected = expected.get(&cell).copied().unwrap_or(0.0);
                 let off = (sum - expected).abs();
                 assert!(off < 1e-10 * (1.0 + expected.abs()), "{seed}, {number}: {sum} for {expected} at {cell:?}");
@@ -127,11 +127,11 @@ fn amounts_of_blocks_are_as_each_by_itself() {
 }
 
 /// Every cell of a plane and its sum.
-fn cells_of<'a>(frame: &'a Frame, plane: &'a [f64]) -> impl Iterator<Item = ([isize; 2], f64)> + 'a {
-    let [first_u, first_v] = frame.first;
-    let rows = (first_v..).map_while(|v| Some((v, frame.row(v)?)));
+fn cells_of<'a>(rectangle: &'a Rectangle, plane: &'a [f64]) -> impl Iterator<Item = ([isize; 2], f64)> + 'a {
+    let [first_u, first_v] = rectangle.first;
+    let rows = (first_v..).map_while(|v| Some((v, rectangle.row(v)?)));
     rows.flat_map(move |(v, row)| {
-        let cells = (first_u..).map_while(|u| Some((u, frame.in_row(u)?)));
+        let cells = (first_u..).map_while(|u| Some((u, rectangle.in_row(u)?)));
         cells.map(move |(u, at)| ([u, v], plane[row.start + at]))
     })
 }
