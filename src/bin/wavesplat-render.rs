@@ -6,7 +6,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use wavesplat::bound::range_bound;
-use wavesplat::camera::View;
+use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
@@ -16,8 +16,10 @@ use wavesplat::progress::Silent;
 use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, check, default_splat_error,
+    render,
 };
+use wavesplat::volume::Grid;
 use wavesplat_format::Metadata;
 
 /// Render pictures of time-varying volumes.
@@ -58,7 +60,7 @@ struct Cli {
         help_heading = "View"
     )]
     views: Vec<Pair>,
-    /// Instead of each view so many, evenly around the vertical axis, beginning with it
+    /// Instead of each view so many, evenly around the vertical axis, beginning with it, and of the smallest scale of all
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
     orbit: u32,
     /// Degrees by which the picture turns counter-clockwise
@@ -202,6 +204,7 @@ impl Cli {
     /// Where the pictures of each view go, and where those of their errors go, if anywhere.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>)> {
         let (pictures, errors) = self.targets(config)?;
+        check(scene, config)?;
         let coloured_array = self.colormap.is_some();
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
         let needed = (pictures.format != PictureFormat::Npy || coloured_array) && self.range.is_none() || certify;
@@ -210,6 +213,9 @@ impl Cli {
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
+        }
+        if certify {
+            self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
         }
         let open = |targets: Targets, range, coloured_array| {
             let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
@@ -279,7 +285,7 @@ impl Cli {
         }
         let all = scene.frames().unwrap_or(0);
         Ok(RenderConfig {
-            views: self.views(),
+            views: self.views(grid)?,
             kernel: Kernel::new(self.sigma, self.tau, grid)?,
             quantity: match self.quantity {
                 QuantityName::Mean => Quantity::Mean,
@@ -291,31 +297,33 @@ impl Cli {
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
-            memory: self.common.memory.0.saturating_sub(self.streams() * Output::BUFFER),
+            memory: self.common.memory.0,
+            reserved: self.views.len()
+                * self.orbit as usize
+                * (1 + usize::from(self.error_image.is_some()))
+                * Output::BUFFER,
         })
     }
 
-    /// Files that are open at a time, at most.
-    fn streams(&self) -> usize {
-        self.views().len() * (1 + usize::from(self.error_image.is_some()))
+    /// All views, each with those of its orbit.
+    fn views(&self, grid: &Grid) -> Result<Vec<View>> {
+        let orbits = self.views.iter().map(|first| self.orbit(first.0, grid));
+        Ok(orbits.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// All views, each with those of its orbit.
-    fn views(&self) -> Vec<View> {
-        let orbit = |first: &Pair| {
-            let [azimuth, elevation] = first.0;
-            let steps = (0..self.orbit).map(|n| f64::from(n) * 360.0 / f64::from(self.orbit));
-            steps.map(move |turned| (azimuth + turned, elevation))
-        };
-        let view = |(azimuth, elevation)| View {
-            azimuth,
-            elevation,
-            roll: self.roll,
-            size: self.size.0,
-            scale: self.scale,
-            center: self.center.map(|c| c.0),
-        };
-        self.views.iter().flat_map(orbit).map(view).collect()
+    /// The views of an orbit, all of one scale.
+    fn orbit(&self, [azimuth, elevation]: [f64; 2], grid: &Grid) -> Result<Vec<View>> {
+        let (roll, size, center) = (self.roll, self.size.0, self.center.map(|c| c.0));
+        let first = View { azimuth, elevation, roll, size, scale: self.scale, center };
+        if self.orbit == 1 {
+            return Ok(vec![first]);
+        }
+        let turned = |n| (azimuth + f64::from(n) * 360.0 / f64::from(self.orbit)).rem_euclid(360.0);
+        let mut views: Vec<View> = (0..self.orbit).map(|n| View { azimuth: turned(n), ..first }).collect();
+        let scales = views.iter().map(|view| Camera::new(view, grid).map(|camera| camera.scale));
+        let scale = scales.collect::<Result<Vec<_>>>()?.into_iter().fold(f64::INFINITY, f64::min);
+        views.iter_mut().for_each(|view| view.scale = Some(scale));
+        Ok(views)
     }
 
     /// The error that samples may have under a looser tolerance, in their unit.

@@ -1,19 +1,20 @@
 //! Where a scene is seen from, and how it is splatted: everything that is the same for all frames of a view.
 
 use super::lattice::Lattice;
+use super::place::{overlap, rows_reached};
 use super::scene::Scene;
-use super::splat::{overlap, rows_reached};
-use super::uncut::Uncut;
-use super::weights::BACKGROUND;
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
 use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
-use crate::footprint::{Footprint, Kernel, Method};
+use crate::footprint::{Footprint, Method};
 use crate::volume::{BlockGrid, Grid, Region};
 use std::ops::Range;
 
 /// Means are of voxels of which some are not deeper than this over tau: exponentials lose digits at 708, and vanish.
 const DEEPEST: f64 = 640.0;
+
+/// A pixel is background where its weights sum to less than this share of the view's largest.
+pub(super) const BACKGROUND: f64 = 0.01;
 
 /// Everything that is the same for all frames of a view.
 #[derive(Debug, Clone)]
@@ -63,23 +64,11 @@ impl Eye {
         let method = instead.unwrap_or(method);
         let (tau, stated_error) = (config.kernel.tau, method.stated_error);
         let deepest = f64::INFINITY;
-        let eye = Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest };
-        let left = most_splat_error(config.quantity, config.splat_error) - stated_error;
-        if config.certify || tau == 0.0 || left <= 0.0 { Ok(eye) } else { eye.without_what_is_dim(config.kernel, left) }
+        Ok(Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest })
     }
 
     pub(super) fn pixels(&self) -> usize {
         self.camera.size[0] * self.camera.size[1]
-    }
-
-    /// Leaves out what is so deep that it adds at most such a share of the largest sum of weights.
-    fn without_what_is_dim(mut self, kernel: Kernel, share: f64) -> Result<Self> {
-        let exact = Footprint::new(kernel, &self.grid, self.camera.scale, Method::EXACT)?;
-        let deepest = Uncut::new(&self, &exact).deepest(share);
-        if deepest < self.camera.depth(&self.grid) {
-            (self.deepest, self.stated_error) = (deepest, self.stated_error + share);
-        }
-        Ok(self)
     }
 
     /// Whether a block is so deep that it may be left out.

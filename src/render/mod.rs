@@ -26,6 +26,7 @@ mod eye;
 mod finish;
 mod frames;
 mod lattice;
+mod place;
 mod plan;
 mod reading;
 mod scene;
@@ -90,6 +91,8 @@ pub struct RenderConfig {
     pub certify: bool,
     /// Bytes that may be allocated.
     pub memory: usize,
+    /// Bytes of these that the sink takes for itself.
+    pub reserved: usize,
 }
 
 /// An error that can be limited.
@@ -226,9 +229,7 @@ pub fn render(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
-    config.check()?;
-    let eyes = config.views.iter().map(|view| Eye::new(scene, config, view)).collect::<Result<Vec<_>>>()?;
-    eyes.iter().try_for_each(|eye| Budget::new(config, scene, std::slice::from_ref(eye)).map(|_| ()))?;
+    let eyes = eyes(scene, config)?;
     progress.start(Some((eyes.len() * config.frames.len()) as u64));
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
     report.views = config.views.iter().zip(&eyes).map(|(view, eye)| ViewReport::new(view, eye)).collect();
@@ -242,7 +243,7 @@ pub fn render(
     };
     let mut first = 0;
     while first < eyes.len() {
-        let budget = Budget::of_most(config, scene, &eyes[first..])?;
+        let budget = Budget::of_most(config, scene, &eyes[first..]);
         render_views(scene, config, (&budget, first), &mut report, &mut sink)?;
         first += budget.eyes().len();
     }
@@ -250,6 +251,20 @@ pub fn render(
     report.sum_up_expected_errors();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
+}
+
+/// An error if [`render`] would refuse to begin.
+pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
+    eyes(scene, config).map(|_| ())
+}
+
+/// All views, for each of which there is memory enough.
+fn eyes(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<Eye>> {
+    config.check()?;
+    let eye = |view: &View| uncut::without_what_is_dim(Eye::new(scene, config, view)?, config);
+    let eyes = config.views.iter().map(eye).collect::<Result<Vec<_>>>()?;
+    Budget::check(config, scene, &eyes)?;
+    Ok(eyes)
 }
 
 /// Renders all frames from views that go together, the first of which is number `first_view`.
@@ -305,7 +320,7 @@ fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
     match quantity {
         Quantity::Emission => error,
         // A pixel that is not background must keep some of its weights.
-        Quantity::Mean => error.min(0.9 * weights::BACKGROUND),
+        Quantity::Mean => error.min(0.9 * eye::BACKGROUND),
     }
 }
 

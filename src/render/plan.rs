@@ -5,8 +5,9 @@
 
 use super::RenderConfig;
 use super::eye::Eye;
+use super::place::TILE;
 use super::scene::Scene;
-use super::splat::{Splats, TILE};
+use super::splat::Splats;
 use super::terms::{Layout, Terms};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -31,35 +32,40 @@ pub(super) struct Budget<'a> {
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
-    /// For pictures of a scene from these views.
-    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Result<Self> {
-        let size = config.size();
-        let fixed = memory::FIXED + eyes.len() * size[0] * size[1] * WEIGHT_BYTES;
-        let numbers = 1 + usize::from(config.certify);
-        let available = config.memory.saturating_sub(fixed);
-        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
-        let budget = Self { eyes, available, size, numbers, block, block_bytes };
-        let least = budget.bytes(1, scene.most_planes(1, config), TILE);
-        if least > budget.available {
-            let mib = (fixed + least).div_ceil(1 << 20);
-            let threads = rayon::current_num_threads();
-            let what = format!(
-                "--memory: pictures of {}x{} pixels of this volume need at least {mib}MiB with {threads} thread(s)",
-                size[0], size[1]
-            );
-            return Err(Error::usage(what));
+    /// An error unless there is memory enough for each of some views alone.
+    pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, eyes: &[Eye]) -> Result<()> {
+        let planes = scene.most_planes(1, config);
+        let least = |eye: &Eye| {
+            let eyes = std::slice::from_ref(eye);
+            fixed(config, eyes) + Budget::new(config, scene, eyes).bytes(1, planes, TILE)
+        };
+        let least = eyes.iter().map(least).max().unwrap_or(0);
+        if least <= config.memory {
+            return Ok(());
         }
-        Ok(budget)
+        let ([width, height], mib) = (config.size(), least.div_ceil(1 << 20));
+        let threads = rayon::current_num_threads();
+        Err(Error::usage(format!(
+            "--memory: pictures of {width}x{height} pixels of this volume need at least {mib}MiB with {threads} thread(s)"
+        )))
+    }
+
+    /// For pictures of a scene from these views.
+    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
+        let (size, numbers) = (config.size(), 1 + usize::from(config.certify));
+        let available = config.memory.saturating_sub(fixed(config, eyes));
+        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
+        Self { eyes, available, size, numbers, block, block_bytes }
     }
 
     /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
     /// alone. Where what is read is chosen by the view, that is one.
-    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Result<Self> {
-        let alone = Self::new(config, scene, &eyes[..1])?;
+    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
+        let alone = Self::new(config, scene, &eyes[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
         let fits = |budget: &Self| budget.bytes(frames, planes, budget.size[1]) <= budget.available;
-        let several = |count: usize| Self::new(config, scene, &eyes[..count]).ok().filter(fits);
+        let several = |count: usize| Some(Self::new(config, scene, &eyes[..count])).filter(fits);
         let (mut best, mut least, mut most) = (alone, 1, if config.chooses_by_view() { 1 } else { eyes.len() });
         while least < most {
             let middle = least.midpoint(most + 1);
@@ -68,7 +74,7 @@ impl<'a> Budget<'a> {
                 None => most = middle - 1,
             }
         }
-        Ok(best)
+        best
     }
 
     /// The views.
@@ -140,6 +146,12 @@ impl<'a> Budget<'a> {
 
 /// Tiles across a band, at least, if it can be: blocks that reach over a band's edge are decoded for both.
 const FEW_ROWS: usize = 4;
+
+/// Bytes that are held whatever is rendered at a time: weights among them.
+fn fixed(config: &RenderConfig, eyes: &[Eye]) -> usize {
+    let [width, height] = config.size();
+    memory::FIXED + config.reserved + eyes.len() * width * height * WEIGHT_BYTES
+}
 
 /// The most frames of one group.
 fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {

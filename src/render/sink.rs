@@ -176,6 +176,9 @@ pub fn names_of_views(path: &Path, views: usize) -> Result<Vec<PathBuf>> {
             Ok((0..views).map(|view| format!("{before}{view:0digits$}{after}").into()).collect())
         }
         None if views == 1 => Ok(vec![path.into()]),
+        None if path == Path::new(STANDARD) => {
+            Err(Error::usage(format!("-: standard output takes one view, not {views}; files have their number as %v")))
+        }
         None => Err(Error::usage(format!("{name}: {views} views need a name with their number, as view%v_%04d.png"))),
     }
 }

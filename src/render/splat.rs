@@ -4,15 +4,11 @@
 //! is tiled or on the number of threads. Sums are in f64.
 
 use super::eye::Eye;
+use super::place::{Place, intersect, overlap};
 use super::terms::Terms;
-use crate::camera::Camera;
 use crate::footprint::Footprint;
-use crate::volume::{Grid, Region};
 use crate::wavelet::Lane;
 use std::ops::Range;
-
-/// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
-pub(super) const TILE: usize = 64;
 
 /// How the planes of a tile lie in memory. No sum depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,33 +17,6 @@ pub enum Order {
     Planes,
     /// Pixel by pixel: fast where voxels have terms in most planes, all planes of a pixel at a time.
     Pixels,
-}
-
-/// A rectangle of pixels.
-#[derive(Debug, Clone)]
-pub(super) struct Place {
-    /// Columns of the picture.
-    pub(super) x: Range<usize>,
-    /// Rows of the picture.
-    pub(super) y: Range<usize>,
-}
-
-impl Place {
-    /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels wide.
-    pub(super) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
-        let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
-        pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
-    }
-
-    /// Number of pixels.
-    pub(super) fn pixels(&self) -> usize {
-        self.x.len() * self.y.len()
-    }
-
-    /// The column and the row of a pixel, counted row by row.
-    pub(super) fn pixel(&self, n: usize) -> [usize; 2] {
-        [self.x.start + n % self.x.len(), self.y.start + n / self.x.len()]
-    }
 }
 
 /// A rectangle of pixels with its planes.
@@ -200,51 +169,4 @@ impl Splats {
 fn reach(spans: impl Iterator<Item = Range<usize>>) -> Range<usize> {
     let all = spans.filter(|s| !s.is_empty()).reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
     all.unwrap_or(0..0)
-}
-
-/// The rows of the picture that any voxel of a block can reach; a block that reaches no column reaches no row.
-pub(super) fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
-    let ends: [[f64; 3]; 2] = [grid.position(region.start), grid.position(region.end.map(|e| e - 1))];
-    let corner = |n: usize| camera.project(std::array::from_fn(|a| ends[n >> a & 1][a]));
-    rows_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
-}
-
-/// The rows of a picture of such a size that are within `reach` pixels of the box around some places; none if no column is.
-pub(super) fn rows_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, size: [usize; 2]) -> Range<usize> {
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for place in places {
-        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
-    }
-    // A pixel more on each side than rounding could move an edge.
-    let span = |i: usize| {
-        let (from, to) = (low[i] - reach - 1.0, high[i] + reach + 1.0);
-        let end = to.clamp(0.0, size[i] as f64).ceil() as usize;
-        from.clamp(0.0, end as f64).floor() as usize..end
-    };
-    if span(0).is_empty() { 0..0 } else { span(1) }
-}
-
-/// Whether two ranges share anything.
-pub(super) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
-    !intersect(a, b).is_empty()
-}
-
-fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    a.start.max(b.start)..a.end.min(b.end)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tiles_cover_each_pixel_once() {
-        let mut seen = vec![0; 150 * 100];
-        for place in Place::cover(150, 30..100, TILE) {
-            for y in place.y.clone() {
-                place.x.clone().for_each(|x| seen[y * 150 + x] += 1);
-            }
-        }
-        assert!(seen[..30 * 150].iter().all(|n| *n == 0) && seen[30 * 150..].iter().all(|n| *n == 1));
-    }
 }

@@ -2,8 +2,24 @@
 
 use super::eye::Eye;
 use super::lattice::Shear;
-use crate::footprint::Footprint;
+use super::{RenderConfig, most_splat_error};
+use crate::error::Result;
+use crate::footprint::{Footprint, Method};
 use std::ops::Range;
+
+/// Leaves out voxels so deep that what they add is within what the method leaves of the splat error.
+pub(super) fn without_what_is_dim(mut eye: Eye, config: &RenderConfig) -> Result<Eye> {
+    let share = most_splat_error(config.quantity, config.splat_error) - eye.stated_error;
+    if config.certify || eye.tau == 0.0 || share <= 0.0 {
+        return Ok(eye);
+    }
+    let exact = Footprint::new(config.kernel, &eye.grid, eye.camera.scale, Method::EXACT)?;
+    let deepest = Uncut::new(&eye, &exact).deepest(share);
+    if deepest < eye.camera.depth(&eye.grid) {
+        (eye.deepest, eye.stated_error) = (deepest, eye.stated_error + share);
+    }
+    Ok(eye)
+}
 
 /// The sums of weights of a view at single pixels.
 pub(super) struct Uncut<'a> {

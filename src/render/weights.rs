@@ -3,7 +3,7 @@
 use super::amounts::{BlockPlanes, OnesOf};
 use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
 use super::certificate;
-use super::eye::Eye;
+use super::eye::{BACKGROUND, Eye};
 use super::plan::Budget;
 use super::splat::Order;
 use super::terms::Layout;
@@ -15,8 +15,6 @@ use crate::volume::BlockGrid;
 use crate::wavelet::LANES;
 use rayon::prelude::*;
 
-/// A pixel is background where its weights sum to less than this share of the view's largest.
-pub(super) const BACKGROUND: f64 = 0.01;
 /// Of a pixel's weights this share must not be missing.
 const LEAST_PRESENT: f64 = 1e-6;
 

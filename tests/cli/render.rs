@@ -39,16 +39,19 @@ fn one_png_takes_one_frame() {
 #[test]
 fn each_view_has_a_name_of_its_own() {
     let work = Work::with_file("");
-    work.render(&format!("a.wspl {SIZE} --frames 2 --view 30,30 -o plain.npy")).ok();
-    work.render(&format!("a.wspl {SIZE} --frames 2 --view=-60,30 --orbit 4 -o view%02v.npy")).ok();
+    work.render(&format!("a.wspl {SIZE} --frames 2 --view 30,30 --scale 1.5 -o plain.npy")).ok();
+    work.render(&format!("a.wspl {SIZE} --frames 2 --view=-60,30 --orbit 4 --scale 1.5 -o view%02v.npy")).ok();
     work.render(&format!("a.wspl {SIZE} --frames 2 --orbit 2 -o c%v.npy --error-image e%v.npy")).ok();
-    work.render(&format!("a.wspl {SIZE} --frames 2 --view 0,90 --view=-60,30 -o two%v.npy")).ok();
+    work.render(&format!("a.wspl {SIZE} --frames 2 --view 0,90 --view=-60,30 --scale 1.5 -o two%v.npy")).ok();
+    let json = work.render(&format!("a.wspl {SIZE} --frames 2 --orbit 3 -o s%v.npy --json"));
+    let scales: HashSet<&str> = json.text().lines().filter(|line| line.contains("scale")).collect();
+    assert_eq!(scales.len(), 1, "a turn does not zoom");
     let turned = |n: usize| work.read(&format!("view{n:02}.npy"));
     assert!(turned(0) == work.read("two1.npy") && turned(1) == work.read("plain.npy"));
     assert!(turned(0) != turned(2) && turned(1) != turned(3) && work.read("e1.npy").len() == turned(1).len());
     let run = work.render(&format!("a.wspl {SIZE} --view 1,2 --orbit 2 -o x%d.png"));
     run.fails(2, &["x%d.png", "2 views", "%v"]);
-    work.render(&format!("a.wspl {SIZE} --orbit 2 -o -")).fails(2, &["2 views"]);
+    work.render(&format!("a.wspl {SIZE} --orbit 2 -o -")).fails(2, &["one view"]);
     work.render(&format!("a.wspl {SIZE} --orbit 0 -o x%v.npy")).fails(2, &["--orbit"]);
     // Nothing is written twice, nor over what is read.
     let twice = work.render(&format!("a.wspl {SIZE} --frames 1,11 --orbit 12 -o x%v%d.png --force"));

@@ -122,6 +122,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         limited: Default::default(),
         certify: false,
         memory: MEMORY,
+        reserved: 0,
     }
 }
 

@@ -124,6 +124,7 @@ fn pictures(scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
         limited: Default::default(),
         certify: false,
         memory: MEMORY,
+        reserved: 0,
     };
     let mut all = Vec::new();
     let report = render(scene, &config, &Silent, &mut |rendered| {

@@ -3,7 +3,7 @@
 use super::cells::Cells;
 use super::kernel::Weights;
 use super::picture::Lattice;
-use crate::render::splat::Place;
+use crate::render::place::Place;
 use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 

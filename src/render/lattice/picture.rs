@@ -8,7 +8,7 @@ use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
 use crate::camera::Camera;
 use crate::footprint::{Footprint, Kernel as Gaussian, Method};
-use crate::render::splat::{Place, TILE, rows_around};
+use crate::render::place::{Place, TILE, rows_around};
 use crate::volume::{Grid, Region};
 use std::ops::Range;
 

@@ -162,6 +162,7 @@ fn pictures(
         limited: allowed.map(|(_, limit)| limit).unwrap_or_default(),
         certify: false,
         memory: MEMORY,
+        reserved: 0,
     };
     let (mut found, mut best) = (Vec::new(), RenderReport { seconds: f64::INFINITY, ..RenderReport::default() });
     for _ in 0..if splat_error > 0.0 { REPEATS } else { 1 } {

@@ -147,6 +147,7 @@ fn by_library(
         limited: Default::default(),
         certify,
         memory: MEMORY,
+        reserved: 0,
     };
     let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered);

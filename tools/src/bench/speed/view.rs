@@ -184,6 +184,7 @@ fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[
         limited: Limit::Expected,
         certify: false,
         memory: MEMORY,
+        reserved: 0,
     };
     let report = render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered.frame, rendered.picture);
