@@ -2,6 +2,7 @@
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 use clap::{Parser, ValueEnum};
+use serde::Serialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -177,7 +178,7 @@ impl Cli {
         self.common.start()?;
         let (mut scene, file) = self.scene()?;
         let config = self.config(scene.as_ref(), file.as_ref())?;
-        let (mut pictures, mut errors) = self.sinks(scene.as_mut(), &config)?;
+        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config)?;
         let progress = self.common.progress("pictures");
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
             if let (Some(sink), Some(error)) = (errors.get_mut(rendered.view), rendered.error) {
@@ -198,16 +199,17 @@ impl Cli {
         if let Some(error) = report.certified_error {
             self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
         }
-        self.common.report(&report, self.output == Path::new(STANDARD))
+        self.common.report(&Reported { report: &report, coloured }, self.output == Path::new(STANDARD))
     }
 
-    /// Where the pictures of each view go, and where those of their errors go, if anywhere.
-    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>)> {
+    /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
+    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
         let (pictures, errors) = self.targets(config)?;
         check(scene, config)?;
         let coloured_array = self.colormap.is_some();
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
-        let needed = (pictures.format != PictureFormat::Npy || coloured_array) && self.range.is_none() || certify;
+        let in_colours = pictures.format != PictureFormat::Npy || coloured_array;
+        let needed = in_colours && self.range.is_none() || certify;
         let looking = RenderConfig { certify, ..config.clone() };
         let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
@@ -224,7 +226,8 @@ impl Cli {
             targets.names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
         };
         let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, seen.errors, false))?;
-        Ok((open(pictures, range, coloured_array)?, errors))
+        let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
+        Ok((open(pictures, range, coloured_array)?, errors, coloured))
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -355,6 +358,22 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
         return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
     }
     error
+}
+
+/// What `--json` says.
+#[derive(Serialize)]
+struct Reported<'a> {
+    #[serde(flatten)]
+    report: &'a RenderReport,
+    #[serde(flatten)]
+    coloured: Coloured,
+}
+
+/// The values of the first and the last colour, of what is in colours.
+#[derive(Serialize)]
+struct Coloured {
+    range: Option<(f64, f64)>,
+    error_range: Option<(f64, f64)>,
 }
 
 /// Where pictures go: a name for each view.

@@ -46,6 +46,9 @@ fn each_view_has_a_name_of_its_own() {
     let json = work.render(&format!("a.wspl {SIZE} --frames 2 --orbit 3 -o s%v.npy --json"));
     let scales: HashSet<&str> = json.text().lines().filter(|line| line.contains("scale")).collect();
     assert_eq!(scales.len(), 1, "a turn does not zoom");
+    assert!(json.json()["range"].is_null(), "values have no colours");
+    let json = work.render(&format!("a.wspl {SIZE} --frames 2 -o c.png --range 1,3 --json")).json();
+    assert_eq!((json["range"][0].as_f64(), json["range"][1].as_f64()), (Some(1.0), Some(3.0)));
     let turned = |n: usize| work.read(&format!("view{n:02}.npy"));
     assert!(turned(0) == work.read("two1.npy") && turned(1) == work.read("plain.npy"));
     assert!(turned(0) != turned(2) && turned(1) != turned(3) && work.read("e1.npy").len() == turned(1).len());
