@@ -1,12 +1,11 @@
 //! Pictures of single frames against brute force (method.md section 2).
 
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
-use crate::common::{MEMORY, direct, looking, pictures, rendered};
+use crate::common::{MEMORY, direct, looking, pictures, rendered, rendered_if_it_can_be};
 use crate::reference::splat::BACKGROUND;
 use wavesplat::camera::View;
 use wavesplat::error::Error;
-use wavesplat::progress::Silent;
-use wavesplat::render::{Quantity, RenderConfig, render};
+use wavesplat::render::{Quantity, RenderConfig};
 use wavesplat::sample::SampleType;
 use wavesplat::volume::{Grid, Region};
 
@@ -203,11 +202,11 @@ pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config
     let mut count = 0;
     for memory in [MEMORY, 32 << 20, 24 << 20, 18 << 20, 16 << 20, 14 << 20, 12 << 20, 11 << 20, 10 << 20, 9 << 20] {
         let config = RenderConfig { memory, ..config.clone() };
-        match render(scene, &config, &Silent, &mut |_| Ok(())) {
-            Err(Error::Usage(_)) => continue,
-            other => drop(other.unwrap()),
+        let found = rendered_if_it_can_be(scene, &config);
+        if let Err(Error::Usage(_)) = found {
+            continue;
         }
-        let (again, errors_again, _) = rendered(scene, &config);
+        let (again, errors_again, _) = found.unwrap();
         assert_eq!(bits(&first), bits(&again), "{memory} bytes");
         assert_eq!(bits(&errors), bits(&errors_again), "{memory} bytes");
         count += 1;

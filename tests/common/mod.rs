@@ -134,17 +134,24 @@ pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32
 
 /// The pictures, and their certified errors if those are asked for.
 pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, Vec<f32>, RenderReport) {
+    rendered_if_it_can_be(scene, config).unwrap()
+}
+
+/// The same, or why it cannot be.
+pub(crate) fn rendered_if_it_can_be(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+) -> wavesplat::error::Result<(Vec<f32>, Vec<f32>, RenderReport)> {
     let (mut pictures, mut errors, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
     let report = render(scene, config, &Silent, &mut |rendered| {
         numbers.push(rendered.frame);
         pictures.extend_from_slice(rendered.picture);
         errors.extend_from_slice(rendered.error.unwrap_or_default());
         Ok(())
-    })
-    .unwrap();
+    })?;
     assert_eq!(numbers, config.frames);
     assert_eq!(errors.len(), if config.certify { pictures.len() } else { 0 });
-    (pictures, errors, report)
+    Ok((pictures, errors, report))
 }
 
 /// The frames of `memory` as they are.
