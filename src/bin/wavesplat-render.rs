@@ -205,12 +205,14 @@ impl Cli {
     /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
     fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
         let (pictures, errors) = self.targets(config)?;
-        check(scene, config)?;
         let coloured_array = self.colormap.is_some();
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
         let in_colours = pictures.format != PictureFormat::Npy || coloured_array;
         let needed = in_colours && self.range.is_none() || certify;
         let looking = RenderConfig { certify, ..config.clone() };
+        if needed {
+            check(scene, config)?; // or small pictures would be made in vain, and what they need be named
+        }
         let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
         let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
         if needed {

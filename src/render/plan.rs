@@ -101,7 +101,7 @@ impl<'a> Budget<'a> {
 
     /// Finished pictures of a group, as f32.
     fn picture_bytes(&self, frames: usize) -> usize {
-        self.eyes.len() * frames * self.numbers * self.size[0] * self.size[1] * size_of::<f32>()
+        self.eyes.len() * frames * self.numbers * self.pixels() * size_of::<f32>()
     }
 
     /// Bands of so many rows with all planes, and what threads work with.
