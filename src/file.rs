@@ -7,9 +7,11 @@ use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::scan::join_ranges;
 use crate::volume::{BlockGrid, Grid, Region};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use wavesplat_format::{BlockEntry, FileId, LeafEntry, Metadata, Reader};
+use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Unfinished};
 
 /// An open file; several threads may read it.
 #[derive(Debug)]
@@ -20,6 +22,32 @@ pub struct CoefficientFile {
     pub grid: Grid,
     /// How it is cut into blocks.
     pub blocks: BlockGrid,
+    /// Damaged blocks that are taken for missing samples, if they are.
+    skipped: Option<Damage>,
+}
+
+/// What is wrong with a file, block by block.
+#[derive(Debug, Clone, Default)]
+pub struct Damage {
+    blocks: BTreeMap<BlockId, String>,
+}
+
+impl Damage {
+    /// Whether no block is damaged.
+    pub fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+
+    /// How many blocks are, and what is wrong with the first.
+    pub fn words(&self) -> String {
+        let first = self.blocks.values().next().map_or("", String::as_str);
+        format!("{} damaged blocks were left out; the first: {first}", self.blocks.len())
+    }
+
+    fn of_window(&self, window: u32) -> bool {
+        let first = BlockId { window, block: 0, channel: 0 };
+        self.blocks.range(first..).next().is_some_and(|(id, _)| id.window == window)
+    }
 }
 
 impl CoefficientFile {
@@ -35,7 +63,7 @@ impl CoefficientFile {
             let what = format!("{} channels", m.channels);
             return Err(failed(wavesplat_format::Error::Unsupported(what)));
         }
-        Ok(Self { path: path.into(), grid, blocks, reader })
+        Ok(Self { path: path.into(), grid, blocks, reader, skipped: None })
     }
 
     /// Its path.
@@ -110,9 +138,55 @@ impl CoefficientFile {
         self.reader.leaves(window)
     }
 
+    /// Takes damaged blocks for blocks of missing samples from here on, once all are read to find them.
+    pub fn skip_damaged(mut self) -> Result<Self> {
+        let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
+        let leaves: Vec<_> = leaves.copied().collect();
+        let found = leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?;
+        self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect() });
+        Ok(self)
+    }
+
+    /// What is wrong with the blocks of a leaf; an error if the storage fails.
+    fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
+        let ids = (leaf.first_block..).take(leaf.count.into()).map(|block| BlockId { block, ..leaf.first() });
+        let entries = match self.reader.leaf(leaf) {
+            Err(failed @ wavesplat_format::Error::Io(_)) => return Err(self.failed(failed)),
+            Err(wrong) => return Ok(ids.map(|id| (id, wrong.to_string())).collect()),
+            Ok(entries) => entries,
+        };
+        let mut found = Vec::new();
+        for entry in entries {
+            match self.reader.check_stored(&entry) {
+                Ok(()) => {}
+                Err(failed @ wavesplat_format::Error::Io(_)) => return Err(self.failed(failed)),
+                Err(wrong) => found.push((entry.id, wrong.to_string())),
+            }
+        }
+        Ok(found)
+    }
+
+    /// What [`Self::skip_damaged`] found.
+    pub fn skipped(&self) -> Option<&Damage> {
+        self.skipped.as_ref().filter(|damage| !damage.is_empty())
+    }
+
+    /// Whether any sample of a window may be missing.
+    pub fn has_missing(&self, window: u32) -> bool {
+        let record = &self.metadata().windows[window as usize];
+        record.missing > 0 || self.skipped().is_some_and(|damage| damage.of_window(window))
+    }
+
     /// The entries of a leaf's blocks.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
-        self.reader.leaf(leaf).map_err(|e| self.failed(e))
+        let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
+        let ids = (leaf.first_block..).take(leaf.count.into()).map(|block| BlockId { block, ..leaf.first() });
+        let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
+        if ids.clone().all(|id| is_lost(&id)) {
+            return Ok(ids.map(BlockEntry::of_lost).collect());
+        }
+        let entries = self.reader.leaf(leaf).map_err(|e| self.failed(e))?.into_iter();
+        Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::of_lost(entry.id) } else { entry }).collect())
     }
 
     /// The entries of a window's blocks that touch a region, in order, a leaf of the directory at a time.
@@ -130,12 +204,49 @@ impl CoefficientFile {
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         let size = self.blocks.region(entry.id.block as usize).dims();
+        if entry.lost && self.skipped.is_some() {
+            return Ok(Block::of_missing(codec, size));
+        }
         Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
-    /// Checks that every byte of the file outside the parts is accounted for.
-    pub fn check_structure(&self) -> Result<()> {
-        self.reader.check_structure().map_err(|e| self.failed(e))
+    /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
+    pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
+        self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
+    }
+
+    /// Checks every byte of a leaf and its blocks, of these entries, that is in no part; `found` is told what is wrong.
+    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+        self.reader.check_leaf(leaf, blocks, &mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
+    }
+
+    /// Compares the checksums of every byte of the file; the first error.
+    pub fn check_stored(&self) -> Result<()> {
+        let mut wrong = None;
+        let mut found = |error| wrong = wrong.take().or(Some(error));
+        self.check_structure(&mut found)?;
+        for leaf in (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window)) {
+            let entries = self.leaf(leaf)?;
+            self.check_leaf(leaf, &entries, &mut found)?;
+            entries.par_iter().try_for_each(|entry| self.reader.check_stored(entry)).map_err(|e| self.failed(e))?;
+        }
+        wrong.map_or(Ok(()), Err)
+    }
+
+    /// All of its windows, once every byte of them was seen to be whole.
+    pub fn whole_windows(&self) -> Result<Unfinished> {
+        let whole = Unfinished::read(self.reader.storage()).map_err(|e| self.failed(e))?;
+        match whole.metadata() == self.metadata() {
+            true => Ok(whole),
+            false => {
+                self.check_stored().and(Err(self.contradiction("windows that the metadata does not tell of".into())))
+            }
+        }
+    }
+
+    /// Bytes of the file that were read so far.
+    pub fn bytes_read(&self) -> u64 {
+        self.reader.storage().bytes_read()
     }
 
     /// An error if the file is no longer what it was when opened.

@@ -42,7 +42,7 @@
 //!
 //! # Who may call whom
 //!
-//! `bin, cli, tools -> convert | render | extract | verify | report -> source, scan, codec, file, camera, footprint
+//! `bin, cli, tools -> convert | render | extract | verify | resume | report -> source, scan, codec, file, camera, footprint
 //! -> wavelet, bound, sample, volume, mapped, npy, output, error -> format`. A test reads the sources and holds this.
 //!
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.
@@ -50,7 +50,7 @@
 //! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions
 //!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
 //!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/canvas.rs`,
-//!    `render/weights.rs`, `extract.rs` and `verify.rs`; `render/plan.rs` asks how many there are.
+//!    `render/weights.rs`, `extract.rs`, `verify.rs` and, to find damage, `file.rs`; `render/plan.rs` asks how many there are.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
@@ -75,6 +75,7 @@ pub mod output;
 pub mod progress;
 pub mod render;
 pub mod report;
+pub mod resume;
 pub mod sample;
 mod scan;
 pub mod source;

@@ -15,7 +15,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::ptr;
-use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 use std::time::SystemTime;
 
 /// How the bytes of a file are reached.
@@ -43,6 +43,7 @@ pub struct FileBytes {
     len: u64,
     modified: Option<SystemTime>,
     map: Option<RegisteredMap>,
+    read: AtomicU64,
 }
 
 impl FileBytes {
@@ -60,7 +61,7 @@ impl FileBytes {
             _ => None,
         };
         let file = map.is_none().then_some(file);
-        Ok(Self { path: path.into(), file, len, modified: meta.modified().ok(), map })
+        Ok(Self { path: path.into(), file, len, modified: meta.modified().ok(), map, read: AtomicU64::new(0) })
     }
 
     /// The path it was opened by.
@@ -90,7 +91,13 @@ impl FileBytes {
             (None, Some(file)) => file.read_exact_at(out, offset)?,
             (None, None) => {} // no bytes at all
         }
+        self.read.fetch_add(out.len() as u64, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// Bytes that were copied out so far.
+    pub fn bytes_read(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
     }
 
     /// Whether small reads are cheap (mapped), or worth joining into larger ones.
@@ -189,17 +196,19 @@ impl Slot {
     }
 }
 
-/// Makes a SIGBUS in a mapped file end the process with a message that names the file, and exit code 4.
+/// Makes a SIGBUS in a mapped file end the process with a message that names the file, and exit code 4; and a write beyond
+/// the limit on a file's size an error like others, not the process's end.
 ///
 /// For programs, called once at their start. A library must not take over signals.
 pub fn explain_sigbus() {
     // SAFETY: `action` is zeroed (a valid value: no flags, empty mask) and then filled in; the handler only uses
-    // async-signal-safe calls (`write`, `_exit`) and lock-free atomics.
+    // async-signal-safe calls (`write`, `_exit`) and lock-free atomics. Ignoring a signal runs nothing.
     unsafe {
         let mut action: libc::sigaction = std::mem::zeroed();
         action.sa_sigaction = on_sigbus as *const () as usize;
         action.sa_flags = libc::SA_SIGINFO;
         libc::sigaction(libc::SIGBUS, &raw const action, ptr::null_mut());
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
     }
 }
 

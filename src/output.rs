@@ -3,9 +3,10 @@
 use crate::error::{Error, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
+use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// The name that stands for a standard stream.
 pub const STANDARD: &str = "-";
@@ -22,17 +23,23 @@ enum Target {
     Stdout(BufWriter<Stdout>),
     /// A device or a pipe, written as it is.
     Special(BufWriter<File>),
-    File(BufWriter<File>, Part),
+    File(Part, BufWriter<File>), // in this order: the name is taken away before the lock is
 }
 
-/// The unfinished file; removed when dropped.
+/// The unfinished file; removed when dropped, unless it is worth keeping.
 #[derive(Debug)]
 struct Part {
     path: PathBuf,
     replace: bool,
-    /// Complete, or renamed: no longer to be removed.
+    /// Whether what is flushed can be gone on with, and must outlive this run.
+    resumable: bool,
+    /// No longer to be removed.
     keep: bool,
+    synced: Instant,
 }
+
+/// What may be lost of a resumable file where power fails: the work of so long.
+const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 
 impl Drop for Part {
     fn drop(&mut self) {
@@ -48,6 +55,10 @@ impl Output {
 
     /// Opens `path`, or standard output for `-`. An existing file is an error unless `force` replaces it.
     pub fn create(path: &Path, force: bool) -> Result<Self> {
+        Self::create_after(path, force, |file| file.set_len(0))
+    }
+
+    fn create_after(path: &Path, force: bool, begin: impl FnOnce(&File) -> io::Result<()>) -> Result<Self> {
         let target = if path == Path::new(STANDARD) {
             if io::stdout().is_terminal() {
                 return Err(Error::usage("-o -: binary data is not written to a terminal; redirect or pipe it"));
@@ -59,9 +70,42 @@ impl Output {
         } else {
             Self::check(path, force)?;
             let (file, part) = Part::create(path, force)?;
-            Target::File(BufWriter::with_capacity(Self::BUFFER, file), part)
+            begin(&file).map_err(|e| Error::io(path, "creating", e))?;
+            Target::File(part, BufWriter::with_capacity(Self::BUFFER, file))
         };
         Ok(Self { path: path.into(), target })
+    }
+
+    /// As [`Self::create`], but of a file what is flushed is kept whatever comes, to be gone on with; and what an earlier
+    /// run left is still there, until [`Self::begin_at`] says from where on to write.
+    pub fn resumable(path: &Path, force: bool) -> Result<Self> {
+        let mut out = Self::create_after(path, force, |_| Ok(()))?;
+        if let Target::File(part, file) = &mut out.target {
+            let held = file.get_ref().metadata().map_or(0, |m| m.len());
+            (part.resumable, part.keep) = (true, held > 0);
+        }
+        Ok(out)
+    }
+
+    /// Where what is written lies until [`Self::commit`]; none if it is not a file.
+    pub fn part(&self) -> Option<&Path> {
+        match &self.target {
+            Target::File(part, _) => Some(&part.path),
+            _ => None,
+        }
+    }
+
+    /// Leaves the first `bytes` of an unfinished file, after which writing goes on.
+    pub fn begin_at(&mut self, bytes: u64) -> Result<()> {
+        let Target::File(part, file) = &mut self.target else { return Ok(()) };
+        part.keep = bytes > 0;
+        let cut = file.get_mut().set_len(bytes).and_then(|()| file.seek(SeekFrom::Start(bytes)));
+        cut.map(drop).map_err(|e| Error::io(&part.path, "cutting", e))
+    }
+
+    /// Whether what was written so far stays if the output is dropped.
+    pub fn is_kept(&self) -> bool {
+        matches!(&self.target, Target::File(part, _) if part.keep)
     }
 
     /// An error if a file cannot be made at `path`, as far as can be told without making it.
@@ -70,7 +114,7 @@ impl Output {
             return Err(Error::usage(format!("{}: is a folder; name a file", path.display())));
         }
         if path.exists() && !force {
-            return Err(Error::usage(format!("{}: exists already; --force replaces it", path.display())));
+            return Err(exists(path));
         }
         match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
             Some(folder) => {
@@ -88,10 +132,16 @@ impl Output {
     }
 
     /// Flushes everything and gives the file its final name.
-    pub fn commit(mut self) -> Result<()> {
-        self.flush().map_err(|e| Error::io(&self.path, "writing", e))?;
-        let Target::File(file, part) = &mut self.target else { return Ok(()) };
+    pub fn commit(self) -> Result<()> {
+        self.commit_if(|_| Ok(()))
+    }
+
+    /// As [`Self::commit`], if a file is found right once it is all on its disk.
+    pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+        self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
+        let Target::File(part, file) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
+        right(&part.path)?;
         part.keep = true; // if its name cannot be given, the work must not be lost
         let doing = || format!("giving the finished {} this name", part.path.display());
         part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))
@@ -99,29 +149,57 @@ impl Output {
 }
 
 impl Part {
-    /// Creates and locks `NAME.part`; one that nobody holds is left over from a run that died.
+    /// Opens and locks `NAME.part`; one that nobody holds is left over from a run that died.
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
         let mut name = OsString::from(path);
         name.push(".part");
-        let part_path = PathBuf::from(name);
+        let part = PathBuf::from(name);
         let failed = |e| Error::io(path, "creating", e);
         loop {
-            let file = File::options().write(true).create(true).truncate(false).open(&part_path).map_err(failed)?;
+            let file =
+                File::options().read(true).write(true).create(true).truncate(false).open(&part).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
-                    return Err(Error::usage(format!("{}: another program is writing it", path.display())));
+                    let who = holder(&file).unwrap_or("another program".into());
+                    return Err(Error::usage(format!("{}: {who} is writing it", path.display())));
                 }
                 Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
                 Err(TryLockError::Error(e)) => return Err(failed(e)),
             }
-            // Between opening and locking, its last owner may have given the file its final name.
-            let is_it = |now: fs::Metadata| file.metadata().is_ok_and(|m| (m.dev(), m.ino()) == (now.dev(), now.ino()));
-            if fs::metadata(&part_path).is_ok_and(is_it) {
-                file.set_len(0).map_err(failed)?;
-                return Ok((file, Self { path: part_path, replace, keep: false }));
+            // Between opening and locking, its last owner may have given the file its final name; or have died before
+            // it took the other one away.
+            let is_at = |path: &Path| {
+                let (file, there) = (file.metadata().ok(), fs::metadata(path).ok());
+                file.zip(there).is_some_and(|(a, b)| (a.dev(), a.ino()) == (b.dev(), b.ino()))
+            };
+            match (is_at(&part), is_at(path)) {
+                (true, true) => fs::remove_file(&part).map_err(failed)?,
+                (true, false) if path.exists() && !replace => {
+                    if file.metadata().is_ok_and(|m| m.len() == 0) {
+                        let _ = fs::remove_file(&part); // ours, and of no use
+                    }
+                    return Err(exists(path));
+                }
+                (true, false) => {
+                    let (resumable, keep, synced) = (false, false, Instant::now());
+                    return Ok((file, Self { path: part, replace, resumable, keep, synced }));
+                }
+                (false, _) => {}
             }
         }
+    }
+
+    /// Sees to it that what was written is not lost, if this is a file to go on with.
+    fn keep(&mut self, file: &File) -> io::Result<()> {
+        if self.resumable {
+            self.keep = true;
+            if self.synced.elapsed() >= BETWEEN_SYNCS {
+                file.sync_data()?;
+                self.synced = Instant::now();
+            }
+        }
+        Ok(())
     }
 
     fn rename(&self, path: &Path) -> io::Result<()> {
@@ -145,7 +223,7 @@ impl Output {
     fn writer(&mut self) -> &mut dyn Write {
         match &mut self.target {
             Target::Stdout(out) => out,
-            Target::Special(out) | Target::File(out, _) => out,
+            Target::Special(out) | Target::File(_, out) => out,
         }
     }
 }
@@ -156,8 +234,27 @@ impl Write for Output {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.writer().flush()
+        self.writer().flush()?;
+        match &mut self.target {
+            Target::File(part, file) => part.keep(file.get_ref()),
+            _ => Ok(()),
+        }
     }
+}
+
+fn exists(path: &Path) -> Error {
+    Error::usage(format!("{}: exists already; --force replaces it", path.display()))
+}
+
+/// Which process has locked a file, where the system tells.
+fn holder(file: &File) -> Option<String> {
+    let locks = fs::read_to_string("/proc/locks").ok()?;
+    let inode = format!(":{}", file.metadata().ok()?.ino());
+    let line =
+        locks.lines().find(|line| line.split_whitespace().nth(5).is_some_and(|place| place.ends_with(&inode)))?;
+    let process: u32 = line.split_whitespace().nth(4)?.parse().ok().filter(|process| *process > 0)?;
+    let name = fs::read_to_string(format!("/proc/{process}/comm")).unwrap_or_default();
+    Some(format!("process {process} ({})", name.trim()))
 }
 
 #[cfg(test)]

@@ -15,14 +15,48 @@ use serde::Serialize;
 use wavesplat_format::{BlockEntry, PartKind};
 
 /// What a check of the file alone found.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct VerifyReport {
     /// Blocks that were read and decoded.
     pub blocks: u64,
     /// Bytes of the file, all of them checked.
     pub bytes: u64,
-    /// What the comparison with the source found.
+    /// Places where it is damaged, and blocks that were lost before it was recovered.
+    pub damaged: u64,
+    /// What is wrong with the first of them, at most [`MOST_NAMED`].
+    pub damage: Vec<String>,
+    /// What the comparison of all blocks that are whole with the source found.
     pub against: Option<Comparison>,
+}
+
+/// Damage that is named; the rest is counted.
+pub const MOST_NAMED: usize = 1000;
+
+impl VerifyReport {
+    fn damage(&mut self, wrong: &Error) {
+        self.damaged += 1;
+        if self.damage.len() < MOST_NAMED {
+            self.damage.push(match wrong {
+                Error::CoefficientFile { source, .. } => source.to_string(),
+                other => other.to_string(),
+            });
+        }
+    }
+
+    /// What was read, unless it is damaged, which is noted; an error if it could not be read for another reason.
+    fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
+        match read {
+            Ok(read) => Ok(Some(read)),
+            Err(Error::CoefficientFile { source: failed @ wavesplat_format::Error::Io(_), path }) => {
+                Err(Error::CoefficientFile { source: failed, path })
+            }
+            Err(wrong @ Error::CoefficientFile { .. }) => {
+                self.damage(&wrong);
+                Ok(None)
+            }
+            Err(other) => Err(other),
+        }
+    }
 }
 
 /// What a comparison with the source found.
@@ -93,7 +127,7 @@ impl Comparison {
     }
 }
 
-/// Checks every byte of the file, and with a source every sample; the source must give the frames and the region that
+/// Checks every byte of the file, whatever of it is damaged, and with a source every sample; the source must give the frames and the region that
 /// were converted. `memory` is what may be allocated, if it is enough for one block.
 pub fn verify(
     file: &CoefficientFile,
@@ -108,8 +142,8 @@ pub fn verify(
     // The source's, those that are extracted and those that are splatted, as samples in their type and as numbers.
     let block_bytes = file.block_bytes() + file.largest_block() * (2 * file.sample().size() + 3 * size_of::<f64>());
     let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
-    file.check_structure()?;
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
+    file.check_structure(&mut |wrong| report.damage(&wrong))?;
     let mut all = Comparison::default();
     for window in 0..file.metadata().windows.len() as u32 {
         let codec = file.codec(window)?;
@@ -121,19 +155,21 @@ pub fn verify(
         }
         for leaf in file.leaves(window) {
             let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
-            let entries = file.leaf(leaf)?;
+            let entries = report.whole(file.leaf(leaf))?.unwrap_or_default();
+            file.check_leaf(leaf, &entries, &mut |wrong| report.damage(&wrong))?;
             for entries in entries.chunks(at_once) {
-                let found = entries.par_iter().map(check).collect::<Result<Vec<_>>>()?;
-                all = found.into_iter().fold(all, Comparison::join);
+                for found in entries.par_iter().map(check).collect::<Vec<_>>() {
+                    all = report.whole(found)?.map_or(all, |found| all.join(found));
+                }
             }
             report.blocks += entries.len() as u64;
-            progress.advance(entries.len() as u64);
+            progress.advance(leaf.count.into());
         }
     }
     file.check_unchanged()?;
     progress.finish();
     if source.is_some() {
-        all.rms_error = (all.squares / (all.samples - all.missing).max(1) as f64).sqrt();
+        all.rms_error = (all.squares / all.samples.saturating_sub(all.missing).max(1) as f64).sqrt();
         report.against = Some(all);
     }
     Ok(report)

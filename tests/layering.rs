@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 7] = [
     &["bound", "wavelet", "camera", "footprint", "source", "npy"],
     &["codec", "scan"],
     &["file", "report"],
-    &["convert", "render", "extract", "verify"],
+    &["convert", "render", "extract", "verify", "resume"],
     &["cli"],
 ];
 
@@ -30,6 +30,7 @@ const HOMES: [(&str, &[&str]); 12] = [
             "render/plan.rs",
             "render/weights.rs",
             "extract.rs",
+            "file.rs",
             "verify.rs",
             "cli/mod.rs",
         ],

@@ -2,8 +2,10 @@
 
 use crate::block::{BlockId, BlockStats, PartKind, PartStats};
 use crate::bytes::{Check, Fields, Put, ensure};
+use crate::header::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
-use crate::section::FRAME;
+use crate::section::{FRAME, Owner, read};
+use crate::{Result, Storage};
 
 /// Bytes of a block's entry without its parts.
 pub(crate) const BLOCK_ENTRY: usize = 64;
@@ -37,9 +39,18 @@ pub struct BlockEntry {
     pub stats: BlockStats,
     /// Its parts, ascending by kind.
     pub parts: Vec<PartEntry>,
+    /// Its data were gone when the file was recovered from a damaged one: nothing is known of its samples.
+    pub lost: bool,
 }
 
 impl BlockEntry {
+    /// Of a block of which nothing is known.
+    pub fn of_lost(id: BlockId) -> Self {
+        let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
+        let stats = BlockStats { step: 0.0, min, max, reached: 0.0, squared_error: 0.0, dropped: 0.0 };
+        Self { id, stats, parts: Vec::new(), lost: true }
+    }
+
     /// The part of a kind, if the block has it.
     pub fn part(&self, kind: PartKind) -> Option<&PartEntry> {
         self.parts.iter().find(|part| part.kind == kind)
@@ -65,7 +76,7 @@ impl BlockEntry {
         out.put_u32(self.id.block);
         out.put_u16(self.id.channel);
         out.put_u16(self.parts.len() as u16);
-        out.put_u32(0);
+        out.put_u32(self.lost.into());
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
         [step, min, max, reached, squared_error, dropped].into_iter().for_each(|value| out.put_f64(value));
         self.parts.iter().for_each(|part| part.encode(out));
@@ -74,7 +85,8 @@ impl BlockEntry {
     pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
         let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
         let count = usize::from(fields.u16()?);
-        fields.reserved::<4>()?;
+        let lost = fields.u32()?;
+        ensure(lost <= 1, || format!("lost: {lost}"))?;
         let stats = BlockStats {
             step: fields.f64()?,
             min: fields.f64()?,
@@ -85,7 +97,7 @@ impl BlockEntry {
         };
         ensure(count <= MAX_PARTS && count * PART_ENTRY <= fields.remaining(), || format!("{count} parts"))?;
         let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<Check<_>>()?;
-        Ok(Self { id, stats, parts })
+        Ok(Self { id, stats, parts, lost: lost == 1 })
     }
 
     /// What must be true of any block, whatever the metadata.
@@ -100,6 +112,7 @@ impl BlockEntry {
         let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers);
         let both = self.is_exact() && self.parts.iter().any(lossy);
         ensure(!both, || "exact samples beside coefficients or outliers".into())?;
+        ensure(!self.lost || self.parts.is_empty(), || "lost, but with parts".into())?;
         self.parts.iter().try_for_each(PartEntry::check)
     }
 
@@ -115,6 +128,16 @@ impl BlockEntry {
 }
 
 impl PartEntry {
+    /// Its stored bytes, if they are all there and their checksum is right.
+    pub(crate) fn read(&self, storage: &impl Storage, file: FileId, block: BlockId) -> Result<Vec<u8>> {
+        let owner = Owner::Part(block, self.kind);
+        let stored = read(storage, owner, self.offset, self.stored_len.into())?;
+        if owner.checksum(file, &stored) != self.checksum {
+            return Err(owner.corrupt(self.offset, "the checksum does not match"));
+        }
+        Ok(stored)
+    }
+
     fn encode(&self, out: &mut Vec<u8>) {
         out.put(&self.kind.code());
         out.put_u16(0);

@@ -1,5 +1,6 @@
 //! What can be wrong with a coefficient file.
 
+use crate::BlockId;
 use std::io;
 
 /// Why a file could not be read or written.
@@ -22,6 +23,9 @@ pub enum Error {
         /// What is wrong.
         what: String,
     },
+    /// A block whose data were gone when the file was recovered from a damaged one.
+    #[error("{0}: lost before the file was recovered")]
+    Lost(BlockId),
     /// Written by a newer version, or with a feature that this reader lacks.
     #[error("not supported: {0}")]
     Unsupported(String),

@@ -4,9 +4,9 @@ use crate::block::PartKind;
 use crate::bytes::{Check, ensure};
 use crate::cells::max_packed;
 use crate::directory::PartEntry;
-use crate::metadata::Window;
 use crate::planes::bitmap_len;
 use crate::pyramid::Pyramid;
+use crate::window::Window;
 
 /// The sizes of one block.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -34,12 +34,17 @@ pub(crate) struct Header {
     pub(crate) required: u64,
     pub(crate) optional: u64,
     pub(crate) id: FileId,
+    /// What a reader must know, in words for users of readers that lack a required feature; empty without one.
+    pub(crate) needs: String,
 }
+
+/// Bytes of the words in a header.
+const NEEDS: usize = 72;
 
 impl Header {
     /// The header of a new file.
     pub(crate) fn new(id: FileId) -> Self {
-        Self { version: VERSION, required: 0, optional: 0, id }
+        Self { version: VERSION, required: 0, optional: 0, id, needs: String::new() }
     }
 
     pub(crate) fn encode(&self) -> Vec<u8> {
@@ -51,7 +56,10 @@ impl Header {
         out.put_u64(self.required);
         out.put_u64(self.optional);
         out.put(&self.id.0);
-        out.put(&[0; 72]);
+        let mut needs = [0; NEEDS];
+        let len = self.needs.floor_char_boundary(NEEDS);
+        needs[..len].copy_from_slice(&self.needs.as_bytes()[..len]);
+        out.put(&needs);
         out.put_u64(xxh3_64(&out));
         out
     }
@@ -75,19 +83,32 @@ impl Header {
         let version = (fields.u16()?, fields.u16()?);
         let first = fields.reserved::<4>();
         let (required, optional) = (fields.u64()?, fields.u64()?);
-        let header = Self { version, required, optional, id: FileId(fields.array()?) };
-        Ok((header, first.and(fields.reserved::<72>())))
+        let id = FileId(fields.array()?);
+        let words = fields.array::<NEEDS>()?;
+        let words = words.split(|&byte| byte == 0).next().unwrap_or_default();
+        let needs = String::from_utf8_lossy(words).chars().filter(|c| !c.is_control()).collect();
+        Ok((Self { version, required, optional, id, needs }, first))
     }
 
     fn check_supported(&self) -> Result<()> {
         let (major, minor) = self.version;
         if major != VERSION.0 {
-            return Err(Error::Unsupported(format!("format version {major}.{minor}; this reader knows 1.x")));
+            return Err(Error::Unsupported(format!(
+                "format version {major}.{minor}{}; this reader knows 1.x",
+                self.words()
+            )));
         }
         match (0..64).find(|bit| self.required >> bit & 1 == 1 && REQUIRED.get(*bit).is_none()) {
-            Some(bit) => Err(Error::Unsupported(format!("required feature bit {bit}, unknown to this reader"))),
+            Some(bit) => {
+                let what = format!("required feature bit {bit}{}, unknown to this reader", self.words());
+                Err(Error::Unsupported(what))
+            }
             None => Ok(()),
         }
+    }
+
+    fn words(&self) -> String {
+        if self.needs.is_empty() { String::new() } else { format!(" ({})", self.needs) }
     }
 }
 
@@ -128,15 +149,18 @@ mod tests {
         assert_eq!(decode(&good).expect("valid"), good);
         let newer = decode(&Header { version: (2, 3), ..good.clone() });
         assert!(matches!(newer, Err(Error::Unsupported(what)) if what.contains("2.3")));
-        let feature = decode(&Header { required: 1 << 41, ..good.clone() });
-        assert!(matches!(feature, Err(Error::Unsupported(what)) if what.contains("41")));
+        let needs = "octree codes, since wavesplat 7".to_string();
+        let feature = decode(&Header { required: 1 << 41, needs, ..good.clone() });
+        assert!(
+            matches!(feature, Err(Error::Unsupported(what)) if what.contains("41 (octree codes, since wavesplat 7)"))
+        );
         assert!(decode(&Header { version: (1, 9), optional: u64::MAX, ..good }).is_ok());
     }
 
     #[test]
     fn reserved_bytes_must_be_zero() {
         let mut bytes: [u8; HEADER] = Header::new(FileId([7; 16])).encode().try_into().expect("128 bytes");
-        bytes[60] = 1;
+        bytes[12] = 1;
         let checksum = xxh3_64(&bytes[..120]).to_le_bytes();
         bytes[120..].copy_from_slice(&checksum);
         assert!(matches!(Header::decode(&bytes), Err(Error::Corrupt { .. })));

@@ -2,11 +2,10 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{Check, Fields, Put, ensure};
-use crate::directory::{BlockEntry, finite_amount, is_amount, is_range};
-use crate::header::HEADER;
-use crate::limits::{BLOCKS_PER_LEAF, align};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, finite_amount, is_amount, is_range};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::section::Extent;
+use crate::section::{Extent, section_end};
 
 /// Bytes of a leaf's entry in the root.
 pub(crate) const LEAF_ENTRY: usize = 128;
@@ -55,6 +54,8 @@ pub struct LeafEntry {
     pub missing: u64,
     /// Blocks stored exactly.
     pub exact: u32,
+    /// Blocks whose data were gone when the file was recovered from a damaged one.
+    pub lost: u64,
 }
 
 impl LeafEntry {
@@ -64,11 +65,11 @@ impl LeafEntry {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         let (count, stored_len, raw_len, offset, checksum) = (0, 0, 0, 0, 0);
         let (reached, squared_error, energy, dropped) = (0.0, 0.0, 0.0, 0.0);
-        let (coded, outliers, missing, exact) = (0, 0, 0, 0);
+        let (coded, outliers, missing, exact, lost) = (0, 0, 0, 0, 0);
         #[rustfmt::skip]
         let leaf = Self {
             window, first_block, channel, count, stored_len, raw_len, data_offset, offset, checksum,
-            min, max, reached, squared_error, energy, dropped, coded, outliers, missing, exact,
+            min, max, reached, squared_error, energy, dropped, coded, outliers, missing, exact, lost,
         };
         leaf
     }
@@ -87,6 +88,7 @@ impl LeafEntry {
         self.squared_error += block.stats.squared_error;
         self.dropped += block.stats.dropped;
         self.exact += u32::from(block.is_exact());
+        self.lost += u64::from(block.lost);
         for part in &block.parts {
             let sum = match part.kind {
                 PartKind::Level(_) => &mut self.coded,
@@ -97,6 +99,24 @@ impl LeafEntry {
             *sum = sum.saturating_add(part.stats.count);
             self.energy += if matches!(part.kind, PartKind::Level(_)) { part.stats.energy } else { 0.0 };
         }
+    }
+
+    /// Bytes that its blocks' entries take at most.
+    pub(crate) fn most_raw(&self) -> usize {
+        usize::from(self.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)
+    }
+
+    /// The entries of its blocks, in order, from its decompressed bytes; their places and contents are not yet checked.
+    pub(crate) fn parse(&self, raw: &[u8]) -> Check<Vec<BlockEntry>> {
+        let mut fields = Fields::new(raw);
+        let mut entries = Vec::with_capacity(usize::from(self.count).min(raw.len() / BLOCK_ENTRY));
+        for block in (self.first_block..).take(self.count.into()) {
+            let (entry, id) = (BlockEntry::decode(&mut fields)?, BlockId { block, ..self.first() });
+            ensure(entry.id == id, || format!("{} where {id} belongs", entry.id))?;
+            entries.push(entry);
+        }
+        fields.end()?;
+        Ok(entries)
     }
 
     pub(crate) fn extent(&self) -> Extent {
@@ -122,11 +142,11 @@ impl LeafEntry {
         out.put_u64(self.checksum);
         let floats = [self.min, self.max, self.reached, self.squared_error, self.energy, self.dropped];
         floats.into_iter().for_each(|value| out.put_f64(value));
-        [self.coded, self.outliers, self.missing, 0].into_iter().for_each(|value| out.put_u64(value));
+        [self.coded, self.outliers, self.missing, self.lost].into_iter().for_each(|value| out.put_u64(value));
     }
 
     pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
-        let leaf = Self {
+        Ok(Self {
             window: fields.u32()?,
             first_block: fields.u32()?,
             channel: fields.u16()?,
@@ -146,9 +166,8 @@ impl LeafEntry {
             coded: fields.u64()?,
             outliers: fields.u64()?,
             missing: fields.u64()?,
-        };
-        fields.reserved::<8>()?;
-        Ok(leaf)
+            lost: fields.u64()?,
+        })
     }
 
     /// What must be true of any leaf that follows the byte `end`; the first byte after it.
@@ -161,40 +180,47 @@ impl LeafEntry {
         let sums = [self.squared_error, self.energy, self.dropped].into_iter().all(is_amount);
         ensure(sums && finite_amount(self.reached), || place("an error or energy out of range"))?;
         ensure(is_range(self.min, self.max), || place("a value range out of order"))?;
+        ensure(self.lost <= self.count.into(), || place("more lost blocks than there are"))?;
         Ok(self.extent().end())
     }
 }
 
-/// The blocks of every leaf that the metadata calls for, in order: the first and how many.
-fn expected(metadata: &Metadata) -> impl Iterator<Item = (BlockId, u32)> {
-    let (windows, channels) = (metadata.windows.len() as u32, metadata.channels);
+/// The blocks of every leaf of a window, in order: the first and how many.
+pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item = (BlockId, u32)> {
     let blocks = metadata.blocks_per_channel();
     let runs = move || (0..blocks).step_by(BLOCKS_PER_LEAF as usize);
-    (0..windows)
-        .flat_map(move |window| (0..channels).map(move |channel| (window, channel)))
-        .flat_map(move |(window, channel)| runs().map(move |block| BlockId { window, block, channel }))
+    (0..metadata.channels)
+        .flat_map(move |channel| runs().map(move |block| BlockId { window, block, channel }))
         .map(move |id| (id, BLOCKS_PER_LEAF.min(blocks - id.block)))
 }
 
-/// Whether these are all leaves of the metadata, one after another from the header on; where the last one ends.
+/// Whether these are all leaves of the metadata, window after window from where the start section ends on; where the last
+/// window's record ends.
 pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u64> {
-    let count = metadata.leaves_per_window() * metadata.windows.len() as u64;
+    let per_window = metadata.leaves_per_window() as usize;
+    let count = per_window as u64 * metadata.windows.len() as u64;
     ensure(leaves.len() as u64 == count, || format!("{} leaves instead of {count}", leaves.len()))?;
-    let mut end = HEADER as u64;
-    for ((id, count), leaf) in expected(metadata).zip(leaves) {
+    let windows = (0..).zip(leaves.chunks(per_window.max(1)));
+    windows
+        .take(metadata.windows.len())
+        .try_fold(metadata.start_end()?, |end, (number, leaves)| check_window(metadata, number, leaves, end))
+}
+
+/// Whether these are all leaves of a window whose blocks follow the byte `end`; where its record ends.
+pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> Check<u64> {
+    let window = metadata.windows.get(number as usize).ok_or("no such window")?;
+    for ((id, count), leaf) in leaves_of(metadata, number).zip(leaves) {
         let same = leaf.first() == id && u32::from(leaf.count) == count;
         ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;
         end = leaf.check(end)?;
     }
-    let per_window = leaves.chunks((metadata.leaves_per_window() as usize).max(1));
-    metadata.windows.iter().zip(per_window).enumerate().try_for_each(|(number, (window, leaves))| {
-        let sum = |of: fn(&LeafEntry) -> u64| leaves.iter().fold(0u64, |sum, leaf| sum.saturating_add(of(leaf)));
-        let same = sum(|l| l.coded) == window.coded && sum(|l| l.outliers) == window.outliers;
-        ensure(same, || format!("window {number}: coefficients or outliers differ from the metadata"))?;
-        let held = |l: &LeafEntry| l.reached <= window.reached && window.min <= l.min && l.max <= window.max;
-        ensure(leaves.iter().all(held) && sum(|l| l.missing) <= window.missing, || {
-            format!("window {number}: errors, values or missing samples differ from the metadata")
-        })
+    let sum = |of: fn(&LeafEntry) -> u64| leaves.iter().fold(0u64, |sum, leaf| sum.saturating_add(of(leaf)));
+    let same = sum(|l| l.coded) == window.coded && sum(|l| l.outliers) == window.outliers;
+    ensure(same, || format!("window {number}: coefficients or outliers differ from its record"))?;
+    let held = |l: &LeafEntry| l.reached <= window.reached && window.min <= l.min && l.max <= window.max;
+    ensure(leaves.iter().all(held) && sum(|l| l.missing) <= window.missing, || {
+        format!("window {number}: errors, values or missing samples differ from its record")
     })?;
-    Ok(end)
+    let record = metadata.record(number).encode()?;
+    Ok(section_end(align(end), record.len()))
 }

@@ -29,6 +29,8 @@ mod structure;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod unfinished;
+mod window;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
@@ -38,7 +40,7 @@ pub use error::{Error, Result};
 pub use geometry::BlockGeometry;
 pub use header::FileId;
 pub use leaf::LeafEntry;
-pub use metadata::{Basis, Bound, Metadata, Window};
+pub use metadata::{Bound, Metadata};
 pub use payload::{
     Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,
     unpack_outliers,
@@ -46,6 +48,8 @@ pub use payload::{
 pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
 pub use sample::SampleType;
+pub use unfinished::Unfinished;
+pub use window::{Basis, Window, WindowRecord};
 pub use writer::{Summary, Writer};
 
 use std::io;

@@ -4,13 +4,16 @@
 //! what follows a value.
 
 use crate::bytes::{Check, ensure};
-use crate::directory::{finite_amount, is_amount, is_range};
+use crate::directory::finite_amount;
+use crate::header::HEADER;
 use crate::limits::*;
-use crate::{BlockGeometry, BlockId, Error, Pyramid, Result, SampleType};
+use crate::section::section_end;
+use crate::window::{Window, WindowRecord};
+use crate::{BlockGeometry, BlockId, Error, Result, SampleType};
 use bincode::{Decode, Encode, config};
 
 /// Fixed-width little-endian integers, nothing larger than the limit.
-const CONFIG: config::Configuration<config::LittleEndian, config::Fixint, config::Limit<MAX_METADATA>> =
+pub(crate) const CONFIG: config::Configuration<config::LittleEndian, config::Fixint, config::Limit<MAX_METADATA>> =
     config::standard().with_little_endian().with_fixed_int_encoding().with_limit::<MAX_METADATA>();
 
 /// What the tolerance promises; new kinds are appended.
@@ -55,68 +58,6 @@ impl Bound {
     }
 }
 
-/// The transform along time; new kinds are appended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
-pub enum Basis {
-    /// The Haar wavelet.
-    Haar,
-    /// The multiwavelet of Geronimo, Hardin and Massopust.
-    Multi,
-    /// None: the samples themselves.
-    Samples,
-    /// Orthonormal functions that suit the window's own series, then Haar functions that complete them.
-    Learned,
-}
-
-impl Basis {
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Haar => "haar",
-            Self::Multi => "multi",
-            Self::Samples => "samples",
-            Self::Learned => "learned",
-        }
-    }
-}
-
-/// A run of frames that is coded together.
-#[derive(Debug, Clone, PartialEq, Encode, Decode)]
-pub struct Window {
-    /// Its first frame.
-    pub first_frame: u64,
-    /// Its frames, 1 to [`MAX_WINDOW_FRAMES`].
-    pub frames: u32,
-    /// The transform along time.
-    pub basis: Basis,
-    /// Coefficients of one voxel; may exceed `frames`.
-    pub coefficients: u32,
-    /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`. Empty with a pyramid.
-    pub levels: Vec<u32>,
-    /// Of a learned basis: the learned functions, `frames` values each, in units of 2^-15; else empty.
-    pub functions: Vec<i16>,
-    /// How coefficients are refined in space, or samples in space and time.
-    pub pyramid: Option<Pyramid>,
-    /// The largest error that the bound allows in this window, in units of the samples.
-    pub delta: f64,
-    /// Largest error of a sample, rounded up; at least that of every block.
-    pub reached: f64,
-    /// Largest share of its bound that any series used, in the bound's own measure, rounded up; at most 1.
-    pub share: f64,
-    /// Sum of the squared errors of the samples; may overflow to infinity.
-    pub squared_error: f64,
-    /// Smallest decoded finite sample; infinity when there is none.
-    pub min: f64,
-    /// Largest decoded finite sample; minus infinity when there is none.
-    pub max: f64,
-    /// Missing samples; at least those in parts of missing samples.
-    pub missing: u64,
-    /// Nonzero coefficients: the sum of the counts of all level parts.
-    pub coded: u64,
-    /// Outliers: the sum of the counts of all parts of outliers.
-    pub outliers: u64,
-}
-
 /// Everything about an archive but its samples.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct Metadata {
@@ -142,9 +83,6 @@ pub struct Metadata {
     pub bound: Bound,
     /// The tolerance as asked for.
     pub tolerance: f64,
-    /// The value range at the end of the archive, or as given, that a pointwise or rms tolerance refers to; (inf, -inf)
-    /// when there is none.
-    pub range: (f64, f64),
     /// The value that marks a missing sample, besides NaN.
     pub missing_value: Option<f64>,
     /// The windows, one after another from frame 0.
@@ -153,6 +91,14 @@ pub struct Metadata {
     pub settings: Vec<(String, String)>,
     /// Name and version of the program that wrote the file.
     pub program: String,
+}
+
+/// The record that is exactly `bytes`.
+pub(crate) fn whole<T: Decode<()>>(bytes: &[u8], what: &str) -> Check<T> {
+    let decoded = bincode::decode_from_slice::<T, _>(bytes, CONFIG);
+    let (record, used) = decoded.map_err(|e| format!("not a {what}: {e}"))?;
+    ensure(used == bytes.len(), || format!("{} bytes after the record", bytes.len() - used))?;
+    Ok(record)
 }
 
 impl Metadata {
@@ -164,7 +110,7 @@ impl Metadata {
         if size > limit {
             return Err(Error::TooLarge { what: "bytes of metadata".into(), size, limit });
         }
-        Self::parse(&bytes).map_err(Error::Invalid)?; // a record near the limit must also fit in memory under it
+        whole::<Self>(&bytes, "metadata").map_err(Error::Invalid)?; // near the limit it must also fit in memory under it
         Ok(bytes)
     }
 
@@ -174,11 +120,71 @@ impl Metadata {
     }
 
     pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        let decoded = bincode::decode_from_slice::<Self, _>(bytes, CONFIG);
-        let (metadata, used) = decoded.map_err(|e| format!("not a metadata record: {e}"))?;
-        ensure(used == bytes.len(), || format!("{} bytes after the record", bytes.len() - used))?;
+        let metadata: Self = whole(bytes, "metadata record")?;
+        ensure(metadata.frames > 0, || "no frames".into())?;
         metadata.check()?;
         Ok(metadata)
+    }
+
+    /// As [`Self::parse`], of the record in the start section.
+    pub(crate) fn parse_start(bytes: &[u8]) -> Check<Self> {
+        let start: Self = whole(bytes, "metadata record")?;
+        ensure(start.frames == 0, || "a start with frames".into())?;
+        start.check()?;
+        Ok(start)
+    }
+
+    /// What is known before the first frame: the same without frames.
+    pub fn start(&self) -> Self {
+        let (frames, times, windows) = (0, Vec::new(), Vec::new());
+        let Self { dims, spacing, origin, sample, block_edge, channels, bound, tolerance, missing_value, .. } = *self;
+        let (variable, settings, program) = (self.variable.clone(), self.settings.clone(), self.program.clone());
+        #[rustfmt::skip]
+        let start = Self {
+            dims, spacing, origin, sample, block_edge, channels, frames, times, variable, bound, tolerance, missing_value,
+            windows, settings, program,
+        };
+        start
+    }
+
+    /// Where the start section ends.
+    pub(crate) fn start_end(&self) -> Check<u64> {
+        let record = self.start().encode().map_err(|e| e.to_string())?;
+        Ok(section_end(HEADER as u64, record.len()))
+    }
+
+    /// The record of a window that there is.
+    pub(crate) fn record(&self, window: u32) -> WindowRecord {
+        let window = self.windows[window as usize].clone();
+        let first = window.first_frame as usize;
+        let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
+        WindowRecord { window, times }
+    }
+
+    /// Adds a window; the reason if it cannot be the next one.
+    pub(crate) fn push(&mut self, record: WindowRecord) -> Check {
+        let WindowRecord { window, times } = record;
+        self.check_window(self.windows.len(), &window, self.frames)?;
+        let timed = times.is_empty() && self.times.is_empty()
+            || times.len() == window.frames as usize && self.times.len() as u64 == self.frames;
+        ensure(timed && times.iter().all(|t| t.is_finite()), || "times of some frames alone, or not finite".into())?;
+        self.frames += u64::from(window.frames);
+        self.times.extend(times);
+        self.windows.push(window);
+        Ok(())
+    }
+
+    /// Leaves `windows` windows.
+    pub(crate) fn truncate(&mut self, windows: usize) {
+        self.windows.truncate(windows);
+        self.frames = self.windows.iter().map(|window| u64::from(window.frames)).sum();
+        self.times.truncate(self.frames as usize);
+    }
+
+    /// The value range that a pointwise or rms tolerance refers to: as given, or that of all frames; (inf, -inf) without
+    /// one.
+    pub fn range(&self) -> (f64, f64) {
+        self.windows.last().map_or((f64::INFINITY, f64::NEG_INFINITY), |window| window.range)
     }
 
     /// Whether everything is within the limits and consistent; [`Error::Invalid`] says why not.
@@ -191,7 +197,6 @@ impl Metadata {
         self.check_times()?;
         ensure(finite_amount(self.tolerance), || format!("a tolerance of {}", self.tolerance))?;
         self.bound.check()?;
-        ensure(is_range(self.range.0, self.range.1), || "a value range out of order".into())?;
         self.check_windows()
     }
 
@@ -206,8 +211,7 @@ impl Metadata {
     }
 
     fn check_times(&self) -> Check {
-        let framed = (1..=MAX_FRAMES).contains(&self.frames);
-        ensure(framed, || format!("{} frames, 1 to {MAX_FRAMES}", self.frames))?;
+        ensure(self.frames <= MAX_FRAMES, || format!("{} frames, at most {MAX_FRAMES}", self.frames))?;
         let timed = self.times.is_empty() || self.times.len() as u64 == self.frames;
         ensure(timed, || format!("{} times for {} frames", self.times.len(), self.frames))?;
         ensure(self.times.iter().all(|t| t.is_finite()), || "a time that is not finite".into())
@@ -215,14 +219,19 @@ impl Metadata {
 
     fn check_windows(&self) -> Check {
         let mut next = 0u64;
-        let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));
         for (number, window) in self.windows.iter().enumerate() {
-            let place = |what: String| format!("window {number}: {what}");
-            ensure(window.first_frame == next, || place(format!("starts at {} not {next}", window.first_frame)))?;
-            window.check(self.largest_box(), voxels_in_all).map_err(place)?;
+            self.check_window(number, window, next)?;
             next = next.saturating_add(window.frames.into());
         }
         ensure(next == self.frames, || format!("windows cover {next} of {} frames", self.frames))
+    }
+
+    /// Whether this can be the window of this number, from the frame `next` on.
+    fn check_window(&self, number: usize, window: &Window, next: u64) -> Check {
+        let place = |what: String| format!("window {number}: {what}");
+        ensure(window.first_frame == next, || place(format!("starts at {} not {next}", window.first_frame)))?;
+        let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));
+        window.check(self.largest_box(), voxels_in_all).map_err(place)
     }
 
     /// Voxels of the largest box.
@@ -277,46 +286,6 @@ impl Metadata {
     }
 }
 
-impl Window {
-    /// Level parts that a block can have.
-    pub fn parts(&self) -> usize {
-        if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }
-    }
-
-    /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
-    fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
-        let Self { frames, coefficients, .. } = *self;
-        ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames"))?;
-        ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
-        let samples = voxels.saturating_mul(frames.max(coefficients).into());
-        ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples}, at most {MAX_BLOCK_SAMPLES} samples"))?;
-        self.check_coding()?;
-        let counted = voxels_in_all.saturating_mul(frames.into());
-        let coded = voxels_in_all.saturating_mul(coefficients.into());
-        let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
-        ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
-        let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
-        ensure(errors && is_range(self.min, self.max), || "an error or value range out of range".into())?;
-        ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
-    }
-
-    fn check_coding(&self) -> Check {
-        let Self { frames, coefficients, .. } = *self;
-        let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
-        let levels = match self.pyramid {
-            Some(_) => self.levels.is_empty(),
-            None => (1..=MAX_LEVELS).contains(&self.levels.len()) && !self.levels.contains(&0),
-        };
-        let levels = levels && (self.pyramid.is_some() || sum == coefficients.into());
-        ensure(levels, || format!("{coefficients} coefficients in levels of {sum}"))?;
-        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.check(self.basis == Basis::Samples))?;
-        let (functions, frames) = (self.functions.len(), frames as usize);
-        let learned = functions.is_multiple_of(frames) && functions / frames <= frames;
-        let fits = if self.basis == Basis::Learned { learned } else { functions == 0 };
-        ensure(fits, || format!("functions of {functions} values for {frames} frames"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -345,7 +314,7 @@ mod tests {
     #[test]
     fn impossible_metadata_is_refused() {
         type Change = fn(&mut Metadata);
-        let changes: [Change; 21] = [
+        let changes: [Change; 22] = [
             |m| m.dims[1] = 0,
             |m| m.dims = [MAX_DIM; 3],
             |m| m.spacing[0] = 0.0,
@@ -356,7 +325,8 @@ mod tests {
             |m| m.times = vec![1.0],
             |m| m.times = vec![f64::NAN; m.frames as usize],
             |m| m.tolerance = -1.0,
-            |m| m.range = (2.0, 1.0),
+            |m| m.windows[1].range = (2.0, 1.0),
+            |m| m.windows[0].coarseness = f64::NAN,
             |m| m.windows[1].first_frame += 1,
             |m| m.windows[0].levels.push(1),
             |m| m.windows[0].frames = 0,

@@ -4,15 +4,15 @@
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{Check, Fields, ensure};
 use crate::cells::unpack_cells;
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
+use crate::directory::{BlockEntry, PartEntry};
 use crate::footer::{FOOTER, Footer};
 use crate::geometry::BlockGeometry;
 use crate::header::{FileId, HEADER, Header, check_magic};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
-use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_ROOT_RAW, align};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
-use crate::section::{FRAME, Owner, decompress, read, read_section};
+use crate::section::{FRAME, Owner, decompress, read_section};
 use crate::{Error, Result, Storage};
 
 /// An open file. Every method works from `&self`; threads may share it if the storage allows.
@@ -59,9 +59,8 @@ impl<S: Storage> Reader<S> {
     /// The entries of a leaf's blocks, in order.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         let owner = Owner::Leaf(leaf.first());
-        let most = usize::from(leaf.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS);
-        if leaf.raw_len as usize > most {
-            return Err(owner.corrupt(leaf.offset, format!("{} bytes, at most {most}", leaf.raw_len)));
+        if leaf.raw_len as usize > leaf.most_raw() {
+            return Err(owner.corrupt(leaf.offset, format!("{} bytes, at most {}", leaf.raw_len, leaf.most_raw())));
         }
         let stored = read_section(&self.storage, self.id(), owner, &leaf.extent())?;
         let entries = decompress(&stored, leaf.raw_len).and_then(|raw| self.parse_leaf(leaf, &raw));
@@ -69,21 +68,15 @@ impl<S: Storage> Reader<S> {
     }
 
     fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> Check<Vec<BlockEntry>> {
-        let mut fields = Fields::new(raw);
-        let mut entries = Vec::with_capacity(usize::from(leaf.count).min(raw.len() / BLOCK_ENTRY));
+        let entries = leaf.parse(raw)?;
         let (mut sums, mut at) = (LeafEntry::new(leaf.first(), leaf.data_offset), leaf.data_offset);
-        for block in (leaf.first_block..).take(leaf.count.into()) {
-            let entry = BlockEntry::decode(&mut fields)?;
-            let id = BlockId { block, ..leaf.first() };
-            ensure(entry.id == id, || format!("{} where {id} belongs", entry.id))?;
+        for entry in &entries {
             at = self
-                .check_entry(&entry)
+                .check_entry(entry)
                 .and_then(|()| entry.check_place(at))
-                .map_err(|what| format!("{id}: {what}"))?;
-            sums.add(&entry);
-            entries.push(entry);
+                .map_err(|what| format!("{}: {what}", entry.id))?;
+            sums.add(entry);
         }
-        fields.end()?;
         ensure(at == leaf.offset, || format!("blocks end at byte {at}"))?;
         sums.set_extent(&leaf.extent());
         ensure(sums == *leaf, || "its sums differ from the directory's root".into())?;
@@ -116,11 +109,13 @@ impl<S: Storage> Reader<S> {
     pub fn part(&self, block: &BlockEntry, part: &PartEntry) -> Result<Vec<u8>> {
         let owner = Owner::Part(block.id, part.kind);
         self.geometry(block.id)?.check(part).map_err(|what| owner.corrupt(part.offset, what))?;
-        let stored = read(&self.storage, owner, part.offset, part.stored_len.into())?;
-        if owner.checksum(self.id(), &stored) != part.checksum {
-            return Err(owner.corrupt(part.offset, "the checksum does not match"));
-        }
+        let stored = part.read(&self.storage, self.id(), block.id)?;
         decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
+    }
+
+    /// [`Error::Lost`] for a block of which nothing is known.
+    fn check_present(&self, block: &BlockEntry) -> Result<()> {
+        if block.lost { Err(Error::Lost(block.id)) } else { Ok(()) }
     }
 
     /// Fills `codes[k * voxels + voxel]`, or with a pyramid pass after pass, with the codes of a level; all zero where the
@@ -131,6 +126,7 @@ impl<S: Storage> Reader<S> {
         if geometry.codes(level) != Some(codes.len()) {
             return Err(Error::Invalid(format!("{}: no level {level} of {} codes", block.id, codes.len())));
         }
+        self.check_present(block)?;
         let Some(part) = block.part(PartKind::Level(level)) else {
             codes.fill(0);
             return Ok(());
@@ -145,6 +141,7 @@ impl<S: Storage> Reader<S> {
 
     /// The outliers of a block; empty where it has none.
     pub fn outliers(&self, block: &BlockEntry) -> Result<Outliers> {
+        self.check_present(block)?;
         let Some(part) = block.part(PartKind::Outliers) else { return Ok(Outliers::default()) };
         let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
         let outliers = unpack_outliers(&raw, geometry.sample_size, geometry.samples());
@@ -153,6 +150,7 @@ impl<S: Storage> Reader<S> {
 
     /// The mask of a block's missing samples (`frame * voxels + voxel`) and their bytes; none where it has none.
     pub fn missing(&self, block: &BlockEntry) -> Result<Option<(Vec<bool>, Vec<u8>)>> {
+        self.check_present(block)?;
         let Some(part) = block.part(PartKind::Missing) else { return Ok(None) };
         let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
         let missing = unpack_missing(&raw, geometry.sample_size, geometry.samples());
@@ -161,14 +159,22 @@ impl<S: Storage> Reader<S> {
 
     /// The little-endian bytes of every sample of a block (`frame * voxels + voxel`); none where it is not exact.
     pub fn exact(&self, block: &BlockEntry) -> Result<Option<Vec<u8>>> {
+        self.check_present(block)?;
         let Some(part) = block.part(PartKind::Exact) else { return Ok(None) };
         let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
         let samples = unpack_exact(&raw, geometry.sample_size, geometry.samples());
         unpacked(block, part, samples, |bytes| bytes.len() / geometry.sample_size).map(Some)
     }
 
+    /// Reads every part of a block and compares its checksum, for its errors alone.
+    pub fn check_stored(&self, block: &BlockEntry) -> Result<()> {
+        self.check_present(block)?;
+        block.parts.iter().try_for_each(|part| part.read(&self.storage, self.id(), block.id).map(drop))
+    }
+
     /// Reads and unpacks every part of a block, for its errors alone.
     pub fn check_parts(&self, block: &BlockEntry) -> Result<()> {
+        self.check_present(block)?;
         let mut codes = Vec::new();
         for part in &block.parts {
             match part.kind {
@@ -198,7 +204,7 @@ fn no_block(id: BlockId) -> Error {
     Error::Invalid(format!("{id}: the archive has no such block"))
 }
 
-fn read_header(storage: &impl Storage) -> Result<Header> {
+pub(crate) fn read_header(storage: &impl Storage) -> Result<Header> {
     let mut bytes = [0; HEADER];
     let present = storage.len().min(HEADER as u64) as usize;
     storage.read_at(0, &mut bytes[..present])?;
@@ -210,7 +216,7 @@ fn read_header(storage: &impl Storage) -> Result<Header> {
     Header::decode(&bytes)
 }
 
-fn read_footer(storage: &impl Storage, id: FileId) -> Result<Footer> {
+pub(crate) fn read_footer(storage: &impl Storage, id: FileId) -> Result<Footer> {
     let (len, size) = (storage.len(), FOOTER as u64);
     let corrupt = |what: String| Error::Corrupt { offset: len.saturating_sub(size), place: "footer".into(), what };
     let offset = len.checked_sub(size).filter(|&offset| offset >= HEADER as u64);
@@ -273,6 +279,6 @@ fn read_root(storage: &impl Storage, footer: &Footer, metadata: &Metadata) -> Re
     let leaves = leaves.map_err(corrupt)?;
     let end = check_leaves(metadata, &leaves).map_err(corrupt)?;
     let follows = align(end) == footer.metadata.offset;
-    ensure(follows, || format!("leaves end at byte {end}, the metadata is elsewhere")).map_err(corrupt)?;
+    ensure(follows, || format!("windows end at byte {end}, the metadata is elsewhere")).map_err(corrupt)?;
     Ok(leaves)
 }

@@ -1,7 +1,7 @@
 //! Framed sections and checksums: every structure but the parts' payloads is a frame of 24 bytes and its content.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Put, ensure};
+use crate::bytes::{Check, Fields, Put, ensure};
 use crate::header::FileId;
 use crate::{Error, Result, Storage};
 use std::fmt;
@@ -34,6 +34,11 @@ impl Extent {
     }
 }
 
+/// Where a section at `offset` of `len` stored bytes ends.
+pub(crate) fn section_end(offset: u64, len: usize) -> u64 {
+    offset.saturating_add((FRAME + len) as u64)
+}
+
 /// Whose bytes are checksummed: seeds the checksum, so that bytes of another owner fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Owner {
@@ -42,6 +47,8 @@ pub(crate) enum Owner {
     Leaf(BlockId),
     Metadata,
     Root,
+    Start,
+    Window(u32),
 }
 
 impl Owner {
@@ -54,6 +61,8 @@ impl Owner {
             Self::Leaf(id) => (id, [17, 0]),
             Self::Metadata => (none, [18, 0]),
             Self::Root => (none, [19, 0]),
+            Self::Start => (none, [20, 0]),
+            Self::Window(window) => (BlockId { window, ..none }, [21, 0]),
         }
     }
 
@@ -65,6 +74,8 @@ impl Owner {
             Self::Leaf(_) => *b"LEAF",
             Self::Metadata => *b"META",
             Self::Root => *b"ROOT",
+            Self::Start => *b"STRT",
+            Self::Window(_) => *b"WNDW",
         }
     }
 
@@ -94,6 +105,8 @@ impl fmt::Display for Owner {
             Self::Leaf(id) => write!(f, "directory leaf of {id}"),
             Self::Metadata => f.write_str("metadata"),
             Self::Root => f.write_str("directory root"),
+            Self::Start => f.write_str("start"),
+            Self::Window(window) => write!(f, "record of window {window}"),
         }
     }
 }
@@ -132,6 +145,32 @@ pub(crate) fn read_section(storage: &impl Storage, file: FileId, owner: Owner, e
         return Err(owner.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
     }
     Ok(bytes)
+}
+
+/// The section of `owner` at `offset`, of at most `most` stored bytes, whose frame says no more than it must and whose
+/// checksum is right.
+pub(crate) fn section_at(
+    storage: &impl Storage,
+    file: FileId,
+    owner: Owner,
+    offset: u64,
+    most: usize,
+) -> Result<(Extent, Vec<u8>)> {
+    let bytes = read(storage, owner, offset, FRAME as u64)?;
+    let extent = parse_frame(owner, offset, &bytes).map_err(|what| owner.corrupt(offset, what))?;
+    if extent.stored_len as usize > most {
+        return Err(owner.corrupt(offset, format!("{} bytes, at most {most}", extent.stored_len)));
+    }
+    let stored = read_section(storage, file, owner, &extent)?;
+    Ok((extent, stored))
+}
+
+fn parse_frame(owner: Owner, offset: u64, bytes: &[u8]) -> Check<Extent> {
+    let mut fields = Fields::new(bytes);
+    ensure(fields.array()? == owner.tag(), || "no such section".into())?;
+    let (stored_len, raw_len) = (fields.u32()?, fields.u32()?);
+    fields.reserved::<4>()?;
+    Ok(Extent { offset, stored_len, raw_len, checksum: fields.u64()? })
 }
 
 /// One zstd frame of the directory's `raw` bytes.

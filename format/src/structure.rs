@@ -1,52 +1,82 @@
 //! The check that every byte of a file is accounted for.
 
 use crate::directory::BlockEntry;
+use crate::header::HEADER;
+use crate::leaf::LeafEntry;
 use crate::limits::{ALIGN, align};
 use crate::reader::Reader;
 use crate::section::{Extent, Owner, frame, read};
 use crate::{Error, Result, Storage};
 
 impl<S: Storage> Reader<S> {
-    /// Checks all leaves, all blocks' headers against them, and all padding. Together with [`Reader::open`] and
-    /// [`Reader::check_parts`] of every block this finds any changed bit of the file.
-    pub fn check_structure(&self) -> Result<()> {
-        for window in 0..self.metadata().windows.len() as u32 {
-            for leaf in self.leaves(window) {
-                let mut at = leaf.data_offset;
-                for block in self.leaf(leaf)? {
-                    at = self.check_block(at, &block)?;
-                }
-                self.check_padding(leaf.extent().end())?;
-            }
+    /// Checks what is not inside leaves' stretches: start, records of windows, padding. Together with [`Reader::open`],
+    /// and [`Reader::check_leaf`] and [`Reader::check_parts`] of all leaves and blocks, this finds any changed bit of the
+    /// file. `found` is called with all that is wrong; an error if the storage fails.
+    pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
+        let metadata = self.metadata();
+        let start = metadata.start().encode()?;
+        note(self.check_section(Owner::Start, HEADER as u64, &start), found)?;
+        for window in 0..metadata.windows.len() as u32 {
+            let end = self.leaves(window).last().map_or(0, |leaf| leaf.extent().end());
+            let record = metadata.record(window).encode().map_err(Error::Invalid)?;
+            note(self.check_section(Owner::Window(window), align(end), &record), found)?;
         }
-        self.check_padding(self.footer.metadata.end())?;
-        self.check_padding(self.footer.root.end()).map(|_| ())
+        note(self.check_padding(self.footer.metadata.end()), found)?;
+        note(self.check_padding(self.footer.root.end()), found)
     }
 
-    /// Whether the header of a block at `start` repeats its entry, and zeros follow its parts; its aligned end.
-    fn check_block(&self, start: u64, block: &BlockEntry) -> Result<u64> {
-        let owner = Owner::Block(block.id);
-        let mut entry = Vec::new();
-        block.encode(&mut entry);
-        let len = entry.len() as u32;
-        let checksum = owner.checksum(self.id(), &entry);
-        let mut expected = frame(owner, &Extent { offset: start, stored_len: len, raw_len: len, checksum });
-        expected.append(&mut entry);
-        if read(self.storage(), owner, start, expected.len() as u64)? != expected {
-            return Err(owner.corrupt(start, "differs from the directory"));
+    /// Checks the headers of a leaf's blocks, of these entries, and all padding between them.
+    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+        let mut at = leaf.data_offset;
+        for block in blocks {
+            let mut entry = Vec::new();
+            block.encode(&mut entry);
+            let owner = Owner::Block(block.id);
+            note(self.check_content(owner, at, &entry), found)?;
+            let end = at + block.header_len() + block.stored_len();
+            note(self.check_padding(end), found)?;
+            at = align(end);
         }
-        self.check_padding(start + block.header_len() + block.stored_len())
+        note(self.check_padding(leaf.extent().end()), found)
     }
 
-    /// Whether zeros reach from `from` to the next aligned place; that place.
-    fn check_padding(&self, from: u64) -> Result<u64> {
-        let to = align(from);
+    /// Whether a section holds this content, and zeros follow.
+    fn check_section(&self, owner: Owner, offset: u64, content: &[u8]) -> Result<()> {
+        let end = self.check_content(owner, offset, content)?;
+        self.check_padding(end)
+    }
+
+    /// Whether a section holds this content, uncompressed; its end.
+    fn check_content(&self, owner: Owner, offset: u64, content: &[u8]) -> Result<u64> {
+        let (len, checksum) = (content.len() as u32, owner.checksum(self.id(), content));
+        let extent = Extent { offset, stored_len: len, raw_len: len, checksum };
+        let expected = [&frame(owner, &extent), content].concat();
+        if read(self.storage(), owner, offset, expected.len() as u64)? != expected {
+            return Err(owner.corrupt(offset, "differs from metadata and directory"));
+        }
+        Ok(extent.end())
+    }
+
+    /// Whether zeros reach from `from` to the next aligned place.
+    fn check_padding(&self, from: u64) -> Result<()> {
         let mut padding = [0; ALIGN as usize];
-        let padding = &mut padding[..(to - from) as usize];
+        let padding = &mut padding[..(align(from) - from) as usize];
         self.storage().read_at(from, padding)?;
         if padding.iter().any(|&byte| byte != 0) {
             return Err(Error::Corrupt { offset: from, place: "padding".into(), what: "not zero".into() });
         }
-        Ok(to)
+        Ok(())
+    }
+}
+
+/// Passes on what is wrong with the file; an error if the storage failed.
+fn note<T>(checked: Result<T>, found: &mut dyn FnMut(Error)) -> Result<()> {
+    match checked {
+        Ok(_) => Ok(()),
+        Err(failed @ Error::Io(_)) => Err(failed),
+        Err(wrong) => {
+            found(wrong);
+            Ok(())
+        }
     }
 }

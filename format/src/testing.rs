@@ -26,6 +26,9 @@ pub(crate) fn metadata() -> Metadata {
         levels: levels.to_vec(),
         functions: Vec::new(),
         pyramid: None,
+        coarseness: 1.0,
+        range: (-4.0, 9.0),
+        digest: 77,
         delta: 0.5,
         reached: 0.25,
         share: 0.75,
@@ -48,7 +51,6 @@ pub(crate) fn metadata() -> Metadata {
         variable: Some("density".into()),
         bound: Bound::Pointwise,
         tolerance: 0.01,
-        range: (-4.0, 9.0),
         missing_value: Some(-999.0),
         windows: vec![window(0, 4, Basis::Haar, &[1, 1, 2]), window(4, 3, Basis::Multi, &[2, 3])],
         settings: vec![("basis".into(), "haar".into())],
@@ -163,27 +165,45 @@ fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)]) {
 
 /// The file of these blocks.
 pub(crate) fn file(metadata: &Metadata, blocks: &[(EncodedBlock, Content)]) -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), ID).expect("memory");
-    blocks.iter().for_each(|(block, _)| writer.append(block).expect("in order"));
-    let (file, summary) = writer.finish(metadata).expect("complete");
+    let (file, summary) = write(metadata, blocks.iter().map(|(block, _)| block)).expect("complete");
     assert_eq!((summary.bytes, summary.blocks), (file.len() as u64, blocks.len() as u64));
     file
+}
+
+/// Writes these blocks, and ends a window wherever the next one begins.
+pub(crate) fn write<'a>(
+    metadata: &Metadata,
+    blocks: impl IntoIterator<Item = &'a EncodedBlock>,
+) -> Result<(Vec<u8>, Summary)> {
+    let mut writer = Writer::new(Vec::new(), ID, metadata)?;
+    for block in blocks {
+        let ended = writer.metadata().windows.len() as u32;
+        if block.id.window > ended {
+            writer.end_window(metadata.record(ended))?;
+        }
+        writer.append(block)?;
+    }
+    writer.end_window(metadata.record(metadata.windows.len() as u32 - 1))?;
+    writer.finish()
 }
 
 /// Opens a file and reads everything in it.
 pub(crate) fn verify(file: &[u8]) -> Result<Vec<(BlockId, Content)>> {
     let reader = Reader::open(file)?;
-    reader.check_structure()?;
+    let mut wrong = Vec::new();
+    reader.check_structure(&mut |error| wrong.push(error))?;
     let mut found = Vec::new();
     for window in 0..reader.metadata().windows.len() as u32 {
         for leaf in reader.leaves(window) {
-            for block in reader.leaf(leaf)? {
+            let blocks = reader.leaf(leaf)?;
+            reader.check_leaf(leaf, &blocks, &mut |error| wrong.push(error))?;
+            for block in blocks {
                 reader.check_parts(&block)?;
                 found.push((block.id, read_content(&reader, &block)?));
             }
         }
     }
-    Ok(found)
+    wrong.into_iter().next().map_or(Ok(found), Err)
 }
 
 fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Content> {

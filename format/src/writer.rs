@@ -1,13 +1,16 @@
 //! Writes a file from front to back, without a seek.
 
 use crate::block::{BlockId, EncodedBlock};
+use crate::bytes::ensure;
 use crate::directory::{BlockEntry, PartEntry};
 use crate::footer::{FOOTER, Footer};
 use crate::header::{FileId, Header};
-use crate::leaf::{LEAF_ENTRY, LeafEntry, check_leaves};
+use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::section::{Extent, Owner, compress_directory, frame};
+use crate::unfinished::Unfinished;
+use crate::window::WindowRecord;
 use crate::{Error, Result};
 use std::io::Write;
 
@@ -33,8 +36,12 @@ pub struct Writer<W: Write> {
     at: u64,
     /// Whether the last call succeeded.
     sound: bool,
+    /// Of the windows that were ended.
+    metadata: Metadata,
+    /// Where the last of them ends.
+    ended: u64,
+    /// The last block, of the window that is being written.
     last: Option<BlockId>,
-    blocks: u64,
     stored: u64,
     /// The leaf being filled and its entries' bytes.
     leaf: Option<LeafEntry>,
@@ -43,22 +50,56 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Starts a file: writes its header.
-    pub fn new(out: W, id: FileId) -> Result<Self> {
-        let (leaf, entries, leaves) = (None, Vec::new(), Vec::new());
-        let mut writer = Self { out, id, at: 0, sound: true, last: None, blocks: 0, stored: 0, leaf, entries, leaves };
+    /// Starts a file: writes its header and its start, which is all of the metadata that does not depend on frames.
+    pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
+        let (start, leaves) = (metadata.start(), Vec::new());
+        let record = start.encode()?;
+        let mut writer = Self::at(out, Unfinished { id, metadata: start, end: 0, leaves, stored: 0 });
         writer.write(&Header::new(id).encode())?;
+        writer.section(Owner::Start, &record, record.len())?;
+        writer.ended = writer.at;
         Ok(writer)
+    }
+
+    /// Goes on after the whole windows of a file that was not finished; `out` is where they end.
+    pub fn go_on(out: W, unfinished: Unfinished) -> Self {
+        Self::at(out, unfinished)
+    }
+
+    fn at(out: W, begun: Unfinished) -> Self {
+        let Unfinished { id, metadata, end, leaves, stored } = begun;
+        let (sound, last, leaf, entries) = (true, None, None, Vec::new());
+        Self { out, id, at: end, sound, metadata, ended: end, last, stored, leaf, entries, leaves }
+    }
+
+    /// Where the bytes go.
+    pub fn out(&mut self) -> &mut W {
+        &mut self.out
+    }
+
+    /// The metadata of the windows that were ended.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 
     /// Appends a block. Blocks come ordered by window, channel and block, none left out; [`Error::Invalid`] otherwise
     /// and for statistics that no block can have.
     pub fn append(&mut self, block: &EncodedBlock) -> Result<()> {
+        self.put(block, false)
+    }
+
+    /// Appends a block of which nothing is known, in its place.
+    pub fn append_lost(&mut self, id: BlockId) -> Result<()> {
+        let stats = BlockEntry::of_lost(id).stats;
+        self.put(&EncodedBlock { id, stats, parts: Vec::new() }, true)
+    }
+
+    fn put(&mut self, block: &EncodedBlock, lost: bool) -> Result<()> {
         self.begin()?;
         self.check_follows(block.id)?;
         self.make_room(block.id)?;
         self.pad()?;
-        let entry = self.place(block)?;
+        let entry = self.place(block, lost)?;
         entry.check().map_err(|what| Error::Invalid(format!("{}: {what}", block.id)))?;
         let mut bytes = Vec::new();
         entry.encode(&mut bytes);
@@ -68,22 +109,41 @@ impl<W: Write> Writer<W> {
         self.section(Owner::Block(block.id), &bytes, bytes.len())?;
         block.parts.iter().try_for_each(|part| self.write(&part.stored))?;
         (self.last, self.sound) = (Some(block.id), true);
-        self.blocks += 1;
         self.stored += entry.stored_len();
         Ok(())
     }
 
-    /// Ends the file: writes metadata, directory and footer, and flushes. [`Error::Invalid`] if the metadata does not
-    /// describe the blocks that were appended.
-    pub fn finish(mut self, metadata: &Metadata) -> Result<(W, Summary)> {
+    /// Ends a window, all of whose blocks were appended: writes the end of its directory and its record. From here on the
+    /// window can be read whatever becomes of the rest. [`Error::Invalid`] if the record does not describe the blocks.
+    pub fn end_window(&mut self, record: WindowRecord) -> Result<()> {
         self.begin()?;
         self.flush_leaf()?;
-        let record = metadata.encode()?;
-        check_leaves(metadata, &self.leaves).map_err(Error::Invalid)?;
+        let number = self.metadata.windows.len() as u32;
+        let bytes = record.encode().map_err(Error::Invalid)?;
+        self.metadata.push(record).map_err(Error::Invalid)?;
+        let leaves =
+            &self.leaves[self.leaves.len().min(number as usize * self.metadata.leaves_per_window() as usize)..];
+        let whole = leaves.len() as u64 == self.metadata.leaves_per_window();
+        let checked = ensure(whole, || format!("window {number}: blocks are missing"))
+            .and_then(|()| check_window(&self.metadata, number, leaves, self.ended));
+        checked.map_err(Error::Invalid)?;
+        self.section(Owner::Window(number), &bytes, bytes.len())?;
+        (self.ended, self.last, self.sound) = (self.at, None, true);
+        Ok(())
+    }
+
+    /// Ends the file: writes metadata, directory and footer, and flushes. [`Error::Invalid`] without a window, or after
+    /// blocks whose window was not ended.
+    pub fn finish(mut self) -> Result<(W, Summary)> {
+        self.begin()?;
+        let record = self.metadata.encode()?;
+        let ended = self.last.is_none() && self.metadata.frames > 0;
+        ensure(ended, || "a file without windows, or within one".into()).map_err(Error::Invalid)?;
         let metadata = self.section(Owner::Metadata, &record, record.len())?;
         let root = self.write_root()?;
         self.pad()?;
-        let (total, blocks, leaves) = (self.at + FOOTER as u64, self.blocks, self.leaves.len() as u64);
+        let (total, blocks) = (self.at + FOOTER as u64, self.metadata.blocks());
+        let leaves = self.leaves.len() as u64;
         self.write(&Footer { id: self.id, total, metadata, root, blocks, leaves }.encode())?;
         self.out.flush()?;
         Ok((self.out, Summary { bytes: total, blocks, leaves, stored: self.stored }))
@@ -97,28 +157,31 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Whether `id` is the next block or begins the next channel or window; [`check_leaves`] sees to the rest.
+    /// Whether `id` is the next block, or begins the next channel; [`Self::end_window`] sees to the rest.
     fn check_follows(&self, id: BlockId) -> Result<()> {
-        let BlockId { window, block, channel } =
-            self.last.unwrap_or(BlockId { window: 0, block: u32::MAX, channel: 0 });
-        let next_block = BlockId { window, block: block.wrapping_add(1), channel };
-        let next_channel = BlockId { window, block: 0, channel: channel.wrapping_add(1) };
-        let next_window = BlockId { window: window.wrapping_add(1), block: 0, channel: 0 };
-        let follows =
-            id == next_block || self.last.is_some_and(|last| last < id) && (id == next_channel || id == next_window);
+        let window = self.metadata.windows.len() as u32;
+        let follows = match self.last {
+            None => id == BlockId { window, block: 0, channel: 0 },
+            Some(last) => {
+                let next_block = BlockId { block: last.block.wrapping_add(1), ..last };
+                let next_channel = BlockId { block: 0, channel: last.channel.wrapping_add(1), ..last };
+                last < id && (id == next_block || id == next_channel)
+            }
+        };
         if follows { Ok(()) } else { Err(Error::Invalid(format!("{id} after {:?}", self.last))) }
     }
 
     /// Ends the current leaf if `id` does not belong to it.
     fn make_room(&mut self, id: BlockId) -> Result<()> {
-        let other = |leaf: LeafEntry| (leaf.window, leaf.channel) != (id.window, id.channel);
+        let other = |leaf: LeafEntry| leaf.channel != id.channel;
         let full = |leaf: LeafEntry| u32::from(leaf.count) == BLOCKS_PER_LEAF;
         if self.leaf.is_some_and(|leaf| other(leaf) || full(leaf)) { self.flush_leaf() } else { Ok(()) }
     }
 
     /// The entry of a block that starts here.
-    fn place(&self, block: &EncodedBlock) -> Result<BlockEntry> {
-        let mut entry = BlockEntry { id: block.id, stats: block.stats, parts: Vec::with_capacity(block.parts.len()) };
+    fn place(&self, block: &EncodedBlock, lost: bool) -> Result<BlockEntry> {
+        let (id, stats, parts) = (block.id, block.stats, Vec::with_capacity(block.parts.len()));
+        let mut entry = BlockEntry { id, stats, parts, lost };
         for part in &block.parts {
             let (kind, stats, raw_len) = (part.kind, part.stats, part.raw_len);
             let stored_len = length(&part.stored)?;

@@ -339,10 +339,10 @@ impl Cli {
         if !(0.0..=1.0).contains(&tolerance) {
             return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
         }
-        let allowed = range_bound(tolerance, file.range);
+        let allowed = range_bound(tolerance, file.range());
         let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         if allowed < reached && self.error == ErrorName::Certified {
-            let least = reached / (file.range.1 - file.range.0);
+            let least = reached / (file.range().1 - file.range().0);
             let what = "the file itself is up to";
             return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
         }

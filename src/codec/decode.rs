@@ -53,6 +53,17 @@ impl Block {
         Ok(block)
     }
 
+    /// Of which every sample is missing: not a number where the type has that, or the declared value, or 0.
+    pub fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
+        let voxels: usize = size.iter().product();
+        let samples = codec.frames() * voxels;
+        let number = if codec.sample.is_float() { f64::NAN } else { codec.missing_value.unwrap_or(0.0) };
+        let mut bytes = vec![0; samples * codec.sample.size()];
+        sample::store(codec.sample, &vec![number; samples], &mut bytes);
+        let (outliers, missing) = (Outliers::default(), (vec![true; samples], bytes));
+        Self { size, voxels, step: 0.0, codes: Buffer::default(), outliers, missing, exact: None, bytes_read: 0 }
+    }
+
     /// Reads the level parts that there are and that `wanted` needs; the codes of others are zero.
     fn read_codes<S: Storage>(
         &mut self,

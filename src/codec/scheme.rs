@@ -25,7 +25,7 @@ impl Scheme {
     /// As a window of a file says.
     pub fn of_window(window: &Window) -> Self {
         let (functions, pyramid) = (window.functions.clone(), window.pyramid.clone());
-        Self { basis: window.basis, functions, pyramid, coarseness: 1.0 }
+        Self { basis: window.basis, functions, pyramid, coarseness: window.coarseness }
     }
 
     /// The transform along time of a window of `frames` frames.

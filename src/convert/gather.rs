@@ -2,7 +2,7 @@
 
 use super::choose::{Chooser, most_samples};
 use super::sampled::{self, Pixel};
-use super::{ConvertConfig, Idle, MissingPolicy, Plan, WindowJob};
+use super::{ConvertConfig, Done, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
 use crate::codec::scheme::Scheme;
@@ -10,11 +10,10 @@ use crate::error::{Error, Result};
 use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
-use crate::volume::Grid;
 use crossbeam::channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use wavesplat_format::{BlockId, FileId};
+use wavesplat_format::{BlockId, FileId, Window};
 use xxhash_rust::xxh3::xxh3_128;
 
 /// Some blocks of one window: their samples, frame by frame.
@@ -22,13 +21,16 @@ use xxhash_rust::xxh3::xxh3_128;
 pub(super) struct Batch {
     pub(super) window: Arc<WindowJob>,
     pub(super) blocks: Vec<(BlockId, Vec<u8>)>,
+    /// No more follow of its window, whose source was unchanged when they were gathered.
+    pub(super) last: bool,
 }
 
-/// Reads all windows in order until the frames end. Returns the time spent reading.
+/// Reads all windows in order until the frames end, and sends those that are not yet done. Returns the time spent reading.
 pub(super) fn read(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
     plan: &Plan,
+    done: &Done,
     idle: &Idle<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
@@ -37,27 +39,24 @@ pub(super) fn read(
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
     };
-    let mut reader = WindowReader { config, plan, idle, archive, pixels, range: None, id: None, scheme: None };
+    let (id, range, scheme) = (None, None, None);
+    let mut reader = WindowReader { config, plan, idle, archive, pixels, range, id, scheme, frames: 0, before: 0 };
+    done.windows[..done.before].iter().for_each(|window| reader.take_over(window));
+    (reader.before, reader.id) = (reader.frames, done.id.filter(|_| done.before > 0));
     let mut busy = Duration::ZERO;
-    for index in 0.. {
+    for index in done.before.. {
         let started = Instant::now();
-        let first = index * config.window;
-        let count = reader.archive.frames.map_or(config.window, |all| config.window.min(all.saturating_sub(first)));
-        if count == 0 {
-            break;
+        let known = done.windows.get(index);
+        let Some(window) = reader.next(source, known.map_or(config.window, |w| w.frames as usize))? else { break };
+        if let Some(known) = known {
+            reader.recognise(window.as_ref(), known, done)?;
+            busy += started.elapsed();
+            continue;
         }
-        let window = source.window(first, count)?;
-        if window.frames() == 0 {
-            break;
-        }
-        let job = Arc::new(reader.prepare(window.as_ref(), index, first)?);
+        let job = Arc::new(reader.prepare(window.as_ref(), index)?);
         busy += started.elapsed();
-        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? {
-            break; // a later stage failed and says why
-        }
-        window.check_unchanged()?;
-        if window.frames() < config.window {
-            break;
+        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < config.window {
+            break; // at the end, or because a later stage failed and says why
         }
     }
     Ok(busy)
@@ -76,17 +75,58 @@ struct WindowReader<'a> {
     id: Option<FileId>,
     /// Of the window before.
     scheme: Option<Scheme>,
+    /// Frames of the file so far.
+    frames: u64,
+    /// Those of them that are not the source's.
+    before: u64,
 }
 
 impl WindowReader<'_> {
+    /// The next frames of the source, at most `count`; none at its end.
+    fn next(&self, source: &mut dyn FrameSource, count: usize) -> Result<Option<Box<dyn FrameWindow>>> {
+        let first = self.first();
+        let count = self.archive.frames.map_or(count, |all| count.min(all.saturating_sub(first)));
+        if count == 0 {
+            return Ok(None);
+        }
+        Ok(Some(source.window(first, count)?).filter(|window| window.frames() > 0))
+    }
+
+    /// The source's frame that comes next.
+    fn first(&self) -> usize {
+        (self.frames - self.before) as usize
+    }
+
+    /// Goes on after a window as if it had just been coded.
+    fn take_over(&mut self, window: &Window) {
+        self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
+        self.scheme = Some(Scheme::of_window(window));
+        self.frames += u64::from(window.frames);
+    }
+
+    /// Goes on after a window that is done; an error if its frames are not those that the source has now.
+    fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &Done) -> Result<()> {
+        let seen = scan(window, &self.archive.grid, self.archive.sample, self.config.missing_value)?;
+        window.check_unchanged()?;
+        let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
+        if Some(id) != done.id || seen.digest != known.digest || window.frames() != known.frames as usize {
+            let (first, end) = (known.first_frame, known.first_frame + u64::from(known.frames));
+            let what = format!("frames {first}..{end} are not those that were converted before");
+            return Err(Error::Changed { path: window.name(0).into(), what });
+        }
+        self.take_over(known);
+        Ok(())
+    }
+
     /// Looks at the window's samples and fixes its bound.
-    fn prepare(&mut self, window: &dyn FrameWindow, index: usize, first: usize) -> Result<WindowJob> {
-        let (config, ty) = (self.config, self.archive.sample);
+    fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
+        let (config, ty, first) = (self.config, self.archive.sample, self.first());
         let seen = scan(window, &self.archive.grid, ty, config.missing_value)?;
         self.refuse_missing(window, first, &seen)?;
         let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
         self.range = Some(range);
-        let delta = self.delta(window, seen.range, config.range.unwrap_or(range))?;
+        let range = config.range.unwrap_or(range);
+        let delta = self.delta(window, seen.range, range)?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(seen.range);
         let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
@@ -95,9 +135,12 @@ impl WindowReader<'_> {
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
-        let id = *self.id.get_or_insert_with(|| file_id(config, &self.archive, self.plan, seen.digest));
+        let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
         let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
-        Ok(WindowJob { index, first_frame: first as u64, id, codec, range })
+        let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
+        let first_frame = self.frames;
+        self.frames += window.frames() as u64;
+        Ok(WindowJob { index, first_frame, id, codec, range, digest: seen.digest, times })
     }
 
     /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
@@ -143,7 +186,11 @@ impl WindowReader<'_> {
         for first in (0..all).step_by(batch) {
             let started = Instant::now();
             let blocks: Result<_> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
-            let batch = Batch { window: job.clone(), blocks: blocks? };
+            let last = first + batch >= all;
+            if last {
+                window.check_unchanged()?;
+            }
+            let batch = Batch { window: job.clone(), blocks: blocks?, last };
             *busy += started.elapsed();
             if out.send(batch).is_err() {
                 return Ok(false);
@@ -164,15 +211,9 @@ impl WindowReader<'_> {
 /// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
 const ANEW: usize = 8;
 
-/// A name for the file that follows from settings and data: the same conversion has the same one everywhere.
-fn file_id(config: &ConvertConfig, archive: &Archive, plan: &Plan, digest: u64) -> FileId {
-    let Grid { dims, spacing, origin } = archive.grid;
-    let ConvertConfig { coding, window, tolerance, bound, range, missing, missing_value, level, settings, .. } = config;
-    let bound: &Bound = bound;
-    let all = format!(
-        "{dims:?} {spacing:?} {origin:?} {} {coding:?} {window} {tolerance:?} {bound:?} {range:?} {missing:?} \
-         {missing_value:?} {} {level} {settings:?} {digest}",
-        archive.sample, plan.blocks.edge
-    );
+/// A name for the file that follows from settings and the digest of its first window: the same conversion has the same
+/// one everywhere.
+fn file_id(plan: &Plan, digest: u64) -> FileId {
+    let all = format!("{:?} {digest}", plan.start);
     FileId(xxh3_128(all.as_bytes()).to_le_bytes())
 }

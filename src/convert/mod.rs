@@ -10,12 +10,17 @@
 //! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from its own samples or, where
 //! the tolerance refers to the value range, from that of all frames up to its end, which never exceeds that of the archive:
 //! no first pass over the data is needed, and a pipe gives the same bytes as files.
+//!
+//! A window is ended in the file once its source was seen unchanged; then `out` is flushed. So what a killed conversion
+//! leaves is whole up to its last window, and [`go_on`] continues there: to the bytes that the conversion would have had
+//! without the kill, since what one window tells the next is in its record.
 
 mod choose;
 mod gather;
 mod learn;
 mod record;
 pub mod sampled;
+mod settings;
 
 use crate::bound::Bound;
 use crate::codec::WindowCodec;
@@ -34,11 +39,12 @@ use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
 use serde::Serialize;
+pub use settings::{of_file, setting};
 use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use wavesplat_format::{Basis, BlockId, FileId};
+use wavesplat_format::{Basis, BlockId, FileId, Metadata, Unfinished, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +80,7 @@ pub struct ConvertConfig {
     pub memory: usize,
     /// Bytes of these that the source takes for itself: a stream's window.
     pub reserved: usize,
-    /// What was asked of the input (frames, region), kept as provenance.
+    /// What was asked of the input (frames, region, variable), to find the same samples again.
     pub settings: Vec<(String, String)>,
 }
 
@@ -101,11 +107,13 @@ impl ConvertConfig {
 /// What a conversion did.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConvertReport {
-    /// Frames converted.
+    /// Frames of the file.
     pub frames: u64,
-    /// Windows written.
+    /// Those that were in it before.
+    pub frames_before: u64,
+    /// Windows of the file.
     pub windows: usize,
-    /// Bytes of samples read.
+    /// Bytes of the samples of all frames.
     pub input_bytes: u64,
     /// Bytes of the coefficient file.
     pub output_bytes: u64,
@@ -140,12 +148,37 @@ pub struct ConvertReport {
     pub seconds: f64,
 }
 
+/// What a file holds to which frames are added.
+#[derive(Debug)]
+pub struct Begun {
+    /// Its whole windows.
+    pub unfinished: Unfinished,
+    /// The first of these windows whose frames the source still holds, from its first frame on; those before it are not
+    /// compared with anything.
+    pub before: usize,
+}
+
 /// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without a seek.
 ///
-/// `name` stands for `out` in messages.
+/// `out` is flushed whenever a window is complete. `name` stands for it in messages.
 pub fn convert<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
+    name: &Path,
+    out: W,
+    progress: &dyn Progress,
+) -> Result<ConvertReport> {
+    go_on(source, config, None, name, out, progress)
+}
+
+/// As [`convert`], after the whole windows of a file that was begun; `out` is where they end.
+///
+/// # Errors
+/// Also where the file was begun with other settings, or from other frames.
+pub fn go_on<W: Write>(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    begun: Option<Begun>,
     name: &Path,
     out: W,
     progress: &dyn Progress,
@@ -155,15 +188,18 @@ pub fn convert<W: Write>(
     let missing_value = sample::missing_value(archive.sample, config.missing_value);
     let config = &ConvertConfig { missing_value, ..config.clone() };
     let plan = Plan::new(config, &archive)?;
-    progress.start(archive.frames.map(|f| (f.div_ceil(config.window) * plan.blocks.len()) as u64));
-    let mut recorder = Recorder::new(config, &archive, &plan, name, out);
+    let done = Done::of(begun.as_ref(), &plan, name)?;
+    let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.before);
+    progress.start(windows.map(|w| (w * plan.blocks.len()) as u64));
+    progress.advance((done.windows.len() * plan.blocks.len()) as u64);
+    let mut recorder = Recorder::new(config, &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let idle = Idle::default();
     let (read_time, encode_time) = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
-        let (plan, idle) = (&plan, &idle);
-        let reader = scope.spawn(move || gather::read(source, config, plan, idle, &to_workers));
+        let (plan, done, idle) = (&plan, &done, &idle);
+        let reader = scope.spawn(move || gather::read(source, config, plan, done, idle, &to_workers));
         let workers = scope.spawn(move || encode(config.level, plan.blocks, idle, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
@@ -174,6 +210,12 @@ pub fn convert<W: Write>(
     Ok(report)
 }
 
+/// What a file of `archive` says before its first frame: all that is decided without looking at samples.
+pub fn beginning(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
+    let missing_value = sample::missing_value(archive.sample, config.missing_value);
+    Plan::new(&ConvertConfig { missing_value, ..config.clone() }, archive).map(|plan| plan.start)
+}
+
 /// Passes a panic of a stage on; it is a bug, not an error.
 fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
     stage.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
@@ -182,6 +224,8 @@ fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
 /// What follows from the configuration and the archive before any frame is read.
 #[derive(Debug)]
 struct Plan {
+    /// What the file says before its first frame.
+    start: Metadata,
     blocks: BlockGrid,
     /// Blocks that are gathered, encoded and written together.
     batch: usize,
@@ -215,7 +259,48 @@ impl Plan {
             return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
         }
         let batch = batch_len(config, blocks, archive.sample)?;
-        Ok(Self { blocks, batch })
+        Ok(Self { start: start(config, archive, edge), blocks, batch })
+    }
+}
+
+/// What the file says before its first frame.
+fn start(config: &ConvertConfig, archive: &Archive, edge: usize) -> Metadata {
+    Metadata {
+        dims: archive.grid.dims.map(|n| n as u64),
+        spacing: archive.grid.spacing,
+        origin: archive.grid.origin,
+        sample: archive.sample,
+        block_edge: edge as u32,
+        channels: 1,
+        frames: 0,
+        times: Vec::new(),
+        variable: archive.variable.clone(),
+        bound: config.bound,
+        tolerance: config.tolerance,
+        missing_value: config.missing_value,
+        windows: Vec::new(),
+        settings: settings::remembered(config),
+        program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// The windows that a file holds already, and how the source's frames lie to them.
+#[derive(Debug, Default)]
+struct Done {
+    id: Option<FileId>,
+    windows: Vec<Window>,
+    /// [`Begun::before`]
+    before: usize,
+}
+
+impl Done {
+    fn of(begun: Option<&Begun>, plan: &Plan, name: &Path) -> Result<Self> {
+        let Some(Begun { unfinished, before }) = begun else { return Ok(Self::default()) };
+        let held = unfinished.metadata();
+        if let Some(what) = settings::difference(&held.start(), &plan.start) {
+            return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
+        }
+        Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before })
     }
 }
 
@@ -264,7 +349,7 @@ fn encode(
 ) -> Result<Duration> {
     let idle = Idle::default();
     let mut busy = Duration::ZERO;
-    for Batch { window, blocks } in batches {
+    for Batch { window, blocks, last } in batches {
         let started = Instant::now();
         let encode = |(id, samples): (BlockId, Vec<u8>)| {
             let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
@@ -276,7 +361,7 @@ fn encode(
         };
         let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
         busy += started.elapsed();
-        let encoded = EncodedBatch { window, blocks: blocks? };
+        let encoded = EncodedBatch { window, blocks: blocks?, last };
         if out.send(encoded).is_err() {
             break; // the writer failed and says why
         }
@@ -316,6 +401,7 @@ fn bug(error: wavesplat_format::Error) -> Error {
 struct EncodedBatch {
     window: Arc<WindowJob>,
     blocks: Vec<Encoded>,
+    last: bool,
 }
 
 /// A window as the reader found it.
@@ -325,6 +411,9 @@ struct WindowJob {
     first_frame: u64,
     id: FileId,
     codec: WindowCodec,
-    /// Range of the samples, of the frames up to the window's end.
+    /// What the tolerance refers to: as given, or the range of the samples of all frames up to the window's end.
     range: (f64, f64),
+    digest: u64,
+    /// Times of its frames, if the source has any.
+    times: Vec<f64>,
 }

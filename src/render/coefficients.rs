@@ -66,7 +66,8 @@ impl Scene for CoefficientScene {
         let windows = &self.file.metadata().windows;
         // Codes, payload and samples; what a pyramid gives; where samples are missing, a mask and overrides.
         let refined = if windows.iter().any(|w| w.pyramid.is_some()) { 8 } else { 0 };
-        let missing = if windows.iter().any(|w| w.missing > 0) { 1 + 32 + 24 } else { 0 };
+        let missing = (0..windows.len() as u32).any(|window| self.file.has_missing(window));
+        let missing = if missing { 1 + 32 + 24 } else { 0 };
         self.file.largest_block() * (4 + 5 + 8 + refined + missing)
     }
 
@@ -145,13 +146,13 @@ impl<'a> CoefficientGroup<'a> {
         let coded = file.leaves(window).iter().any(|leaf| leaf.coded > 0);
         let exact = file.leaves(window).iter().any(|leaf| leaf.exact > 0);
         let record = &file.metadata().windows[window as usize];
-        let samples = what == What::Samples;
+        let (samples, missing) = (what == What::Samples, file.has_missing(window));
         let by_values = !samples && !config.certify && few_asked(file, &codec, window, config);
         let layout = Layout {
             coefficients: if samples || by_values || !coded { 0 } else { kept.len() },
             frames: frames.len(),
-            values: samples || by_values || exact || record.outliers > 0 || record.missing > 0,
-            absent: record.missing > 0,
+            values: samples || by_values || exact || record.outliers > 0 || missing,
+            absent: missing,
             error_planes: error_planes(config, codec.parts()),
             order: if samples || by_values || is_dense(record, file.grid.whole().voxels()) {
                 Order::Pixels
@@ -246,7 +247,9 @@ impl<'a> CoefficientGroup<'a> {
 
     /// Whether a block adds nothing to any plane.
     fn adds_nothing(&self, kept: &Kept) -> bool {
-        kept.entry.parts.is_empty() && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
+        kept.entry.parts.is_empty()
+            && !kept.entry.lost
+            && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
     }
 
     /// The entries of the directory's leaf that lists a block.
@@ -281,7 +284,7 @@ impl Group for CoefficientGroup<'_> {
                 found.left_out += kept.left_out;
                 found.other_frames += self.of_other_frames(&kept.entry);
                 found.certified = found.certified.max(kept.certified);
-                found.empty -= u64::from(!entry.parts.is_empty());
+                found.empty -= u64::from(!entry.parts.is_empty() || entry.lost);
                 if !self.adds_nothing(&kept) {
                     found.blocks.push(entry.id.block as usize);
                 }

@@ -123,9 +123,13 @@ fn missing_values_are_refused_with_their_place_or_kept() {
     work.write("nan.npy", archive.npy());
     let place = ["nan.npy", "frame 33", "x 4, y 5, z 6", "first of 3", "--missing mask"];
     work.wavesplat("convert nan.npy -o out.wspl").fails(3, &place);
-    work.piped("convert - -o out.wspl", &archive.npy()).fails(3, &["frame 33", "x 4, y 5, z 6", "first of 3"]);
-    assert_eq!(work.names(), ["nan.npy"]);
-    work.wavesplat("convert nan.npy -o out.wspl --missing mask").ok();
+    work.wavesplat("convert nan.npy -o out.wspl --missing mask").fails(2, &["out.wspl.part", "32 frames", "--force"]);
+    let args = "convert - -o out.wspl --force";
+    work.piped(args, &archive.npy()).fails(3, &["frame 33", "x 4, y 5, z 6", "first of 3"]);
+    assert_eq!(work.names(), ["nan.npy", "out.wspl.part"]);
+    work.wavesplat("convert nan.npy -o out.wspl --missing mask --resume")
+        .fails(2, &["another missing: error, now mask"]);
+    work.wavesplat("convert nan.npy -o out.wspl --missing mask --force").ok();
     let report = work.wavesplat("verify out.wspl --against nan.npy --json").ok().json();
     assert_eq!(report["against"]["missing"], 3);
     work.wavesplat("extract out.wspl -o out.raw").ok();

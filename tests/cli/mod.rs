@@ -129,6 +129,14 @@ impl Run {
         self
     }
 
+    /// It failed with this code, and said all these words on standard error; what it found is on standard output.
+    #[track_caller]
+    pub(crate) fn finds(self, code: i32, words: &[&str]) -> Self {
+        assert!(!self.out.is_empty(), "{}: nothing on standard output", self.args);
+        let found = Self { out: Vec::new(), ..self };
+        found.fails(code, words)
+    }
+
     fn text(&self) -> &str {
         std::str::from_utf8(&self.out).unwrap()
     }

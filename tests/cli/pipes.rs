@@ -59,14 +59,16 @@ fn a_consumer_that_closes_early_ends_programs_quietly() {
 fn a_producer_that_dies_within_a_frame_leaves_no_file() {
     let (work, archive) = (Work::new(), small());
     let bytes = archive.bytes();
-    let options = "convert - -o out.wspl --dims 20x14x10 --dtype f32";
-    work.piped(options, &bytes[..35 * 11_200 + 100]).fails(3, &["-: ", "frame 35", "11200", "100"]);
-    work.piped("convert - -o out.wspl", &archive.npy()[..9 * 11_200]).fails(3, &["-: ", "frame 8"]);
-    work.piped("convert - -o out.wspl", &archive.npy()[..128 + 32 * 11_200]).fails(3, &["-: ", "32 of 40 frames"]);
-    work.piped("convert - -o out.wspl", &archive.npy()[..50]).fails(3, &["-: ", "header"]);
-    work.piped("convert - -o out.wspl", &[archive.npy(), archive.npy()].concat()).fails(3, &["-: ", "40 frame(s)"]);
-    work.piped(options, b"").fails(3, &["-: ", "empty"]);
-    assert_eq!(work.names(), [""; 0]);
+    let options = "convert - -o raw.wspl --dims 20x14x10 --dtype f32";
+    let kept = "what is finished is kept; --resume";
+    work.piped(options, &bytes[..35 * 11_200 + 100]).fails(3, &["-: ", "frame 35", "11200", "100", kept]);
+    work.piped("convert - -o few.wspl", &archive.npy()[..9 * 11_200]).fails(3, &["-: ", "frame 8"]);
+    work.piped("convert - -o npy.wspl", &archive.npy()[..128 + 32 * 11_200])
+        .fails(3, &["-: ", "32 of 40 frames", kept]);
+    work.piped("convert - -o few.wspl", &archive.npy()[..50]).fails(3, &["-: ", "header"]);
+    work.piped("convert - -o two.wspl", &[archive.npy(), archive.npy()].concat()).fails(3, &["-: ", "40 frame(s)"]);
+    work.piped(&options.replace("raw", "few"), b"").fails(3, &["-: ", "empty"]);
+    assert_eq!(work.names(), ["npy.wspl.part", "raw.wspl.part", "two.wspl.part"], "whole windows, and no final name");
 }
 
 #[test]
@@ -83,11 +85,11 @@ fn a_killed_conversion_leaves_no_file_under_the_final_name() {
     }
     work.wavesplat("info out.wspl").fails(1, &["out.wspl"]);
     let args = "convert - -o out.wspl --window 8 --dims 20x14x10 --dtype f32";
-    work.piped(args, &archive.bytes()).fails(2, &["out.wspl", "another program"]);
+    work.piped(args, &archive.bytes()).fails(2, &["out.wspl", &format!("process {} (", child.id())]);
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(!work.path("out.wspl").exists());
-    work.piped(args, &archive.bytes()).ok();
+    work.piped(&format!("{args} --force"), &archive.bytes()).ok();
     assert_eq!(work.names(), ["out.wspl"]);
     work.wavesplat("verify out.wspl").ok();
 }

@@ -24,7 +24,7 @@ use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::{BlockId, EncodedBlock, Metadata, Writer};
+use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowRecord, Writer};
 
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
@@ -81,7 +81,7 @@ pub(crate) fn stored_with_a_lie(
     let file = stored(&mut memory.clone(), config).open();
     let mut metadata = file.metadata().clone();
     let mut encoder = Encoder::new(config.level).unwrap();
-    let mut writer = Writer::new(Vec::new(), file.id()).unwrap();
+    let mut writer = Writer::new(Vec::new(), file.id(), &metadata).unwrap();
     for window in 0..file.metadata().windows.len() as u32 {
         let (codec, frames) = (file.codec(window).unwrap(), file.window_range(window));
         let samples = memory.clone().window(frames.start, frames.len()).unwrap();
@@ -95,8 +95,10 @@ pub(crate) fn stored_with_a_lie(
             }
             writer.append(&encoded).unwrap();
         }
+        let times = metadata.times.get(frames).unwrap_or_default().to_vec();
+        writer.end_window(WindowRecord { window: metadata.windows[window as usize].clone(), times }).unwrap();
     }
-    writer.finish(&metadata).unwrap().0
+    writer.finish().unwrap().0
 }
 
 /// All samples of a file.

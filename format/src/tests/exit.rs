@@ -8,9 +8,9 @@ use crate::*;
 
 type Times = (u64, Vec<f64>, Option<String>);
 type Grid = ([u64; 3], [f64; 3], [f64; 3], u32, u32, u16);
-type Tolerance<B> = (B, f64, (f64, f64), Option<f64>);
+type Tolerance<B> = (B, f64, Option<f64>);
 type Refined = Option<(Vec<u32>, u32, f64, f64, bool)>;
-type Coded = (u32, u32, Vec<u32>, Vec<i16>, Refined);
+type Coded = (u32, u32, Vec<u32>, Vec<i16>, Refined, f64, (f64, f64), u64);
 type Reached = (f64, f64, f64, f64, f64, f64, u64, u64, u64);
 type Record<B> = (Grid, Times, Tolerance<B>, Vec<(u64, u32, Coded, Reached)>, Vec<(String, String)>, String);
 
@@ -18,10 +18,10 @@ type Record<B> = (Grid, Times, Tolerance<B>, Vec<(u64, u32, Coded, Reached)>, Ve
 fn record<B>(m: &Metadata, bound: B) -> Record<B> {
     let grid = (m.dims, m.spacing, m.origin, m.sample as u32, m.block_edge, m.channels);
     let times = (m.frames, m.times.clone(), m.variable.clone());
-    let tolerance = (bound, m.tolerance, m.range, m.missing_value);
+    let tolerance = (bound, m.tolerance, m.missing_value);
     let window = |w: &Window| {
-        let coded =
-            (w.basis as u32, w.coefficients, w.levels.clone(), w.functions.clone(), w.pyramid.as_ref().map(refined));
+        let (levels, functions, pyramid) = (w.levels.clone(), w.functions.clone(), w.pyramid.as_ref().map(refined));
+        let coded = (w.basis as u32, w.coefficients, levels, functions, pyramid, w.coarseness, w.range, w.digest);
         let reached = (w.delta, w.reached, w.share, w.squared_error, w.min, w.max, w.missing, w.coded, w.outliers);
         (w.first_frame, w.frames, coded, reached)
     };

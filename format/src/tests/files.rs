@@ -53,15 +53,13 @@ fn writers_refuse_wrong_orders_and_stay_refused() {
     let mut metadata = metadata();
     let blocks = blocks(&mut metadata, 5);
     for wrong in [1, 12, 24] {
-        let mut writer = Writer::new(Vec::new(), ID).expect("memory");
+        let mut writer = Writer::new(Vec::new(), ID, &metadata).expect("memory");
         assert!(matches!(writer.append(&blocks[wrong].0), Err(Error::Invalid(_))));
         assert!(matches!(writer.append(&blocks[0].0), Err(Error::Invalid(_))), "broken for good");
     }
     for skipped in [3, 11, 23, 47] {
-        let mut writer = Writer::new(Vec::new(), ID).expect("memory");
-        let mut others = blocks.iter().enumerate().filter(|&(number, _)| number != skipped);
-        let appended = others.try_for_each(|(_, (block, _))| writer.append(block));
-        assert!(appended.and_then(|()| writer.finish(&metadata)).is_err(), "block {skipped} is missing");
+        let others = blocks.iter().enumerate().filter(|&(number, _)| number != skipped);
+        assert!(write(&metadata, others.map(|(_, (block, _))| block)).is_err(), "block {skipped} is missing");
     }
 }
 
@@ -81,7 +79,7 @@ fn writers_refuse_impossible_statistics() {
     for change in changes {
         let mut block = EncodedBlock { id: BlockId { window: 0, block: 0, channel: 0 }, ..block.clone() };
         change(&mut block);
-        let mut writer = Writer::new(Vec::new(), ID).expect("memory");
+        let mut writer = Writer::new(Vec::new(), ID, &metadata).expect("memory");
         assert!(matches!(writer.append(&block), Err(Error::Invalid(_))));
     }
 }
@@ -90,9 +88,9 @@ fn writers_refuse_impossible_statistics() {
 fn a_full_disk_is_an_error_that_stays() {
     let mut metadata = metadata();
     let blocks = blocks(&mut metadata, 5);
-    let mut space = [0; 700];
-    let mut writer = Writer::new(&mut space[..], ID).expect("room for the header");
+    let mut space = [0; 1300];
+    let mut writer = Writer::new(&mut space[..], ID, &metadata).expect("room for the start");
     let failed = blocks.iter().position(|(block, _)| writer.append(block).is_err());
     assert!(failed.is_some());
-    assert!(writer.finish(&metadata).is_err());
+    assert!(writer.finish().is_err());
 }

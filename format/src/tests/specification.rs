@@ -37,15 +37,18 @@ fn check(heading: &str, record: &[u8], values: &[(&str, &[u8])]) {
 
 #[test]
 fn the_header_is_as_specified() {
-    let record = Header { version: (1, 2), required: 3, optional: 4, id: ID }.encode();
+    let needs = "words".to_string();
+    let record = Header { version: (1, 2), required: 3, optional: 4, id: ID, needs }.encode();
     assert_eq!(record.len(), HEADER);
     let magic = [0x89, 0x57, 0x53, 0x50, 0x0D, 0x0A, 0x1A, 0x0A];
     let sum = xxh3_64(&record[..120]).to_le_bytes();
+    let mut words = [0; 72];
+    words[..5].copy_from_slice(b"words");
     let (required, optional) = (3u64.to_le_bytes(), 4u64.to_le_bytes());
     #[rustfmt::skip]
     check("Header", &record, &[
         ("magic", &magic), ("major", &[1, 0]), ("minor", &[2, 0]), ("required", &required), ("optional", &optional),
-        ("file id", &ID.0), ("checksum", &sum),
+        ("file id", &ID.0), ("needs", &words), ("checksum", &sum),
     ]);
 }
 
@@ -78,10 +81,11 @@ fn frames_and_entries_are_as_specified() {
     let (offset, stored_len, raw_len, checksum) = (12, 10, 11, 13);
     let part = PartEntry { kind: PartKind::Level(2), stats: part_stats, offset, stored_len, raw_len, checksum };
     let mut record = Vec::new();
-    BlockEntry { id: BlockId { window: 1, block: 2, channel: 3 }, stats, parts: vec![part] }.encode(&mut record);
+    BlockEntry { id: BlockId { window: 1, block: 2, channel: 3 }, stats, parts: vec![part], lost: true }
+        .encode(&mut record);
     #[rustfmt::skip]
     check("Block entry", &record[..64], &[
-        ("window", &n4(1)), ("block", &n4(2)), ("channel", &[3, 0]), ("parts", &[1, 0]), ("step", &f8(4.0)),
+        ("window", &n4(1)), ("block", &n4(2)), ("channel", &[3, 0]), ("parts", &[1, 0]), ("lost", &n4(1)), ("step", &f8(4.0)),
         ("min", &f8(5.0)), ("max", &f8(6.0)), ("reached", &f8(7.0)), ("squared error", &f8(8.0)), ("dropped", &f8(9.0)),
     ]);
     #[rustfmt::skip]
@@ -97,7 +101,7 @@ fn leaf_entries_are_as_specified() {
     let leaf = LeafEntry {
         window: 1, first_block: 2, channel: 3, count: 4, stored_len: 5, raw_len: 6, exact: 7, data_offset: 8, offset: 9,
         checksum: 10, min: 11.0, max: 12.0, reached: 13.0, squared_error: 14.0, energy: 15.0, dropped: 16.0, coded: 17,
-        outliers: 18, missing: 19,
+        outliers: 18, missing: 19, lost: 20,
     };
     let mut record = Vec::new();
     leaf.encode(&mut record);
@@ -108,7 +112,7 @@ fn leaf_entries_are_as_specified() {
         ("window", &n4(1)), ("first block", &n4(2)), ("channel", &[3, 0]), ("count", &[4, 0]), ("stored", &n4(5)),
         ("raw", &n4(6)), ("exact", &n4(7)), ("data offset", &n8(8)), ("offset", &n8(9)), ("checksum", &n8(10)),
         ("min", &f8(11.0)), ("max", &f8(12.0)), ("reached", &f8(13.0)), ("squared error", &f8(14.0)),
-        ("energy", &f8(15.0)), ("dropped", &f8(16.0)), ("coded", &n8(17)), ("outliers", &n8(18)), ("missing", &n8(19)),
+        ("energy", &f8(15.0)), ("dropped", &f8(16.0)), ("coded", &n8(17)), ("outliers", &n8(18)), ("missing", &n8(19)), ("lost", &n8(20)),
     ]);
 }
 

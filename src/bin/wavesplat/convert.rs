@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, spare_inputs};
 use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, convert};
+use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
 use wavesplat::error::{Error, Result};
 use wavesplat::output::{Output, STANDARD};
+use wavesplat::resume::{self, Earlier};
+use wavesplat::source::{Archive, FrameSource};
 use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
@@ -18,6 +20,10 @@ Examples:
   wavesplat convert 'frames/step_*.vti' -o run.wspl --basis multi --tolerance 0.001
   wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
+  wavesplat convert frames/ -o run.wspl --resume
+A run that is killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. With
+--resume the same command goes on there (frames that were converted are read again and compared); a producer behind a pipe
+must begin at its first frame again.
 Inputs: .npy, .nrrd/.nhdr, .vti, .pvd, headerless data with --dims and --dtype.
 The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass;
 --range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of
@@ -31,9 +37,12 @@ pub(crate) struct ConvertArgs {
     /// Coefficient file to write, or - for standard output
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Replace an existing file
+    /// Replace an existing file, and what an earlier run left unfinished
     #[arg(long)]
     force: bool,
+    /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
+    #[arg(long)]
+    resume: bool,
     /// What series, or samples, are made of
     #[arg(long, value_enum, default_value = "auto")]
     basis: BasisName,
@@ -139,15 +148,51 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let config = args.config()?;
     let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
     spare_inputs(&args.inputs, &args.output)?;
-    let mut out = Output::create(&args.output, args.force)?;
-    let progress = args.common.progress("blocks");
-    let report = convert(source.as_mut(), &config, &args.output, &mut out, &progress)?;
-    out.commit()?;
-    args.common.note(summary(&report, config.bound));
-    args.common.report(&report, args.output == Path::new(STANDARD))
+    if args.resume && !args.force && args.output.is_file() {
+        return args.see_that_it_is_complete(&config, source.archive());
+    }
+    let (out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
+    let begun = begun.map(|unfinished| Begun { unfinished, before: 0 });
+    finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
+}
+
+/// Converts what is left, and gives the file its name if what it replaces is `still` the same.
+pub(crate) fn finish(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    begun: Option<Begun>,
+    name: &Path,
+    mut out: Output,
+    common: &CommonArgs,
+    still: &dyn Fn() -> Result<()>,
+) -> Result<()> {
+    if let Some(begun) = &begun {
+        let (frames, windows) = (begun.unfinished.metadata().frames, begun.unfinished.metadata().windows.len());
+        common.note(format_args!("{}: goes on after {frames} frames in {windows} windows", name.display()));
+    }
+    let report = go_on(source, config, begun, name, &mut out, &common.progress("blocks"));
+    let report = report.inspect_err(|_| {
+        if let Some(part) = out.part().filter(|_| out.is_kept()) {
+            common.note(format_args!("{}: what is finished is kept; --resume goes on with it", part.display()));
+        }
+    })?;
+    out.commit_if(|part| resume::check(part).and_then(|()| still()))?;
+    common.note(summary(&report, config.bound));
+    common.report(&report, name == Path::new(STANDARD))
 }
 
 impl ConvertArgs {
+    /// Nothing is left to do where an earlier run came to its end.
+    fn see_that_it_is_complete(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
+        let name = self.output.display();
+        if !resume::is_complete(&self.output, &beginning(config, archive)?, archive.frames)? {
+            let what = "is complete, but with other settings or frames; --force replaces it, append adds frames";
+            return Err(Error::usage(format!("{name}: {what}")));
+        }
+        self.common.note(format_args!("{name}: is complete already"));
+        Ok(())
+    }
+
     fn config(&self) -> Result<ConvertConfig> {
         let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
         let streamed = self.inputs == [PathBuf::from(STANDARD)];
@@ -237,7 +282,8 @@ const SAMPLES: u32 = 300;
 
 fn summary(r: &ConvertReport, bound: Bound) -> String {
     let ratio = r.input_bytes as f64 / r.output_bytes as f64;
-    let rate = r.input_bytes as f64 / r.seconds / 1e6;
+    let new = (r.frames - r.frames_before) as f64 / r.frames as f64;
+    let rate = new * r.input_bytes as f64 / r.seconds / 1e6;
     let errors = match bound {
         Bound::Pointwise => format!("largest error {:.4e} of {:.4e} allowed", r.reached, r.delta),
         Bound::Relative { .. } => {

@@ -1,6 +1,7 @@
 //! `wavesplat`: converts archives to coefficient files and looks after them.
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
+mod append;
 mod convert;
 mod extract;
 mod info;
@@ -18,6 +19,7 @@ use std::process::ExitCode;
     after_help = "\
 Examples:
   wavesplat convert frames/ -o run.wspl --tolerance 0.001
+  wavesplat append run.wspl more/
   wavesplat info run.wspl
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
@@ -31,6 +33,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Convert(Box<convert::ConvertArgs>),
+    Append(append::AppendArgs),
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),
@@ -39,6 +42,7 @@ enum Command {
 fn main() -> ExitCode {
     wavesplat::cli::main(|cli: Cli| match cli.command {
         Command::Convert(args) => convert::run(&args),
+        Command::Append(args) => append::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Extract(args) => extract::run(&args),

@@ -2,12 +2,13 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use wavesplat::cli::{CommonArgs, InputArgs, narrow, print};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print};
+use wavesplat::convert::setting;
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::report::PromiseReport;
 use wavesplat::source::FrameSource;
-use wavesplat::verify::{BlockPlace, Comparison, VerifyReport, verify};
+use wavesplat::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 
 /// Check a coefficient file, and its promise against the source
 #[derive(Debug, Args)]
@@ -15,15 +16,18 @@ use wavesplat::verify::{BlockPlace, Comparison, VerifyReport, verify};
 Examples:
   wavesplat verify run.wspl
   wavesplat verify run.wspl --against frames/
-Every byte is checked. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound, or
+Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound, or
 further off than its block says. Of a file with a sampled bound, an estimate, what is checked is the rms of each series.
-The frames and the region that were converted are remembered and chosen again.")]
+The frames and the region that were converted are remembered and chosen again, but for --frames.")]
 pub(crate) struct VerifyArgs {
     /// Coefficient file
     file: PathBuf,
     /// The frames it was made from
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     against: Vec<PathBuf>,
+    /// Which frames of INPUT the file holds: a:b, a:b:step, the end left out [default: those that were converted first]
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, requires = "against")]
+    frames: Option<FrameRange>,
     #[command(flatten)]
     input: InputArgs,
     #[command(flatten)]
@@ -43,7 +47,12 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {
         let m = file.metadata();
-        print(&summary(&report, &PromiseReport::new(m.bound, m.tolerance, m.range)))?;
+        print(&summary(&report, &PromiseReport::new(m.bound, m.tolerance, m.range())))?;
+    }
+    if report.damaged > 0 {
+        let (count, first) = (report.damaged, &report.damage[0]);
+        let what = format!("damaged in {count} places, the first: {first}; wavesplat recover saves what is whole");
+        return Err(Error::input(&args.file, what));
     }
     match report.against.as_ref().and_then(missed) {
         Some(what) => Err(Error::BoundMissed { path: args.file.clone(), what }),
@@ -68,19 +77,25 @@ impl VerifyArgs {
         if self.against.is_empty() {
             return Ok(None);
         }
-        let setting = |name: &str| file.metadata().settings.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone());
+        let setting = |name: &str| setting(file.metadata(), name);
         let parsed = |what: String| Error::input(&self.file, format!("its settings are not understood: {what}"));
-        let frames = setting("frames").map(|f| f.parse()).transpose().map_err(parsed)?;
-        let region = setting("region").map(|r| r.parse()).transpose().map_err(parsed)?;
+        let converted = setting("frames").map(str::parse).transpose().map_err(parsed)?;
+        let region = setting("region").map(str::parse).transpose().map_err(parsed)?;
         let mut input = self.input.clone();
-        input.variable = input.variable.or_else(|| setting("variable"));
-        narrow(input.open(&self.against, &self.common)?, frames, region).map(Some)
+        input.variable = input.variable.or_else(|| setting("variable").map(String::from));
+        narrow(input.open(&self.against, &self.common)?, self.frames.or(converted), region).map(Some)
     }
 }
 
 fn summary(r: &VerifyReport, promise: &PromiseReport) -> String {
     let estimate = promise.caution();
-    let mut text = format!("{} blocks, {} bytes: whole\n", r.blocks, r.bytes);
+    let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {} places", r.damaged) };
+    let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);
+    let shown = r.damage.len().min(MOST_SHOWN);
+    r.damage[..shown].iter().for_each(|damage| text += &format!("  {damage}\n"));
+    if r.damaged > shown as u64 {
+        text += &format!("  and {} more; --json lists up to {MOST_NAMED}\n", r.damaged - shown as u64);
+    }
     if let Some(c) = &r.against {
         let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
@@ -91,3 +106,6 @@ fn summary(r: &VerifyReport, promise: &PromiseReport) -> String {
     }
     text
 }
+
+/// Damaged places that are listed.
+const MOST_SHOWN: usize = 20;

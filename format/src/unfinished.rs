@@ -1,0 +1,146 @@
+//! What a file that was never finished, or is to be appended to, holds for certain: its whole windows from the first on.
+
+use crate::block::BlockId;
+use crate::bytes::{Fields, ensure};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
+use crate::header::{FileId, HEADER};
+use crate::leaf::{LeafEntry, check_window, leaves_of};
+use crate::limits::{MAX_METADATA, MAX_PARTS, align};
+use crate::metadata::Metadata;
+use crate::reader::read_header;
+use crate::section::{Owner, decompress, section_at};
+use crate::window::WindowRecord;
+use crate::{Error, Result, Storage};
+
+/// Whole windows at the beginning of a file, from which [`crate::Writer::go_on`] goes on.
+#[derive(Debug, Clone)]
+pub struct Unfinished {
+    pub(crate) id: FileId,
+    /// Of the windows that are whole, and without frames if none is.
+    pub(crate) metadata: Metadata,
+    /// Where the last whole window ends.
+    pub(crate) end: u64,
+    pub(crate) leaves: Vec<LeafEntry>,
+    /// Bytes of all parts.
+    pub(crate) stored: u64,
+}
+
+/// What a window adds.
+#[derive(Default)]
+struct Found {
+    at: u64,
+    leaves: Vec<LeafEntry>,
+    stored: u64,
+}
+
+impl Unfinished {
+    /// Reads a file from its first byte up to where its windows stop being whole, checksums and all; whether metadata,
+    /// directory and footer follow there is not looked at.
+    ///
+    /// # Errors
+    /// A header or start that is not whole: nothing can be gone on with. Or the storage's.
+    pub fn read(storage: &impl Storage) -> Result<Self> {
+        let id = read_header(storage)?.id;
+        let (extent, record) = section_at(storage, id, Owner::Start, HEADER as u64, MAX_METADATA)?;
+        let metadata = Metadata::parse_start(&record).map_err(|what| Owner::Start.corrupt(HEADER as u64, what))?;
+        let mut found = Self { id, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
+        loop {
+            match found.window(storage) {
+                Ok(()) => {}
+                Err(failed @ Error::Io(_)) => return Err(failed),
+                Err(_) => return Ok(found),
+            }
+        }
+    }
+
+    /// The file's identity.
+    pub fn id(&self) -> FileId {
+        self.id
+    }
+
+    /// The metadata of what is whole; without frames if no window is.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Bytes to keep: what is beyond them is not whole, or metadata and directory.
+    pub fn bytes(&self) -> u64 {
+        self.end
+    }
+
+    /// Takes in the next window, if it is whole.
+    fn window(&mut self, storage: &impl Storage) -> Result<()> {
+        let number = self.metadata.windows.len() as u32;
+        let owner = Owner::Window(number);
+        let mut found = Found { at: self.end, ..Found::default() };
+        for (first, count) in leaves_of(&self.metadata, number) {
+            found.leaf(storage, self.id, first, count)?;
+        }
+        let at = align(found.at);
+        let (extent, record) = section_at(storage, self.id, owner, at, MAX_METADATA)?;
+        let checked = WindowRecord::parse(&record)
+            .and_then(|record| self.metadata.push(record))
+            .and_then(|()| check_window(&self.metadata, number, &found.leaves, self.end))
+            .and_then(|end| ensure(end == extent.end(), || "not where it belongs".into()));
+        if let Err(what) = checked {
+            self.metadata.truncate(number as usize);
+            return Err(owner.corrupt(at, what));
+        }
+        (self.end, self.stored) = (extent.end(), self.stored + found.stored);
+        self.leaves.append(&mut found.leaves);
+        Ok(())
+    }
+}
+
+impl Found {
+    /// Takes in the next leaf and its blocks.
+    fn leaf(&mut self, storage: &impl Storage, id: FileId, first: BlockId, count: u32) -> Result<()> {
+        let mut leaf = LeafEntry::new(first, align(self.at));
+        let mut entries = Vec::new();
+        for block in (first.block..).take(count as usize) {
+            let entry = self.block(storage, id, BlockId { block, ..first })?;
+            leaf.add(&entry);
+            entries.push(entry);
+        }
+        let (owner, at) = (Owner::Leaf(first), align(self.at));
+        let (extent, stored) = section_at(storage, id, owner, at, leaf.most_raw())?;
+        let most = extent.raw_len as usize <= leaf.most_raw();
+        let same = ensure(most, || "too long".into())
+            .and_then(|()| decompress(&stored, extent.raw_len))
+            .and_then(|raw| leaf.parse(&raw))
+            .and_then(|told| ensure(told == entries, || "differs from its blocks".into()));
+        same.map_err(|what| owner.corrupt(at, what))?;
+        leaf.set_extent(&extent);
+        self.leaves.push(leaf);
+        self.at = extent.end();
+        Ok(())
+    }
+
+    /// Takes in the next block.
+    fn block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
+        let (entry, end) = block_at(storage, id, block, align(self.at))?;
+        for part in &entry.parts {
+            part.read(storage, id, block)?;
+            self.stored += u64::from(part.stored_len);
+        }
+        self.at = end;
+        Ok(entry)
+    }
+}
+
+/// The entry in a block's own header at `offset`, and where its parts end; the parts themselves are not read.
+pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
+    let owner = Owner::Block(id);
+    let (_, bytes) = section_at(storage, file, owner, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let mut fields = Fields::new(&bytes);
+    let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
+        fields.end()?;
+        ensure(entry.id == id, || format!("says that it is {}", entry.id))?;
+        entry.check()?;
+        entry.check_place(offset)?;
+        Ok(entry)
+    });
+    let entry = entry.map_err(|what| owner.corrupt(offset, what))?;
+    let end = offset + entry.header_len() + entry.stored_len();
+    Ok((entry, end))
+}

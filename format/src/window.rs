@@ -1,0 +1,139 @@
+//! A window of frames: how its blocks are coded, and what they promised and reached.
+
+use crate::Pyramid;
+use crate::bytes::{Check, ensure};
+use crate::directory::{finite_amount, is_amount, is_range};
+use crate::limits::*;
+use crate::metadata::{CONFIG, whole};
+use bincode::{Decode, Encode};
+
+/// The transform along time; new kinds are appended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
+pub enum Basis {
+    /// The Haar wavelet.
+    Haar,
+    /// The multiwavelet of Geronimo, Hardin and Massopust.
+    Multi,
+    /// None: the samples themselves.
+    Samples,
+    /// Orthonormal functions that suit the window's own series, then Haar functions that complete them.
+    Learned,
+}
+
+impl Basis {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Haar => "haar",
+            Self::Multi => "multi",
+            Self::Samples => "samples",
+            Self::Learned => "learned",
+        }
+    }
+}
+
+/// A run of frames that is coded together.
+#[derive(Debug, Clone, PartialEq, Encode, Decode)]
+pub struct Window {
+    /// Its first frame.
+    pub first_frame: u64,
+    /// Its frames, 1 to [`MAX_WINDOW_FRAMES`].
+    pub frames: u32,
+    /// The transform along time.
+    pub basis: Basis,
+    /// Coefficients of one voxel; may exceed `frames`.
+    pub coefficients: u32,
+    /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`. Empty with a pyramid.
+    pub levels: Vec<u32>,
+    /// Of a learned basis: the learned functions, `frames` values each, in units of 2^-15; else empty.
+    pub functions: Vec<i16>,
+    /// How coefficients are refined in space, or samples in space and time.
+    pub pyramid: Option<Pyramid>,
+    /// What the writer took for a block's step, in units of its own; for writers that append.
+    pub coarseness: f64,
+    /// The value range that a pointwise or rms tolerance refers to here: as given, or that of all frames up to the window's
+    /// end; (inf, -inf) without one.
+    pub range: (f64, f64),
+    /// The writer's digest of the samples, to tell whether a source still holds them; 0: unknown.
+    pub digest: u64,
+    /// The largest error that the bound allows in this window, in units of the samples.
+    pub delta: f64,
+    /// Largest error of a sample, rounded up; at least that of every block.
+    pub reached: f64,
+    /// Largest share of its bound that any series used, in the bound's own measure, rounded up; at most 1.
+    pub share: f64,
+    /// Sum of the squared errors of the samples; may overflow to infinity.
+    pub squared_error: f64,
+    /// Smallest decoded finite sample; infinity when there is none.
+    pub min: f64,
+    /// Largest decoded finite sample; minus infinity when there is none.
+    pub max: f64,
+    /// Missing samples; at least those in parts of missing samples.
+    pub missing: u64,
+    /// Nonzero coefficients: the sum of the counts of all level parts.
+    pub coded: u64,
+    /// Outliers: the sum of the counts of all parts of outliers.
+    pub outliers: u64,
+}
+
+/// What the section at a window's end holds: with it and the file's start, all before it can be read.
+#[derive(Debug, Clone, PartialEq, Encode, Decode)]
+pub struct WindowRecord {
+    /// The window.
+    pub window: Window,
+    /// Time of each of its frames; empty: frame numbers.
+    pub times: Vec<f64>,
+}
+
+impl WindowRecord {
+    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
+        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+    }
+
+    /// The record that is exactly `bytes`; the rest of the metadata says whether it can be.
+    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
+        whole(bytes, "window record")
+    }
+}
+
+impl Window {
+    /// Level parts that a block can have.
+    pub fn parts(&self) -> usize {
+        if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }
+    }
+
+    /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
+    pub(crate) fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
+        let Self { frames, coefficients, .. } = *self;
+        ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames"))?;
+        ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
+        let samples = voxels.saturating_mul(frames.max(coefficients).into());
+        ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples}, at most {MAX_BLOCK_SAMPLES} samples"))?;
+        self.check_coding()?;
+        let counted = voxels_in_all.saturating_mul(frames.into());
+        let coded = voxels_in_all.saturating_mul(coefficients.into());
+        let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
+        ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
+        let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
+        let ranges = is_range(self.min, self.max) && is_range(self.range.0, self.range.1);
+        ensure(errors && ranges, || "an error or value range out of range".into())?;
+        ensure(finite_amount(self.coarseness), || format!("a coarseness of {}", self.coarseness))?;
+        ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
+    }
+
+    fn check_coding(&self) -> Check {
+        let Self { frames, coefficients, .. } = *self;
+        let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
+        let levels = match self.pyramid {
+            Some(_) => self.levels.is_empty(),
+            None => (1..=MAX_LEVELS).contains(&self.levels.len()) && !self.levels.contains(&0),
+        };
+        let levels = levels && (self.pyramid.is_some() || sum == coefficients.into());
+        ensure(levels, || format!("{coefficients} coefficients in levels of {sum}"))?;
+        self.pyramid.as_ref().map_or(Ok(()), |pyramid| pyramid.check(self.basis == Basis::Samples))?;
+        let (functions, frames) = (self.functions.len(), frames as usize);
+        let learned = functions.is_multiple_of(frames) && functions / frames <= frames;
+        let fits = if self.basis == Basis::Learned { learned } else { functions == 0 };
+        ensure(fits, || format!("functions of {functions} values for {frames} frames"))
+    }
+}

@@ -1,0 +1,70 @@
+//! `wavesplat append`
+
+use super::convert::finish;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
+use wavesplat::convert::{Begun, ConvertConfig, of_file, setting};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::output::STANDARD;
+use wavesplat::resume::{Earlier, open_successor};
+
+/// Add later frames to a coefficient file
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  wavesplat append run.wspl more/
+  wavesplat append run.wspl frames/ --frames 400:
+The new frames are coded as the others were, in windows after theirs; the region that was converted is chosen again. Whole
+windows come out as if all frames had been converted at once. The file is copied, and its successor takes its name when it is
+complete: whoever reads the old one meanwhile is not disturbed, and a kill costs nothing that was there.")]
+pub(crate) struct AppendArgs {
+    /// Coefficient file
+    file: PathBuf,
+    /// The frames that come next: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Only these frames of INPUTS: a:b, a:b:step, the end left out
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    frames: Option<FrameRange>,
+    /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
+    #[arg(long)]
+    resume: bool,
+    /// Begin anew, whatever an earlier run left unfinished
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &AppendArgs) -> Result<()> {
+    args.common.start()?;
+    let file = CoefficientFile::open(&args.file, args.input.access())?;
+    let config = args.config(&file)?;
+    let parsed = |what: String| Error::input(&args.file, format!("its settings are not understood: {what}"));
+    let region = setting(file.metadata(), "region").map(str::parse).transpose().map_err(parsed)?;
+    let mut input = args.input.clone();
+    input.variable = input.variable.or_else(|| setting(file.metadata(), "variable").map(String::from));
+    let mut source = narrow(input.open(&args.inputs, &args.common)?, args.frames, region)?;
+    let timed = source.archive().times.is_empty() == file.metadata().times.is_empty();
+    if !timed {
+        return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));
+    }
+    spare_inputs(&args.inputs, &args.file)?;
+    let (out, unfinished) = open_successor(&file, Earlier::by(args.force, args.resume))?;
+    let begun = Begun { unfinished, before: file.metadata().windows.len() };
+    finish(source.as_mut(), &config, Some(begun), &args.file, out, &args.common, &|| file.check_unchanged())
+}
+
+impl AppendArgs {
+    fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
+        let streamed = self.inputs == [Path::new(STANDARD)];
+        let config = of_file(file.metadata(), self.common.memory.0);
+        let config =
+            config.ok_or_else(|| Error::input(&self.file, "does not say how it was made: nothing to append by"))?;
+        Ok(ConvertConfig { reserved: if streamed { self.common.stream_memory() } else { 0 }, ..config })
+    }
+}

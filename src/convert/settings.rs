@@ -1,0 +1,96 @@
+//! What a file remembers of how it was made: enough to verify it against its source, and to append to it.
+
+use super::{Coding, ConvertConfig, MissingPolicy, Space};
+use crate::codec::scheme::Stencil;
+use crate::wavelet::Basis;
+use std::str::FromStr;
+use wavesplat_format::Metadata;
+
+/// The value of one of a file's settings.
+pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
+    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+}
+
+/// How a conversion is remembered; what is in the metadata anyway is not repeated.
+pub(super) fn remembered(config: &ConvertConfig) -> Vec<(String, String)> {
+    let ConvertConfig { coding, window, level, missing, range, .. } = config;
+    let basis = BASES.iter().find(|(_, basis)| *basis == coding.basis).map_or("auto", |(name, _)| name);
+    let space = SPACES.iter().find(|(_, space)| *space == coding.space).map_or("auto", |(name, _)| name);
+    let missing = if *missing == MissingPolicy::Mask { "mask" } else { "error" };
+    let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
+    let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
+    let more = [("level", level.to_string()), ("missing", missing.into())];
+    let all = given.into_iter().chain(more).chain(range);
+    all.map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
+}
+
+/// The configuration that made a file, to append to it; none if it does not say.
+pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
+    let named = |name: &str| setting(file, name);
+    let basis = BASES.iter().find(|(name, _)| named("basis") == Some(name))?.1;
+    let space = SPACES.iter().find(|(name, _)| named("space") == Some(name))?.1;
+    let range = match named("range") {
+        Some(range) => Some(range.split_once(',').and_then(|(lo, hi)| Some((number(lo)?, number(hi)?)))?),
+        None => None,
+    };
+    Some(ConvertConfig {
+        coding: Coding { basis, space },
+        window: number(named("window")?)?,
+        tolerance: file.tolerance,
+        bound: file.bound,
+        range,
+        missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
+        missing_value: file.missing_value,
+        block: Some(file.block_edge as usize),
+        level: number(named("level")?)?,
+        memory,
+        reserved: 0,
+        settings: file.settings.iter().filter(|(name, _)| !OURS.contains(&name.as_str())).cloned().collect(),
+    })
+}
+
+/// The first thing in which two conversions differ, in words.
+pub(super) fn difference(before: &Metadata, now: &Metadata) -> Option<String> {
+    let of = |m: &Metadata| {
+        let given = [
+            ("size", format!("{:?}", m.dims)),
+            ("--spacing", format!("{:?}", m.spacing)),
+            ("--origin", format!("{:?}", m.origin)),
+            ("type of samples", m.sample.to_string()),
+            ("--block", m.block_edge.to_string()),
+            ("variable", m.variable.clone().unwrap_or_default()),
+            ("--bound", format!("{:?}", m.bound)),
+            ("--tolerance", format!("{:?}", m.tolerance)),
+            ("--missing-value", format!("{:?}", m.missing_value)),
+            ("version of the program", m.program.clone()),
+        ];
+        let ours = OURS.into_iter().chain(["frames", "region"]);
+        let settings = ours.map(|name| (name, setting(m, name).unwrap_or("none").to_string()));
+        given.into_iter().chain(settings).collect::<Vec<_>>()
+    };
+    let pairs = of(before).into_iter().zip(of(now));
+    let mut differ = pairs.filter(|(before, now)| before != now);
+    differ.next().map(|((what, before), (_, now))| format!("{what}: {before}, now {now}"))
+}
+
+fn number<T: FromStr>(text: &str) -> Option<T> {
+    text.parse().ok()
+}
+
+/// The names of what [`remembered`] adds by itself.
+const OURS: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
+
+const BASES: [(&str, Option<Basis>); 5] = [
+    ("auto", None),
+    ("haar", Some(Basis::Haar)),
+    ("multi", Some(Basis::Multi)),
+    ("learned", Some(Basis::Learned)),
+    ("pyramid", Some(Basis::Samples)),
+];
+
+const SPACES: [(&str, Space); 4] = [
+    ("auto", Space::Any),
+    ("none", Space::Alone),
+    ("linear", Space::Pyramid(Stencil::Linear)),
+    ("cubic", Space::Pyramid(Stencil::Cubic)),
+];

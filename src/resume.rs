@@ -1,0 +1,114 @@
+//! Going on with a file: one that a killed run left as `NAME.part`, or a finished one to which windows are added.
+//!
+//! Both are the same: whole windows at the beginning of `NAME.part`, after which writing goes on. Those of a finished file are
+//! copied there first, so that it stays what it is until its successor takes its name.
+
+use crate::error::{Error, Result};
+use crate::file::CoefficientFile;
+use crate::mapped::{Access, FileBytes};
+use crate::output::Output;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use wavesplat_format::{Error as FormatError, Unfinished};
+
+/// What becomes of the whole windows that an earlier run left unfinished.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Earlier {
+    /// They are an error: neither lost nor taken for what they may not be.
+    Refuse,
+    /// They are written over.
+    Discard,
+    /// The run goes on after them.
+    Resume,
+}
+
+impl Earlier {
+    /// As `--force` and `--resume` say.
+    pub fn by(force: bool, resume: bool) -> Self {
+        match (resume, force) {
+            (true, _) => Self::Resume,
+            (false, true) => Self::Discard,
+            (false, false) => Self::Refuse,
+        }
+    }
+
+    /// What is gone on with of what there is.
+    fn of(self, held: Option<Unfinished>, part: &Path) -> Result<Option<Unfinished>> {
+        match (self, held) {
+            (Self::Resume, held) => Ok(held),
+            (Self::Refuse, Some(held)) => {
+                let (part, frames) = (part.display(), held.metadata().frames);
+                let what = "--resume goes on with it, --force begins anew";
+                Err(Error::usage(format!("{part}: holds {frames} frames of a run that was not finished; {what}")))
+            }
+            (Self::Discard | Self::Refuse, _) => Ok(None),
+        }
+    }
+}
+
+/// Opens the output of a conversion, and finds what there is to go on with. With `replace` a file of that name is replaced in
+/// the end.
+pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<Unfinished>)> {
+    let mut out = Output::resumable(path, replace)?;
+    let Some(part) = out.part() else {
+        return match earlier {
+            Earlier::Resume => Err(Error::usage("--resume: takes a file to write to, not a pipe or a device")),
+            _ => Ok((out, None)),
+        };
+    };
+    let held = earlier.of(whole_windows(part)?, part)?;
+    out.begin_at(held.as_ref().map_or(0, Unfinished::bytes))?;
+    Ok((out, held))
+}
+
+/// Opens the successor of a finished file that begins with all of its windows, and finds these, or more where there are more
+/// to go on with.
+pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, Unfinished)> {
+    let (path, own) = (of.path(), of.whole_windows()?);
+    let mut out = Output::resumable(path, true)?;
+    let Some(part) = out.part() else { return Err(Error::input(path, "not a regular file")) };
+    let (part, held) = (part.to_path_buf(), whole_windows(part)?);
+    let of_own = held.as_ref().is_some_and(|held| begins_with(&own, held)); // killed while it was copied
+    match earlier.of(held.filter(|_| !of_own), &part)? {
+        Some(held) if begins_with(&held, &own) => {
+            out.begin_at(held.bytes())?;
+            Ok((out, held))
+        }
+        Some(_) => {
+            let what = "is of another file; --force begins anew";
+            Err(Error::usage(format!("{}: {what}", part.display())))
+        }
+        None => {
+            out.begin_at(0)?;
+            let mut start = File::open(path).map_err(|e| Error::io(path, "opening", e))?.take(own.bytes());
+            io::copy(&mut start, &mut out).map_err(|e| Error::io(&part, "copying", e))?;
+            Ok((out, own))
+        }
+    }
+}
+
+/// Whether the first windows of one are those of the other.
+fn begins_with(all: &Unfinished, first: &Unfinished) -> bool {
+    all.id() == first.id() && all.metadata().windows.starts_with(&first.metadata().windows)
+}
+
+/// The whole windows at the beginning of a file; none if there is not even one.
+fn whole_windows(part: &Path) -> Result<Option<Unfinished>> {
+    match Unfinished::read(&FileBytes::open(part, Access::Read)?) {
+        Ok(held) => Ok(Some(held).filter(|held| held.metadata().frames > 0)),
+        Err(FormatError::Io(e)) => Err(Error::io(part, "reading", e)),
+        Err(_) => Ok(None),
+    }
+}
+
+/// The program's own last look at what it wrote, before the file gets its name: every checksum, from the disk.
+pub fn check(part: &Path) -> Result<()> {
+    CoefficientFile::open(part, Access::Read)?.check_stored()
+}
+
+/// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
+pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Option<usize>) -> Result<bool> {
+    let file = CoefficientFile::open(path, Access::Read)?;
+    Ok(file.metadata().start() == *like && frames.is_none_or(|frames| frames == file.frames()))
+}

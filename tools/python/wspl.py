@@ -1,0 +1,1231 @@
+"""Reader of coefficient files (.wspl), version 1.0, written from format/FORMAT.md alone.
+
+    python wspl.py info FILE              metadata as JSON
+    python wspl.py check FILE             everything in the file is as the format says
+    python wspl.py extract FILE OUT       samples, little-endian, frame by frame, x fastest
+    python wspl.py extract-many LISTFILE  lines FILE<TAB>OUT: check and extract each
+
+Exit codes: 0 fine, 2 usage, 3 damaged, lost or not supported.
+"Section n" in this file is a section of FORMAT.md.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import mmap
+import os
+import struct
+import sys
+from collections import namedtuple
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+import xxhash
+import zstandard
+
+# Section 9.
+ALIGN = 64
+BLOCKS_PER_LEAF = 512
+MAX_BLOCK_SAMPLES = 8388608
+MAX_PART_RAW = 100663296
+MAX_LEVELS = 32
+MAX_PARTS = 35
+MAX_WINDOW_FRAMES = 1025
+MAX_COEFFICIENTS = 4100
+MAX_DIM = 2147483648
+MAX_FRAMES = 9007199254740992
+MAX_METADATA = 16777216
+MAX_ROOT_RAW = 1073741824
+
+MAGIC = bytes.fromhex("89 57 53 50 0D 0A 1A 0A")
+END_MAGIC = bytes.fromhex("89 57 53 50 45 4E 44 0A")
+
+class Layout:
+    """A structure of fixed length: names and struct's codes of its fields, without padding."""
+
+    def __init__(self, name: str, text: str):
+        words = text.split()
+        self.type = namedtuple(name, words[::2])
+        self.struct = struct.Struct("<" + "".join(words[1::2]))
+        self.size = self.struct.size
+
+    def read(self, data: bytes, at: int = 0):
+        return self.type(*self.struct.unpack_from(data, at))
+
+
+# Sections 3 to 5.
+HEADER = Layout("Header", "magic 8s major H minor H reserved I required Q optional Q id 16s needs 72s checksum Q")
+FOOTER = Layout(
+    "Footer",
+    "id 16s total Q metadata_offset Q metadata_stored I metadata_raw I metadata_checksum Q root_offset Q"
+    " root_stored I root_raw I root_checksum Q blocks Q leaves Q reserved 24s checksum Q magic 8s",
+)
+FRAME = Layout("Frame", "tag 4s stored I raw I reserved I checksum Q")
+BLOCK = Layout(
+    "BlockEntry",
+    "window I block I channel H count H lost I step d min d max d reached d squared_error d dropped d",
+)
+PART = Layout(
+    "Part",
+    "kind B level B reserved H stored I raw I reserved_too I offset Q checksum Q count Q energy d largest d",
+)
+LEAF = Layout(
+    "Leaf",
+    "window I first_block I channel H count H stored I raw I exact I data_offset Q offset Q checksum Q min d max d"
+    " reached d squared_error d energy d dropped d coded Q outliers Q missing Q lost Q",
+)
+
+# Kinds of parts and sections (section 4).
+LEVEL, OUTLIERS, MISSING, EXACT = 0, 1, 2, 3
+KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21}
+
+# Variants, in the order of section 6.
+SAMPLES = ["u8", "i8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"]
+BOUNDS = ["pointwise", "rms", "relative", "sampled"]
+BASES = ["haar", "multi", "samples", "learned"]
+AXES = ["x", "y", "z", "t"]
+STENCILS = ["linear", "cubic"]
+
+
+class Damaged(Exception):
+    """The file is not what the format says, or what was asked for is lost."""
+
+    def __init__(self, place: str, reason: str, offset: int | None = None):
+        super().__init__(f"{place}{'' if offset is None else f' at byte {offset}'}: {reason}")
+
+
+class Unsupported(Damaged):
+    """The file needs a reader of another version or with more features."""
+
+
+def need(true, place: str, reason: str, offset: int | None = None) -> None:
+    if not true:
+        raise Damaged(place, reason, offset)
+
+
+def align(offset: int) -> int:
+    return -(-offset // ALIGN) * ALIGN
+
+
+def finite(*values: float) -> bool:
+    return all(math.isfinite(v) for v in values)
+
+
+def is_range(low: float, high: float) -> bool:
+    """Section 9: finite and in order, or (+inf, -inf)."""
+    return (finite(low, high) and low <= high) or (low == math.inf and high == -math.inf)
+
+
+def decompress(stored: bytes, raw: int, place: str, offset: int) -> bytes:
+    """Exactly one zstd frame with content size and content checksum (the page's first lines)."""
+    try:
+        frame = zstandard.get_frame_parameters(stored)
+        need(stored[:4] == b"\x28\xb5\x2f\xfd", place, "not a zstd frame", offset)
+        need(frame.content_size == raw, place, "the zstd frame declares another length", offset)
+        need(frame.has_checksum, place, "the zstd frame has no checksum", offset)
+        out = zstandard.ZstdDecompressor().decompress(stored, allow_extra_data=False)
+    except zstandard.ZstdError as e:
+        raise Damaged(place, f"does not decompress: {e}", offset) from None
+    need(len(out) == raw, place, "decompresses to another length", offset)
+    return out
+
+
+# ---------------------------------------------------------------- records (section 6)
+
+
+class Record:
+    """Fields of a record, taken one after another, never beyond its end."""
+
+    def __init__(self, data: bytes, place: str, at: int = 0):
+        self.data, self.place, self.at = data, place, at
+
+    def take(self, size: int) -> bytes:
+        need(size <= len(self.data) - self.at, self.place, "ends too early", self.at)
+        self.at += size
+        return self.data[self.at - size : self.at]
+
+    def get(self, code: str):
+        values = struct.unpack("<" + code, self.take(struct.calcsize("<" + code)))
+        return values[0] if len(values) == 1 else values
+
+    def string(self) -> str:
+        try:
+            return self.take(self.get("Q")).decode("utf-8")
+        except UnicodeDecodeError:
+            raise Damaged(self.place, "a string is not UTF-8", self.at) from None
+
+    def numbers(self, dtype: str) -> np.ndarray:
+        size = np.dtype(dtype).itemsize
+        return np.frombuffer(self.take(size * self.get("Q")), dtype)
+
+    def list(self, item) -> list:
+        return [item() for _ in range(self.get("Q"))]  # an item takes bytes: it ends with the data
+
+    def option(self, value):
+        flag = self.get("B")
+        need(flag <= 1, self.place, "an option is neither 0 nor 1", self.at - 1)
+        return value() if flag else None
+
+    def variant(self, names: list[str]) -> str:
+        number = self.get("I")
+        need(number < len(names), self.place, f"there is no variant {number}", self.at - 4)
+        return names[number]
+
+    def end(self) -> None:
+        need(self.at == len(self.data), self.place, "bytes follow the record", self.at)
+
+
+@dataclass(frozen=True)
+class Pyramid:
+    order: tuple[str, ...]
+    stencil: str
+    growth: float
+    most: float
+    single: int
+
+    @staticmethod
+    def read(r: Record) -> "Pyramid":
+        order = tuple(r.list(lambda: r.variant(AXES)))
+        p = Pyramid(order, r.variant(STENCILS), *r.get("ddB"))
+        need(len(set(order)) == len(order), r.place, "an axis is refined twice")
+        need(1 <= p.growth <= 1e6 and 1 <= p.most <= 1e6, r.place, "growth or most is not in 1 .. 10^6")
+        need(p.single <= 1, r.place, "single is neither 0 nor 1")
+        return p
+
+
+@dataclass(frozen=True, eq=False)  # eq=False: hashed by identity, for the caches below
+class Window:
+    first_frame: int
+    frames: int
+    basis: str
+    coefficients: int
+    levels: list[int]
+    functions: np.ndarray
+    pyramid: Pyramid | None
+    coarseness: float
+    range: tuple[float, float]
+    digest: int
+    delta: float
+    reached: float
+    share: float
+    squared_error: float
+    min: float
+    max: float
+    missing: int
+    coded: int
+    outliers: int
+    bytes: bytes  # the record itself: a window section repeats it
+
+    @staticmethod
+    def read(r: Record) -> "Window":
+        begin = r.at
+        head = [*r.get("QI"), r.variant(BASES), r.get("I"), r.numbers("<u4").tolist(), r.numbers("<i2")]
+        head += [r.option(lambda: Pyramid.read(r)), r.get("d"), r.get("dd"), r.get("Q")]
+        w = Window(*head, *r.get("ddddddQQQ"), r.data[begin : r.at])
+        w.check(r.place + f", window from frame {w.first_frame}")
+        return w
+
+    def check(self, place: str) -> None:
+        need(1 <= self.frames <= MAX_WINDOW_FRAMES, place, "too few or too many frames")
+        need(self.coefficients == coefficients_of(self.basis, self.frames), place, "coefficients do not fit the basis")
+        need(self.coefficients <= MAX_COEFFICIENTS, place, "too many coefficients")
+        if self.pyramid is None:
+            need(len(self.levels) <= MAX_LEVELS and min(self.levels, default=0) >= 1, place, "bad list of levels")
+            need(sum(self.levels) == self.coefficients, place, "levels do not sum up to the coefficients")
+        else:
+            need(not self.levels, place, "levels and a pyramid")
+            need("t" not in self.pyramid.order or self.basis == "samples", place, "t is refined without samples")
+        count = len(self.functions)
+        need(count == 0 or self.basis == "learned", place, "functions without a learned basis")
+        need(count % self.frames == 0 and count <= self.frames**2, place, "bad count of functions")
+        need(finite(self.coarseness) and self.coarseness >= 0, place, "bad coarseness")
+        need(is_range(*self.range) and is_range(self.min, self.max), place, "bad range")
+        need(finite(self.delta, self.reached, self.share), place, "an error is not finite")
+        need(self.squared_error >= 0, place, "bad squared error")
+
+    @property
+    def level_parts(self) -> int:
+        return 4 if self.pyramid else len(self.levels)
+
+
+@dataclass
+class Metadata:
+    dims: tuple[int, int, int]
+    spacing: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    sample: str
+    block_edge: int
+    channels: int
+    frames: int
+    times: np.ndarray
+    variable: str | None
+    bound: dict
+    tolerance: float
+    missing_value: float | None
+    windows: list[Window]
+    settings: list[tuple[str, str]]
+    program: str
+    start: bytes  # the record of the start: this one without frames, times and windows
+
+    @staticmethod
+    def read(data: bytes) -> "Metadata":
+        r = Record(data, "metadata")
+        head = [r.get("QQQ"), r.get("ddd"), r.get("ddd"), r.variant(SAMPLES), *r.get("IH")]
+        a = r.at
+        head += [r.get("Q"), r.numbers("<f8")]
+        b = r.at
+        head += [r.option(r.string), read_bound(r), r.get("d"), r.option(lambda: r.get("d"))]
+        c = r.at
+        windows = r.list(lambda: Window.read(r))
+        d = r.at
+        tail = [r.list(lambda: (r.string(), r.string())), r.string()]
+        r.end()
+        m = Metadata(*head, windows, *tail, data[:a] + bytes(16) + data[b:c] + bytes(8) + data[d:])
+        m.check()
+        return m
+
+    def check(self) -> None:
+        place = "metadata"
+        need(all(1 <= n <= MAX_DIM for n in self.dims), place, "an extent is 0 or too large")
+        need(finite(*self.spacing, *self.origin), place, "the grid is not finite")
+        need(self.block_edge >= 1 and self.channels >= 1, place, "no block edge or no channel")
+        need(self.frames <= MAX_FRAMES, place, "too many frames")
+        need(len(self.times) in (0, self.frames), place, "times do not fit the frames")
+        need(np.isfinite(self.times).all(), place, "a time is not finite")
+        need(self.blocks < 1 << 32, place, "too many blocks")
+        largest = math.prod(min(self.block_edge, n) for n in self.dims)
+        frame = 0
+        for w in self.windows:
+            need(w.first_frame == frame, place, f"no window begins with frame {frame}")
+            need(largest * max(w.frames, w.coefficients) <= MAX_BLOCK_SAMPLES, place, "blocks are too large")
+            frame += w.frames
+        need(frame == self.frames, place, "windows do not cover the frames")
+
+    @property
+    def dtype(self) -> np.dtype:
+        return np.dtype("<" + self.sample[0] + str(int(self.sample[1:]) // 8))
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return tuple(-(-n // self.block_edge) for n in self.dims)
+
+    @property
+    def blocks(self) -> int:
+        """Of one window and channel."""
+        return math.prod(self.grid)
+
+    def box(self, block: int) -> tuple[slice, slice, slice]:
+        """The voxels of a block along x, y, z (section 1)."""
+        nx, ny, _ = self.grid
+        number = (block % nx, block // nx % ny, block // (nx * ny))
+        edge = self.block_edge
+        return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(number, self.dims))
+
+    def window_section(self, w: Window) -> bytes:
+        """The record of a window section: the window, then its times."""
+        times = self.times[w.first_frame : w.first_frame + w.frames]
+        return w.bytes + struct.pack("<Q", len(times)) + times.tobytes()
+
+
+def read_bound(r: Record) -> dict:
+    name = r.variant(BOUNDS)
+    if name == "relative":
+        return {"name": name, "floor": r.get("d")}
+    if name == "sampled":
+        return {"name": name, **dict(zip(("samples", "seed"), r.get("IQ")))}
+    return {"name": name}
+
+
+# ---------------------------------------------------------------- directory (section 5)
+
+
+class Block(namedtuple("Block", BLOCK.type._fields + ("parts", "bytes"))):
+    """A block's entry, its parts and its bytes, which the block's header repeats."""
+
+    @staticmethod
+    def read(r: Record) -> "Block":
+        begin = r.at
+        head = BLOCK.read(r.take(BLOCK.size))
+        need(head.count <= MAX_PARTS, r.place, "too many parts in a block")
+        parts = [PART.read(r.take(PART.size)) for _ in range(head.count)]
+        return Block(*head, parts, r.data[begin : r.at])
+
+    @property
+    def place(self) -> str:
+        return f"window {self.window}, channel {self.channel}, block {self.block}"
+
+    @property
+    def exact(self) -> bool:
+        return any(p.kind == EXACT for p in self.parts)
+
+    def end(self, offset: int) -> int:
+        """Where the block ends if it begins at `offset`."""
+        return offset + FRAME.size + len(self.bytes) + sum(p.stored for p in self.parts)
+
+    def count_of(self, kind: int) -> int:
+        return sum(p.count for p in self.parts if p.kind == kind)
+
+
+def name_of(leaf) -> str:
+    return f"leaf of window {leaf.window}, channel {leaf.channel}, block {leaf.first_block}"
+
+
+def sums(blocks: list[Block]) -> dict:
+    """What a leaf's entry says of its blocks, recomputed; float sums in order, from 0."""
+    energies = [p.energy for b in blocks for p in b.parts if p.kind == LEVEL]
+    return {
+        "exact": sum(b.exact for b in blocks),
+        "min": min(b.min for b in blocks),
+        "max": max(b.max for b in blocks),
+        "reached": max(b.reached for b in blocks),
+        "squared_error": plain_sum(b.squared_error for b in blocks),
+        "energy": plain_sum(energies),
+        "dropped": plain_sum(b.dropped for b in blocks),
+        "coded": sum(b.count_of(LEVEL) for b in blocks),
+        "outliers": sum(b.count_of(OUTLIERS) for b in blocks),
+        "missing": sum(b.count_of(MISSING) for b in blocks),
+        "lost": sum(b.lost for b in blocks),
+    }
+
+
+def plain_sum(values) -> float:
+    """One rounding after each term: sum() compensates from Python 3.12 on."""
+    total = 0.0
+    for v in values:
+        total += v
+    return total
+
+
+def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -> None:
+    """Sections 5 and 9: an entry by itself and with the block's geometry."""
+    place = b.place
+    need(b.lost <= 1, place, "lost is neither 0 nor 1")
+    need(finite(b.step, b.reached) and b.reached >= 0, place, "step or error is not finite")
+    need(is_range(b.min, b.max), place, "bad range")
+    need(b.squared_error >= 0 and b.dropped >= 0, place, "bad squared error or dropped energy")
+    if b.lost:
+        empty = not b.parts and b.min == math.inf
+        need(empty and b.step == b.reached == b.squared_error == b.dropped == 0, place, "not empty, but lost")
+    keys = [(p.kind, p.level) for p in b.parts]
+    need(all(k < l for k, l in zip(keys, keys[1:])), place, "parts do not ascend")
+    need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
+    for p in b.parts:
+        check_part(p, w, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
+
+
+def check_part(p, w: Window, size: tuple[int, ...], s: int, place: str) -> None:
+    need(p.reserved == p.reserved_too == 0, place, "reserved bytes are not zero")
+    need(p.kind <= EXACT, place, "there is no such kind")
+    need(p.level < (w.level_parts if p.kind == LEVEL else 1), place, "there is no such level")
+    need(p.count >= 1, place, "count is 0")
+    need(p.energy >= 0 and finite(p.largest) and p.largest >= 0, place, "bad energy or largest amount")
+    need(p.kind == LEVEL or p.energy == p.largest == 0, place, "energy, but not of a level")
+    voxels = math.prod(size)
+    samples = voxels * w.frames
+    most = samples
+    if p.kind == LEVEL and w.pyramid:
+        boxes = [q.counts for q in passes((*size, w.coefficients), w.pyramid.order) if q.part == p.level]
+        most = sum(map(math.prod, boxes))
+        fits = p.raw <= lattice_most(sum(math.prod(cells_of(b)) for b in boxes), most)
+    elif p.kind == LEVEL:
+        most = w.levels[p.level] * voxels
+        fits = p.raw in [1 + -(-most // 8) + width * p.count for width in (1, 2, 3, 4)]
+    elif p.kind == OUTLIERS:
+        fits = p.raw == (4 + s) * p.count
+    elif p.kind == MISSING:
+        fits = p.raw == -(-samples // 8) + s * p.count
+    else:
+        fits = p.count == samples and p.raw == s * samples
+    need(p.count <= most, place, "count is too large")
+    need(fits and p.raw <= MAX_PART_RAW, place, "length does not fit count and geometry")
+
+
+# ---------------------------------------------------------------- payloads (section 7)
+
+
+def planes(data: bytes, dtype, count: int) -> np.ndarray:
+    """Byte planes: all lowest bytes of the values, then all second ones, and so on."""
+    dtype = np.dtype(dtype)
+    rows = np.frombuffer(data, np.uint8).reshape(-1, count)
+    rows = np.concatenate([rows, np.zeros((dtype.itemsize - len(rows), count), np.uint8)])
+    return np.ascontiguousarray(rows.T).reshape(-1).view(dtype)
+
+
+def bitmap(data: bytes, bits: int, place: str) -> np.ndarray:
+    """`bits` bits, the first in the lowest bit of the first byte; padding bits are zero."""
+    out = np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little")
+    need(not out[bits:].any(), place, "padding bits are not zero")
+    return out[:bits].astype(bool)
+
+
+def codes_of(values: np.ndarray) -> np.ndarray:
+    """Codes of `zigzag(code) - 1`: 0, 1, 2, 3, ... is -1, 1, -2, 2, ..."""
+    z = values.astype(np.int64) + 1
+    return np.where(z % 2 == 0, z // 2, -((z + 1) // 2))
+
+
+def read_level(data: bytes, n: int, count: int, place: str) -> np.ndarray:
+    """A level without a pyramid: width, bitmap, byte planes."""
+    width, split = data[0], 1 + -(-n // 8)
+    need(1 <= width <= 4, place, "width is not 1 to 4")
+    need(len(data) == split + width * count, place, "length does not fit width and count")
+    nonzero = bitmap(data[1:split], n, place)
+    need(nonzero.sum() == count, place, "the bitmap does not fit the count")
+    values = planes(data[split:], "<u4", count)
+    need(width == 1 or values.max() >> (8 * width - 8), place, "width is not the least")
+    need(values.max() < 0xFFFFFFFF, place, "a code is too large")
+    out = np.zeros(n, np.int64)
+    out[nonzero] = codes_of(values)
+    return out
+
+
+def read_outliers(data: bytes, dtype, count: int, samples: int, place: str):
+    """Sample numbers and samples."""
+    gaps = planes(data[: 4 * count], "<u4", count).astype(np.uint64)
+    numbers = np.cumsum(gaps + np.uint64(1)) - np.uint64(1)
+    need(numbers[-1] < samples, place, "an outlier is beyond the last sample")
+    return numbers.astype(np.int64), planes(data[4 * count :], dtype, count)
+
+
+def read_missing(data: bytes, dtype, count: int, samples: int, place: str):
+    """Which samples are missing, and these."""
+    split = -(-samples // 8)
+    mask = bitmap(data[:split], samples, place)
+    need(mask.sum() == count, place, "the bitmap does not fit the count")
+    return mask, planes(data[split:], dtype, count)
+
+
+# ---------------------------------------------------------------- lattice codes (section 7)
+
+STREAM_OF_ACTIVITY = [0] + [1] * 2 + [2] * 5 + [3] * 8 + [4] * 17  # a is 0 .. 32
+ONES = [bin(i).count("1") for i in range(256)]
+
+
+class Bits:
+    """Bits of a byte string from `at` on, the lowest first."""
+
+    def __init__(self, data: bytes, at: int, place: str):
+        self.data, self.at, self.place, self.bit = data, at, place, 0
+
+    def take(self, count: int) -> int:
+        value = 0
+        for i in range(count):
+            need(self.at < len(self.data), self.place, "ends within a table of frequencies")
+            value |= (self.data[self.at] >> self.bit & 1) << i
+            self.bit += 1
+            if self.bit == 8:
+                self.bit, self.at = 0, self.at + 1
+        return value
+
+    def end(self) -> int:
+        """The next whole byte; the rest of the last is zero."""
+        if self.bit:
+            need(self.data[self.at] >> self.bit == 0, self.place, "padding bits are not zero")
+            self.at += 1
+        return self.at
+
+
+def take_number(r: Record) -> int:
+    """1 to 5 bytes with 7 bits each, the lowest first, no more than it has to take."""
+    value = 0
+    for i in range(5):
+        byte = r.take(1)[0]
+        value |= (byte & 127) << 7 * i
+        if byte < 128:
+            need(byte or i == 0, r.place, "a number is longer than it has to be")
+            return value
+    raise Damaged(r.place, "a number is longer than 5 bytes")
+
+
+def cells_of(counts) -> tuple[int, int, int, int]:
+    x, y, z, t = counts
+    return (-(-x // 2), -(-y // 2), -(-z // 2), t)
+
+
+def lattice_most(cells: int, codes: int) -> int:
+    """The largest raw length that is allowed."""
+    s = cells + codes
+    return 45 + s + 5 * (9 + s // 4096) + -(-29 * codes // 8)
+
+
+def read_lattice(data: bytes, boxes: list, count: int, place: str) -> list[np.ndarray]:
+    """The codes of each box, as arrays [t, z, y, x]."""
+    r = Record(data, place)
+    lengths = [take_number(r) for _ in range(9)]
+    cells = [math.prod(cells_of(b)) for b in boxes]
+    need(sum(lengths[:5]) == sum(cells), place, "significance streams do not fit the cells")
+    need(sum(lengths[5:]) == count, place, "value streams do not fit the count")
+    symbols = read_segments(r, sum(lengths))
+    ends = np.cumsum([0] + lengths)
+    streams = [symbols[a:b] for a, b in zip(ends, ends[1:])]
+    significance, activity = read_significance(streams[:5], boxes, place)
+    nonzero = np.unpackbits(significance[:, None], axis=1, bitorder="little").astype(bool)
+    values = read_values(r, streams[5:], nonzero.sum(axis=1), activity, place)
+    codes = np.zeros(nonzero.shape, np.int64)
+    codes[nonzero] = codes_of(values)
+    ends = np.cumsum([0] + cells)
+    return [uncell(codes[a:b], box, place) for a, b, box in zip(ends, ends[1:], boxes)]
+
+
+def read_significance(streams: list[bytes], boxes: list, place: str):
+    """Significance byte and activity of every cell of all boxes, in order."""
+    bytes_, activities = bytearray(), bytearray()
+    next_of_stream = [iter(s).__next__ for s in streams]
+    next_of_activity = [next_of_stream[s] for s in STREAM_OF_ACTIVITY]
+    used = [0] * 5
+    for box in boxes:
+        x, y, z, t = cells_of(box)
+        sy, sz, st = x + 1, (x + 1) * (y + 1), (x + 1) * (y + 1) * (z + 1)
+        counts = bytearray(st * (t + 1))  # one cell of zeros before the first along each axis
+        inner = np.arange(len(counts)).reshape(t + 1, z + 1, y + 1, x + 1)[1:, 1:, 1:, 1:]
+        begin = len(activities)
+        try:
+            for i in inner.ravel().tolist():
+                a = counts[i - 1] + counts[i - sy] + counts[i - sz] + counts[i - st]
+                byte = next_of_activity[a]()
+                counts[i] = ONES[byte]
+                bytes_.append(byte)
+                activities.append(a)
+        except StopIteration:
+            raise Damaged(place, "a significance stream ends too early") from None
+        for a, n in enumerate(np.bincount(np.frombuffer(activities[begin:], np.uint8), minlength=33)):
+            used[STREAM_OF_ACTIVITY[a]] += n
+    need(used == [len(s) for s in streams], place, "a significance stream ends too late")
+    return np.frombuffer(bytes_, np.uint8), np.frombuffer(activities, np.uint8)
+
+
+def read_values(r: Record, streams: list[bytes], c: np.ndarray, a: np.ndarray, place: str) -> np.ndarray:
+    """`zigzag(code) - 1` of all nonzero codes, in order; the low bits end the payload."""
+    of_cell = np.searchsorted([4, 10, 20], 2 * c.astype(np.int64) + a // 2, side="right")
+    of_value = np.repeat(of_cell, c)
+    symbols = np.zeros(len(of_value), np.int64)
+    for i, stream in enumerate(streams):
+        mask = of_value == i
+        need(mask.sum() == len(stream), place, "a value stream ends too early or too late")
+        symbols[mask] = np.frombuffer(stream, np.uint8)
+    need(not (symbols > 227).any(), place, "a symbol is above 227")
+    large = symbols >= 128
+    bits, top = np.divmod(symbols[large] - 128, 4)
+    low = bits + 8 - 3  # a value of n bits has n - 3 low ones
+    begins = np.cumsum(low) - low
+    rest = r.take(-(-int(low.sum()) // 8))
+    r.end()
+    pool = np.append(bitmap(rest, int(low.sum()), place), np.zeros(32, bool)).astype(np.int64)
+    values = (4 + top) << low
+    for i in range(29):
+        values |= np.where(i < low, pool[begins + np.minimum(i, low)] << i, 0)
+    symbols[large] = values
+    need(not (symbols >= 0xFFFFFFFF).any(), place, "a code is too large")
+    return symbols
+
+
+def uncell(codes: np.ndarray, box, place: str) -> np.ndarray:
+    """Cells of 8 codes, bit dx + 2 dy + 4 dz, to a box [t, z, y, x]; beyond its far faces is nothing."""
+    x, y, z, t = cells_of(box)
+    full = codes.reshape(t, z, y, x, 2, 2, 2).transpose(0, 1, 4, 2, 5, 3, 6).reshape(t, 2 * z, 2 * y, 2 * x)
+    inside = full[:, : box[2], : box[1], : box[0]]
+    need(np.count_nonzero(inside) == np.count_nonzero(full), place, "a code beyond the far faces")
+    return inside
+
+
+def read_segments(r: Record, total: int) -> bytes:
+    """One string of `total` symbols."""
+    out = bytearray()
+    while len(out) < total:
+        length, kind = divmod(take_number(r), 4)
+        need(1 <= length <= total - len(out), r.place, "a segment is empty or ends after the string")
+        if kind == 0:
+            out += r.take(length)
+        elif kind == 1:
+            out += r.take(1) * length
+        else:
+            out += read_coded(r, length, 12 if kind == 2 else 14)
+    return bytes(out)
+
+
+def read_frequencies(r: Record, b: int) -> np.ndarray:
+    bits = Bits(r.data, r.at, r.place)
+    frequencies = np.zeros(256, np.int64)
+    length, left = b, 1 << b
+    for value in range(256):
+        if bits.take(1):
+            if bits.take(1):
+                length = bits.take(4)
+            else:
+                length += -1 if bits.take(1) else 1
+        need(0 <= length <= b, r.place, "a frequency is too long")
+        if length:
+            frequencies[value] = 1 << (length - 1) | bits.take(length - 1)
+        left -= int(frequencies[value])
+        if left <= 0:
+            break
+    need(left == 0, r.place, "frequencies do not add up")
+    r.at = bits.end()
+    return frequencies
+
+
+def read_coded(r: Record, length: int, b: int) -> bytearray:
+    """A segment of kind 2 or 3."""
+    frequencies = read_frequencies(r, b)
+    symbol = np.repeat(np.arange(256), frequencies)  # of every slot
+    begin = np.cumsum(frequencies) - frequencies
+    rest = (np.arange(1 << b) - begin[symbol]).tolist()
+    frequency = frequencies[symbol].tolist()
+    symbol = symbol.tolist()
+    words = take_number(r)
+    lanes = 4 if length >= 1024 else 1
+    states = list(struct.unpack(f"<{lanes}I", r.take(4 * lanes)))
+    need(min(states) >= 65536, r.place, "a state is below 65536")
+    next_word = iter(np.frombuffer(r.take(2 * words), "<u2").tolist())
+    out, mask, lane = bytearray(length), (1 << b) - 1, lanes - 1
+    try:
+        for i in range(length):
+            state = states[i & lane]
+            slot = state & mask
+            out[i] = symbol[slot]
+            state = frequency[slot] * (state >> b) + rest[slot]
+            if state < 65536:
+                state = state << 16 | next(next_word)
+            states[i & lane] = state
+    except StopIteration:
+        raise Damaged(r.place, "words end too early") from None
+    need(all(s == 65536 for s in states), r.place, "a state does not end at 65536")
+    need(next(next_word, None) is None, r.place, "words are left")
+    return out
+
+
+# ---------------------------------------------------------------- pyramids (section 8)
+
+
+@dataclass(frozen=True)
+class Pass:
+    part: int
+    level: int
+    axis: int | None  # None: the first pass
+    first: tuple[int, ...]  # f and d along x, y, z, t
+    stride: tuple[int, ...]
+    counts: tuple[int, ...]  # nodes along x, y, z, t
+
+
+@lru_cache(256)
+def passes(extents: tuple[int, ...], order: tuple[str, ...]) -> list[Pass]:
+    axes = [AXES.index(a) for a in order]
+    top = max([(extents[a] - 1).bit_length() for a in axes], default=0)
+
+    def one(part: int, level: int, axis: int | None, along: dict) -> Pass:
+        first, stride = zip(*[along.get(a, (0, 1)) for a in range(4)])
+        return Pass(part, level, axis, first, stride, tuple(-(-(n - f) // d) for n, f, d in zip(extents, first, stride)))
+
+    out = [one(0, top, None, {a: (0, 1 << top) for a in axes})]
+    for level in range(top - 1, -1, -1):
+        near, far = 1 << level, 2 << level
+        for at, axis in enumerate(axes):
+            if extents[axis] <= near:
+                continue
+            along = {a: (0, near if i < at else far) for i, a in enumerate(axes)}
+            along[axis] = (near, far)
+            last_t = axis == 3 and at == len(axes) - 1
+            part = 0 if level >= 2 else 1 if level == 1 else 3 if last_t else 2
+            out.append(one(part, level, axis, along))
+    return out
+
+
+def predict(e: np.ndarray, count: int, stencil: str) -> np.ndarray:
+    """p of the `count` nodes between e[0] .. e[n-1] (first axis): the table of stencils, its last rows first."""
+    n = len(e)
+    c = e.dtype.type
+    p = np.empty((count, *e.shape[1:]), e.dtype)
+    if n == 1:
+        p[:] = e[0]
+        return p
+    p[: n - 1] = c(1 / 2) * e[:-1] + c(1 / 2) * e[1:]
+    if stencil == "cubic" and n > 2:
+        p[1 : n - 2] = c(-1 / 16) * e[: n - 3] + c(9 / 16) * e[1 : n - 2] + c(9 / 16) * e[2 : n - 1] - c(1 / 16) * e[3:]
+        p[n - 2] = c(-1 / 8) * e[n - 3] + c(3 / 4) * e[n - 2] + c(3 / 8) * e[n - 1]
+        p[0] = c(3 / 8) * e[0] + c(3 / 4) * e[1] - c(1 / 8) * e[2]
+    if count == n:
+        p[n - 1] = c(-1 / 2) * e[n - 2] + c(3 / 2) * e[n - 1]
+    return p
+
+
+def level_step(step: float, level: int, p: Pyramid) -> float:
+    g = 1.0
+    for _ in range(level):
+        g = min(g * p.growth, p.most)
+    return step / g
+
+
+def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid) -> np.ndarray:
+    """The coefficients [k, voxel] from the codes of the passes; a pass without codes has zeros."""
+    precision = np.float32 if p.single else np.float64
+    nodes = np.zeros(extents[::-1], precision)
+    for number, q in enumerate(passes(extents, p.order)):
+        s = precision(level_step(step, q.level, p))
+        part = [slice(f, None, d) for f, d in zip(q.first, q.stride)][::-1]
+        base = precision(0)
+        if q.axis is not None:
+            lines = list(part)
+            lines[3 - q.axis] = slice(0, None, q.stride[q.axis])
+            e = np.moveaxis(nodes[tuple(lines)], 3 - q.axis, 0)
+            base = np.moveaxis(predict(e, q.counts[q.axis], p.stencil), 0, 3 - q.axis)
+        amount = codes[number].astype(precision) * s if number in codes else precision(0)
+        nodes[tuple(part)] = base + amount
+    return nodes.reshape(extents[3], -1).astype(np.float64)
+
+
+# ---------------------------------------------------------------- along time (section 8)
+
+
+def coefficients_of(basis: str, frames: int) -> int:
+    """K."""
+    if basis != "multi":
+        return frames
+    n = 1
+    while 2 * n + 1 < frames:
+        n *= 2
+    return 2 * n + 1
+
+
+def inverse_haar(c: np.ndarray) -> np.ndarray:
+    weights = [[1] * len(c)]  # of the sums before each step
+    while len(weights[-1]) > 1:
+        m = weights[-1]
+        weights.append([sum(m[i : i + 2]) for i in range(0, len(m), 2)])
+    sums_, used = [c[0]], 1
+    for m in weights[-2::-1]:
+        fine = []
+        for i in range(len(m) // 2):
+            m1, m2 = m[2 * i], m[2 * i + 1]
+            a, b = math.sqrt(m1 / (m1 + m2)), math.sqrt(m2 / (m1 + m2))
+            s, d = sums_[i], c[used + i]
+            fine += [a * s + b * d, b * s - a * d]
+        if len(m) % 2:
+            fine.append(sums_[-1])
+        sums_, used = fine, used + len(m) // 2
+    return np.array(sums_)
+
+
+# The numbers of the multi transform, as the page gives them.
+T1, T9, T10, T3Q, T6, T8Q = 0.07071067811865475, 0.6363961030678927, 0.7071067811865475, 0.3, 0.4242640687119285, 0.8
+I1, I9, I3Q, I10Q = 0.05, 0.45, 0.21213203435596428, 0.7071067811865476
+NODE, END_NODE, MID = 0.816496580927726, 0.5773502691896258, 0.7216878364870322
+END_TAPS = np.array([T10, T9, -T3Q, -T1])[:, None]
+END_WAVELET = np.array([-T10, T9, -T3Q, -T1])[:, None]
+NODE_TAPS = np.array([-I1, -I3Q, I9, I10Q, I9, -I3Q, -I1])[:, None]
+EVEN_WAVELET = np.array([-I1, -I3Q, I9, -I10Q, I9, -I3Q, -I1])[:, None]
+ODD_WAVELET = np.array([-T1, -T3Q, T9, 0, -T9, T3Q, T1])[:, None]
+
+
+def inverse_multi(c: np.ndarray, frames: int) -> np.ndarray:
+    f, used = c[:3], 3
+    while used < len(c):
+        n = len(f) - 1  # intervals of the finer level
+        f = inverse_multi_level(f, c[used : used + n], n)
+        used += n
+    x = np.empty_like(f)
+    x[::2] = f[::2] / NODE
+    x[0], x[-1] = f[0] / END_NODE, f[-1] / END_NODE
+    x[1::2] = f[1::2] / MID - 0.3 * (x[:-2:2] + x[2::2])
+    return x[:frames]
+
+
+def inverse_multi_level(s: np.ndarray, w: np.ndarray, n: int) -> np.ndarray:
+    """Each fine coefficient is summed up from 0, in the page's order of scaling coefficients and wavelets."""
+    fine = np.zeros((2 * n + 1, s.shape[1]))
+    fine[:4] += END_TAPS * s[0]
+    fine[:4] += END_WAVELET * w[0]
+    for c in range(1, n // 2):
+        at = fine[4 * c - 3 : 4 * c + 4]
+        at += NODE_TAPS * s[2 * c]
+        at += EVEN_WAVELET * w[2 * c - 1]
+        at += ODD_WAVELET * w[2 * c]
+    for i, tap in enumerate((T6, T8Q, T6)):
+        fine[1 + i :: 4] += tap * s[1::2]
+    fine[-4:] += END_TAPS[::-1] * s[-1]
+    fine[-4:] += END_WAVELET[::-1] * w[-1]
+    return fine
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> float:
+    return np.add.accumulate(a * b)[-1]  # from left to right: np.dot and np.sum are not
+
+
+@lru_cache(16)
+def learned_functions(w: Window) -> np.ndarray:
+    """The orthonormal functions [k, t]."""
+    identity = np.eye(w.frames)
+    candidates = [w.functions.reshape(-1, w.frames) / 32768.0, inverse_haar(identity).T, identity]
+    out: list[np.ndarray] = []
+    for f in np.concatenate(candidates):
+        if len(out) == w.frames:
+            break
+        before = dot(f, f)
+        for u in out + out:
+            f = f - dot(f, u) * u
+        s = dot(f, f)
+        if s > 1e-10 * max(before, 1e-10):
+            out.append(f / np.sqrt(s))
+    need(len(out) == w.frames, f"window from frame {w.first_frame}", "too few functions")
+    return np.array(out)
+
+
+def inverse(c: np.ndarray, w: Window) -> np.ndarray:
+    """x [frame, voxel] from c [k, voxel]."""
+    if w.basis == "samples":
+        return c
+    if w.basis == "haar":
+        return inverse_haar(c)
+    if w.basis == "multi":
+        return inverse_multi(c, w.frames)
+    x = np.zeros_like(c)
+    for u, row in zip(learned_functions(w), c):
+        if row.any():
+            x += u[:, None] * row
+    return x
+
+
+def to_samples(x: np.ndarray, dtype: np.dtype, place: str) -> np.ndarray:
+    """Rounded to the sample type: section 8."""
+    if dtype.kind == "f":
+        return x.astype(dtype)
+    need(not np.isnan(x).any(), place, "a sample is not a number")
+    whole = np.trunc(x)
+    whole += np.where(np.abs(x - whole) >= 0.5, np.sign(x), 0)  # the difference is exact
+    limits = np.iinfo(dtype)
+    return np.clip(whole, limits.min, limits.max).astype(dtype)
+
+
+# ---------------------------------------------------------------- the file
+
+
+class Archive:
+    """An open file. Opening it goes through section 2 up to the root; leaves and blocks are read when asked for."""
+
+    def __init__(self, path: str):
+        with open(path, "rb") as f:
+            f.seek(0, 2)
+            self.length = f.tell()
+            need(self.length >= 256 and self.length % ALIGN == 0, "file", f"cannot be {self.length} bytes long")
+            self.data = mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)
+        self._leaves: dict[int, list[Block]] = {}
+        self._header()
+        self._footer()
+        f = self.footer
+        place = (f.metadata_offset, f.metadata_stored, f.metadata_raw, f.metadata_checksum)
+        self.metadata = Metadata.read(self._section(b"META", *place, place="metadata", cap=MAX_METADATA))
+        place = (f.root_offset, f.root_stored, f.root_raw, f.root_checksum)
+        root = self._section(b"ROOT", *place, place="root", cap=MAX_ROOT_RAW)
+        root = decompress(root, f.root_raw, "root", f.root_offset)
+        self.leaves = [LEAF.read(root, i) for i in range(0, len(root), LEAF.size)]
+        self._places()
+        self._totals()
+
+    def close(self) -> None:
+        self.data.close()
+
+    # ---- sections 3 and 4
+
+    def _header(self) -> None:
+        data = self.data[:128]
+        head = HEADER.read(data)
+        need(head.magic == MAGIC, "header", "wrong magic", 0)
+        need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
+        if head.major != 1:
+            raise Unsupported("header", f"version {head.major}", 8)
+        if head.required:
+            words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
+            raise Unsupported("header", f"the file needs: {words}", 16)
+        need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
+        self.id = head.id
+
+    def _footer(self) -> None:
+        """Checks the footer and the places of metadata and root."""
+        at = self.length - 128
+        data = self.data[at:]
+        f = self.footer = FOOTER.read(data)
+        need(f.magic == END_MAGIC, "footer", "wrong end magic", at + 120)
+        need(xxhash.xxh3_64_intdigest(data[:112]) == f.checksum, "footer", "wrong checksum", at + 112)
+        need(f.id == self.id, "footer", "another file id than the header's", at)
+        need(f.total == self.length, "footer", "another length than the file's", at + 16)
+        need(not any(f.reserved), "footer", "reserved bytes are not zero", at + 88)
+        need(f.metadata_offset % ALIGN == 0 and f.metadata_offset >= 128, "footer", "bad place of metadata", at + 24)
+        end = align(f.metadata_offset + FRAME.size + f.metadata_stored)
+        need(end == f.root_offset, "footer", "the root does not follow the metadata", at + 48)
+        end = align(f.root_offset + FRAME.size + f.root_stored)
+        need(end == at, "footer", "does not follow the root", at)
+        need(f.blocks <= self.length // 128, "footer", "too many blocks", at + 72)
+        need(f.leaves <= f.blocks and f.root_raw == LEAF.size * f.leaves, "footer", "bad count of leaves", at + 80)
+
+    def _seed(self, kind: int, window: int, block: int, channel: int, level: int = 0) -> int:
+        return xxhash.xxh3_64_intdigest(self.id + struct.pack("<IIHBB", window, block, channel, kind, level))
+
+    def _bytes(self, offset: int, size: int, checksum: int, seed: int, place: str) -> bytes:
+        need(offset + size <= self.length - 128, place, "is not within the file", offset)
+        stored = self.data[offset : offset + size]
+        need(xxhash.xxh3_64_intdigest(stored, seed) == checksum, place, "wrong checksum", offset)
+        return stored
+
+    def _section(self, tag, offset, stored, raw, checksum, where=(0, 0, 0), place="", cap=None) -> bytes:
+        """The stored bytes of a section. `checksum` None: only its frame has it."""
+        need(offset + FRAME.size <= self.length - 128, place, "is not within the file", offset)
+        need(tag in (b"LEAF", b"ROOT") or stored == raw, place, "stored and raw differ", offset)
+        need(cap is None or raw <= cap, place, "is too long", offset)
+        frame = FRAME.read(self.data[offset : offset + FRAME.size])
+        expected = (tag, stored, raw, 0, frame.checksum if checksum is None else checksum)
+        need(frame == expected, place, "its frame is not the one that is expected", offset)
+        return self._bytes(offset + FRAME.size, stored, frame.checksum, self._seed(KIND[tag], *where), place)
+
+    # ---- section 5
+
+    def _places(self) -> None:
+        """Leaves, window sections and metadata follow each other without a gap but padding."""
+        m = self.metadata
+        per_channel = -(-m.blocks // BLOCKS_PER_LEAF)
+        need(self.footer.blocks == m.blocks * m.channels * len(m.windows), "footer", "count of blocks does not fit the metadata")
+        need(len(self.leaves) == per_channel * m.channels * len(m.windows), "footer", "count of leaves does not fit")
+        at = align(128 + FRAME.size + len(m.start))
+        leaves = iter(self.leaves)
+        for number, w in enumerate(m.windows):
+            for channel in range(m.channels):
+                for first in range(0, m.blocks, BLOCKS_PER_LEAF):
+                    at = self._place(next(leaves), (number, channel, first), at)
+            at = align(at + FRAME.size + len(m.window_section(w)))
+        end = self.footer.metadata_offset
+        need(at == end, "metadata", f"do not follow what is before, which ends at byte {at}", end)
+
+    def _place(self, leaf, key: tuple, at: int) -> int:
+        """Checks a leaf's entry, and returns where the next thing begins."""
+        place = f"root, {name_of(leaf)}"
+        need((leaf.window, leaf.channel, leaf.first_block) == key, place, "leaves are not in order")
+        need(leaf.count == min(BLOCKS_PER_LEAF, self.metadata.blocks - leaf.first_block), place, "bad count of blocks")
+        need(leaf.data_offset == at, place, f"its blocks do not begin at byte {at}", leaf.data_offset)
+        need(leaf.offset % ALIGN == 0 and leaf.offset >= at + 128 * leaf.count, place, "bad place", leaf.offset)
+        least = BLOCK.size * leaf.count
+        need(least <= leaf.raw <= least + PART.size * MAX_PARTS * leaf.count, place, "bad length")
+        return align(leaf.offset + FRAME.size + leaf.stored)
+
+    def _totals(self) -> None:
+        """What the metadata says of a window fits what its leaves say."""
+        of_window: list[list] = [[] for _ in self.metadata.windows]
+        for leaf in self.leaves:
+            of_window[leaf.window].append(leaf)
+        for number, (w, leaves) in enumerate(zip(self.metadata.windows, of_window)):
+            place = f"metadata, window {number}"
+            need(sum(l.coded for l in leaves) == w.coded, place, "another count of codes than the directory's")
+            need(sum(l.outliers for l in leaves) == w.outliers, place, "another count of outliers than the directory's")
+            need(sum(l.missing for l in leaves) <= w.missing, place, "fewer missing samples than in the directory")
+            need(all(l.reached <= w.reached for l in leaves), place, "smaller error than in the directory")
+
+    def leaf(self, number: int) -> list[Block]:
+        """The entries of a leaf's blocks."""
+        if number not in self._leaves:
+            self._leaves = {number: self._read_leaf(self.leaves[number])}
+        return self._leaves[number]
+
+    def _read_leaf(self, leaf) -> list[Block]:
+        where, place = (leaf.window, leaf.first_block, leaf.channel), name_of(leaf)
+        stored = self._section(b"LEAF", leaf.offset, leaf.stored, leaf.raw, leaf.checksum, where, place)
+        r = Record(decompress(stored, leaf.raw, place, leaf.offset), place)
+        blocks = [Block.read(r) for _ in range(leaf.count)]
+        r.end()
+        at = leaf.data_offset
+        for i, b in enumerate(blocks):
+            need((b.window, b.block, b.channel) == (leaf.window, leaf.first_block + i, leaf.channel), place, "blocks are not in order")
+            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize)
+            part_at = at + FRAME.size + len(b.bytes)
+            for p in b.parts:
+                need(p.offset == part_at, b.place, f"a part does not begin at byte {part_at}", p.offset)
+                part_at += p.stored
+            at = align(b.end(at))
+        need(at == leaf.offset, place, "does not follow its blocks", leaf.offset)
+        for name, value in sums(blocks).items():
+            need(getattr(leaf, name) == value, f"root, {place}", f"wrong {name}")
+        return blocks
+
+    def _size(self, b: Block) -> tuple[int, ...]:
+        return tuple(s.stop - s.start for s in self.metadata.box(b.block))
+
+    # ---- samples
+
+    def block(self, window: int, channel: int, number: int) -> Block:
+        per_channel = -(-self.metadata.blocks // BLOCKS_PER_LEAF)
+        leaf = (window * self.metadata.channels + channel) * per_channel + number // BLOCKS_PER_LEAF
+        return self.leaf(leaf)[number % BLOCKS_PER_LEAF]
+
+    def payload(self, b: Block, p) -> bytes:
+        """What a part holds once decompressed."""
+        place = f"{b.place}, part of kind {p.kind}, level {p.level}"
+        seed = self._seed(p.kind, b.window, b.block, b.channel, p.level)
+        return decompress(self._bytes(p.offset, p.stored, p.checksum, seed, place), p.raw, place, p.offset)
+
+    def samples(self, b: Block) -> np.ndarray:
+        """The samples of a block, [frame, z, y, x] (section 7)."""
+        need(not b.lost, b.place, "lost: its data were gone when the file was recovered")
+        w, size, dtype = self.metadata.windows[b.window], self._size(b), self.metadata.dtype
+        count = math.prod(size) * w.frames
+        payloads = {(p.kind, p.level): (p, self.payload(b, p)) for p in b.parts}
+        if (EXACT, 0) in payloads:
+            out = planes(payloads[EXACT, 0][1], dtype, count)
+        else:
+            with np.errstate(all="ignore"):
+                c = self._coefficients(b, w, size, payloads)
+                need(np.isfinite(c).all(), b.place, "a coefficient is not finite")
+                out = to_samples(inverse(c, w), dtype, b.place).reshape(-1)
+        for kind, read in ((OUTLIERS, read_outliers), (MISSING, read_missing)):
+            if (kind, 0) in payloads:
+                p, data = payloads[kind, 0]
+                which, values = read(data, dtype, p.count, count, f"{b.place}, part of kind {kind}")
+                out = out.copy()
+                out[which] = values
+        return out.reshape(w.frames, *size[::-1])
+
+    def _coefficients(self, b: Block, w: Window, size: tuple[int, ...], payloads: dict) -> np.ndarray:
+        """c [k, voxel] as 64-bit floats (section 8)."""
+        levels = {p.level: (p, data) for (kind, _), (p, data) in payloads.items() if kind == LEVEL}
+        if w.pyramid:
+            extents, codes = (*size, w.coefficients), {}
+            for level, (p, data) in levels.items():
+                mine = [(i, q.counts) for i, q in enumerate(passes(extents, w.pyramid.order)) if q.part == level]
+                boxes = read_lattice(data, [c for _, c in mine], p.count, f"{b.place}, level {level}")
+                codes.update(zip([i for i, _ in mine], boxes))
+            return rebuild(codes, b.step, extents, w.pyramid)
+        voxels = math.prod(size)
+        rows = []
+        for level, count in enumerate(w.levels):
+            if level in levels:
+                p, data = levels[level]
+                rows.append(read_level(data, count * voxels, p.count, f"{b.place}, level {level}"))
+            else:
+                rows.append(np.zeros(count * voxels, np.int64))
+        return np.concatenate(rows).astype(np.float64).reshape(-1, voxels) * b.step
+
+    def window(self, number: int, channel: int) -> np.ndarray:
+        """All samples of a window and channel, [frame, z, y, x]."""
+        m = self.metadata
+        out = np.empty((m.windows[number].frames, *m.dims[::-1]), m.dtype)
+        for i in range(m.blocks):
+            out[(slice(None), *m.box(i)[::-1])] = self.samples(self.block(number, channel, i))
+        return out
+
+    def extract(self, path: str) -> None:
+        """Writes the samples of all frames."""
+        need(self.metadata.channels == 1, "metadata", f"{self.metadata.channels} channels, not 1")
+        try:
+            with open(path, "wb") as f:
+                for number in range(len(self.metadata.windows)):
+                    f.write(self.window(number, 0))
+        except Damaged:
+            os.remove(path)  # half a series could be taken for a whole one
+            raise
+
+    # ---- check
+
+    def check(self, decode: bool = True) -> int:
+        """Reads everything in the order of the file; returns how many blocks are lost."""
+        m, f = self.metadata, self.footer
+        at = self._padding(self._repeats(b"STRT", 128, m.start, (0, 0, 0), "start"))
+        lost, leaves = 0, iter(range(len(self.leaves)))
+        for number, w in enumerate(m.windows):
+            for _ in range(len(self.leaves) // len(m.windows)):
+                i = next(leaves)
+                for b in self.leaf(i):
+                    at = self._check_block(b, at, decode)
+                    lost += b.lost
+                at = self._padding(at + FRAME.size + self.leaves[i].stored)
+            place = f"window section {number}"
+            at = self._padding(self._repeats(b"WNDW", at, m.window_section(w), (number, 0, 0), place))
+        self._padding(f.metadata_offset + FRAME.size + f.metadata_stored)
+        self._padding(f.root_offset + FRAME.size + f.root_stored)
+        return lost
+
+    def _padding(self, end: int) -> int:
+        """Zeros up to the next multiple of 64, which is returned."""
+        need(not any(self.data[end : align(end)]), "padding", "is not zero", end)
+        return align(end)
+
+    def _repeats(self, tag: bytes, at: int, expected: bytes, where: tuple, place: str) -> int:
+        """A section that repeats what leaf or metadata say; returns its end."""
+        found = self._section(tag, at, len(expected), len(expected), None, where, place)
+        need(found == expected, place, "is not what leaf or metadata say", at)
+        return at + FRAME.size + len(expected)
+
+    def _check_block(self, b: Block, at: int, decode: bool) -> int:
+        self._repeats(b"BLCK", at, b.bytes, (b.window, b.block, b.channel), f"header of {b.place}")
+        if decode and not b.lost:
+            self.samples(b)
+        else:
+            for p in b.parts:
+                self.payload(b, p)
+        return self._padding(b.end(at))
+
+
+# ---------------------------------------------------------------- command line
+
+
+def plain(value):
+    """A value as JSON has it: infinities and NaN as words, records as objects."""
+    if isinstance(value, (Metadata, Window, Pyramid)):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.type != "bytes"}
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
+
+
+def info(path: str) -> None:
+    archive = Archive(path)
+    file = {"id": archive.id.hex(), "bytes": archive.length, "blocks": archive.footer.blocks, "leaves": len(archive.leaves)}
+    print(json.dumps({"file": file, **plain(archive.metadata)}, indent=2, ensure_ascii=False))
+
+
+def check(path: str) -> None:
+    lost = Archive(path).check()
+    print(f"ok {path}" + (f" ({lost} blocks lost)" if lost else ""))
+
+
+def extract(path: str, out: str) -> None:
+    Archive(path).extract(out)
+
+
+def extract_many(path: str) -> None:
+    bad = 0
+    with open(path, encoding="utf-8") as f:
+        jobs = [line.rstrip("\n").split("\t") for line in f if line.strip()]
+    for source, out in jobs:
+        try:
+            archive = Archive(source)
+            archive.check(decode=False)
+            archive.extract(out)
+            archive.close()
+            print(f"ok {source}", flush=True)
+        except (Damaged, OSError) as e:
+            print(f"damaged {source}: {e}", flush=True)
+            bad += 1
+    if bad:
+        raise Damaged(path, f"{bad} of {len(jobs)} files")
+
+
+def main(arguments: list[str]) -> int:
+    commands = {"info": (info, 1), "check": (check, 1), "extract": (extract, 2), "extract-many": (extract_many, 1)}
+    command, count = commands.get(arguments[0] if arguments else "", (None, 0))
+    if command is None or len(arguments) != 1 + count:
+        print(__doc__, file=sys.stderr)
+        return 2
+    try:
+        command(*arguments[1:])
+    except Damaged as e:
+        print(f"{arguments[0]}: {e}", file=sys.stderr)
+        return 3
+    except OSError as e:
+        print(f"{arguments[0]}: {e}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
