@@ -31,6 +31,10 @@ pub struct ExtractReport {
     pub blocks_read: u64,
     /// Stored bytes that were read of blocks.
     pub bytes_read: u64,
+    /// Bytes of the file that were read, directory and all.
+    pub file_bytes_read: u64,
+    /// Bytes that the file has.
+    pub file_bytes: u64,
     /// Bytes written.
     pub bytes: u64,
 }
@@ -62,6 +66,7 @@ pub fn extract(
         }
     }
     file.check_unchanged()?;
+    (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
     progress.finish();
     Ok(report)
 }

@@ -171,6 +171,11 @@ impl CoefficientFile {
         self.skipped.as_ref().filter(|damage| !damage.is_empty())
     }
 
+    /// An error that tells what was left out, if anything was: for the end of what was done with the rest.
+    pub fn refuse_skipped(&self) -> Result<()> {
+        self.skipped().map_or(Ok(()), |damage| Err(Error::input(&self.path, damage.words())))
+    }
+
     /// Whether any sample of a window may be missing.
     pub fn has_missing(&self, window: u32) -> bool {
         let record = &self.metadata().windows[window as usize];

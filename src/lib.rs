@@ -73,6 +73,7 @@ mod memory;
 pub mod npy;
 pub mod output;
 pub mod progress;
+pub mod recover;
 pub mod render;
 pub mod report;
 pub mod resume;

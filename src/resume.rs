@@ -107,6 +107,13 @@ pub fn check(part: &Path) -> Result<()> {
     CoefficientFile::open(part, Access::Read)?.check_stored()
 }
 
+/// As [`check`], of a file that may have lost blocks: all but the blocks themselves.
+pub fn check_structure(part: &Path) -> Result<()> {
+    let mut wrong = None;
+    CoefficientFile::open(part, Access::Read)?.check_structure(&mut |error| wrong = wrong.take().or(Some(error)))?;
+    wrong.map_or(Ok(()), Err)
+}
+
 /// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
 pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Option<usize>) -> Result<bool> {
     let file = CoefficientFile::open(path, Access::Read)?;

@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 7] = [
     &["bound", "wavelet", "camera", "footprint", "source", "npy"],
     &["codec", "scan"],
     &["file", "report"],
-    &["convert", "render", "extract", "verify", "resume"],
+    &["convert", "render", "extract", "verify", "recover", "resume"],
     &["cli"],
 ];
 

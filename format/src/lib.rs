@@ -21,6 +21,7 @@ mod planes;
 mod pyramid;
 mod rans;
 mod reader;
+mod salvage;
 mod sample;
 mod section;
 mod segments;
@@ -47,6 +48,7 @@ pub use payload::{
 };
 pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
+pub use salvage::{Salvage, Salvaged};
 pub use sample::SampleType;
 pub use unfinished::Unfinished;
 pub use window::{Basis, Window, WindowRecord};

@@ -154,16 +154,17 @@ impl Metadata {
     }
 
     /// The record of a window that there is.
-    pub(crate) fn record(&self, window: u32) -> WindowRecord {
-        let window = self.windows[window as usize].clone();
+    pub(crate) fn record(&self, number: u32) -> WindowRecord {
+        let window = self.windows[number as usize].clone();
         let first = window.first_frame as usize;
         let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
-        WindowRecord { window, times }
+        WindowRecord { number, window, times }
     }
 
     /// Adds a window; the reason if it cannot be the next one.
     pub(crate) fn push(&mut self, record: WindowRecord) -> Check {
-        let WindowRecord { window, times } = record;
+        let WindowRecord { number, window, times } = record;
+        ensure(number as usize == self.windows.len(), || format!("window {number} where another belongs"))?;
         self.check_window(self.windows.len(), &window, self.frames)?;
         let timed = times.is_empty() && self.times.is_empty()
             || times.len() == window.frames as usize && self.times.len() as u64 == self.frames;

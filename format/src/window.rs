@@ -1,10 +1,10 @@
 //! A window of frames: how its blocks are coded, and what they promised and reached.
 
-use crate::Pyramid;
 use crate::bytes::{Check, ensure};
 use crate::directory::{finite_amount, is_amount, is_range};
 use crate::limits::*;
 use crate::metadata::{CONFIG, whole};
+use crate::{EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
 /// The transform along time; new kinds are appended.
@@ -79,6 +79,8 @@ pub struct Window {
 /// What the section at a window's end holds: with it and the file's start, all before it can be read.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct WindowRecord {
+    /// Its number, from 0.
+    pub number: u32,
     /// The window.
     pub window: Window,
     /// Time of each of its frames; empty: frame numbers.
@@ -97,6 +99,17 @@ impl WindowRecord {
 }
 
 impl Window {
+    /// Adds what a block holds to what the window does.
+    pub(crate) fn count(&mut self, block: &EncodedBlock) {
+        for part in &block.parts {
+            match part.kind {
+                PartKind::Level(_) => self.coded += part.stats.count,
+                PartKind::Outliers => self.outliers += part.stats.count,
+                PartKind::Missing | PartKind::Exact => {}
+            }
+        }
+    }
+
     /// Level parts that a block can have.
     pub fn parts(&self) -> usize {
         if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }

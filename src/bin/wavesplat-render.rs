@@ -6,6 +6,7 @@ use serde::Serialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
@@ -130,6 +131,9 @@ struct Cli {
     /// A value that means "missing" in frames, besides NaN and infinities
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     missing_value: Option<f64>,
+    /// Show damaged and lost blocks of a coefficient file as missing samples, and the rest; exit code 3
+    #[arg(long)]
+    skip_damaged: bool,
     #[command(flatten)]
     input: InputArgs,
     #[command(flatten)]
@@ -177,7 +181,7 @@ impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
         let (mut scene, file) = self.scene()?;
-        let config = self.config(scene.as_ref(), file.as_ref())?;
+        let config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()))?;
         let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config)?;
         let progress = self.common.progress("pictures");
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
@@ -199,7 +203,13 @@ impl Cli {
         if let Some(error) = report.certified_error {
             self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
         }
-        self.common.report(&Reported { report: &report, coloured }, self.output == Path::new(STANDARD))
+        if let Some(file) = &file {
+            self.common.detail(format_args!("{} of the file's {} bytes were read", file.bytes_read(), file.bytes()));
+        }
+        let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
+        let reported = Reported { report: &report, coloured, file_bytes_read, file_bytes };
+        self.common.report(&reported, self.output == Path::new(STANDARD))?;
+        file.map_or(Ok(()), |file| file.refuse_skipped())
     }
 
     /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
@@ -255,8 +265,8 @@ impl Cli {
         Ok((pictures, errors))
     }
 
-    /// What is rendered, and what it was converted with.
-    fn scene(&self) -> Result<(Box<dyn Scene>, Option<Metadata>)> {
+    /// What is rendered, and the file that it is from.
+    fn scene(&self) -> Result<Opened> {
         let coefficients = self.method == MethodName::Coefficients;
         if let [only] = self.inputs.as_slice()
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
@@ -266,9 +276,12 @@ impl Cli {
             }
             self.input.refuse_for_coefficients()?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
-            let metadata = file.metadata().clone();
+            let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            return Ok((Box::new(CoefficientScene::new(file, what)), Some(metadata)));
+            return Ok((Box::new(CoefficientScene::new(file.clone(), what)), Some(file)));
+        }
+        if self.skip_damaged {
+            return Err(Error::usage("--skip-damaged: is for a coefficient file"));
         }
         if coefficients {
             return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
@@ -362,6 +375,9 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     error
 }
 
+/// What is rendered, and the file that it is from.
+type Opened = (Box<dyn Scene>, Option<Arc<CoefficientFile>>);
+
 /// What `--json` says.
 #[derive(Serialize)]
 struct Reported<'a> {
@@ -369,6 +385,9 @@ struct Reported<'a> {
     report: &'a RenderReport,
     #[serde(flatten)]
     coloured: Coloured,
+    /// Bytes of the coefficient file that were read, directory and all, and those that it has.
+    file_bytes_read: Option<u64>,
+    file_bytes: Option<u64>,
 }
 
 /// The values of the first and the last colour, of what is in colours.

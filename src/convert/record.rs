@@ -65,7 +65,8 @@ impl<'a, W: Write> Recorder<'a, W> {
         }
         if let Some(window) = self.window.take_if(|_| batch.last) {
             let times = batch.window.times.clone();
-            writer.end_window(WindowRecord { window, times }).map_err(failed)?;
+            let number = batch.window.index;
+            writer.end_window(WindowRecord { number, window, times }).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
         }
         Ok(())

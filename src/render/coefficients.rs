@@ -28,14 +28,14 @@ pub enum What {
 
 /// A coefficient file as a scene.
 pub struct CoefficientScene {
-    file: CoefficientFile,
+    file: Arc<CoefficientFile>,
     what: What,
 }
 
 impl CoefficientScene {
     /// Of an open file.
-    pub fn new(file: CoefficientFile, what: What) -> Self {
-        Self { file, what }
+    pub fn new(file: impl Into<Arc<CoefficientFile>>, what: What) -> Self {
+        Self { file: file.into(), what }
     }
 }
 

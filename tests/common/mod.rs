@@ -96,7 +96,8 @@ pub(crate) fn stored_with_a_lie(
             writer.append(&encoded).unwrap();
         }
         let times = metadata.times.get(frames).unwrap_or_default().to_vec();
-        writer.end_window(WindowRecord { window: metadata.windows[window as usize].clone(), times }).unwrap();
+        let record = WindowRecord { number: window, window: metadata.windows[window as usize].clone(), times };
+        writer.end_window(record).unwrap();
     }
     writer.finish().unwrap().0
 }

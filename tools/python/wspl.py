@@ -323,10 +323,11 @@ class Metadata:
         edge = self.block_edge
         return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(number, self.dims))
 
-    def window_section(self, w: Window) -> bytes:
-        """The record of a window section: the window, then its times."""
+    def window_section(self, number: int) -> bytes:
+        """The record of a window section: the window's number, the window, then its times."""
+        w = self.windows[number]
         times = self.times[w.first_frame : w.first_frame + w.frames]
-        return w.bytes + struct.pack("<Q", len(times)) + times.tobytes()
+        return struct.pack("<I", number) + w.bytes + struct.pack("<Q", len(times)) + times.tobytes()
 
 
 def read_bound(r: Record) -> dict:
@@ -646,6 +647,7 @@ def read_segments(r: Record, total: int) -> bytes:
 
 
 def read_frequencies(r: Record, b: int) -> np.ndarray:
+    """Frequencies of all byte values; they add up to 2^b."""
     bits = Bits(r.data, r.at, r.place)
     frequencies = np.zeros(256, np.int64)
     length, left = b, 1 << b
@@ -667,7 +669,7 @@ def read_frequencies(r: Record, b: int) -> np.ndarray:
 
 
 def read_coded(r: Record, length: int, b: int) -> bytearray:
-    """A segment of kind 2 or 3."""
+    """A segment of kind 2 or 3, after its number."""
     frequencies = read_frequencies(r, b)
     symbol = np.repeat(np.arange(256), frequencies)  # of every slot
     begin = np.cumsum(frequencies) - frequencies
@@ -711,12 +713,14 @@ class Pass:
 
 @lru_cache(256)
 def passes(extents: tuple[int, ...], order: tuple[str, ...]) -> list[Pass]:
+    """The passes of a block in their order, each with the part that its codes are in."""
     axes = [AXES.index(a) for a in order]
     top = max([(extents[a] - 1).bit_length() for a in axes], default=0)
 
     def one(part: int, level: int, axis: int | None, along: dict) -> Pass:
         first, stride = zip(*[along.get(a, (0, 1)) for a in range(4)])
-        return Pass(part, level, axis, first, stride, tuple(-(-(n - f) // d) for n, f, d in zip(extents, first, stride)))
+        counts = tuple(-(-(n - f) // d) for n, f, d in zip(extents, first, stride))
+        return Pass(part, level, axis, first, stride, counts)
 
     out = [one(0, top, None, {a: (0, 1 << top) for a in axes})]
     for level in range(top - 1, -1, -1):
@@ -742,7 +746,8 @@ def predict(e: np.ndarray, count: int, stencil: str) -> np.ndarray:
         return p
     p[: n - 1] = c(1 / 2) * e[:-1] + c(1 / 2) * e[1:]
     if stencil == "cubic" and n > 2:
-        p[1 : n - 2] = c(-1 / 16) * e[: n - 3] + c(9 / 16) * e[1 : n - 2] + c(9 / 16) * e[2 : n - 1] - c(1 / 16) * e[3:]
+        near, far = c(9 / 16), c(-1 / 16)
+        p[1 : n - 2] = far * e[: n - 3] + near * e[1 : n - 2] + near * e[2 : n - 1] + far * e[3:]
         p[n - 2] = c(-1 / 8) * e[n - 3] + c(3 / 4) * e[n - 2] + c(3 / 8) * e[n - 1]
         p[0] = c(3 / 8) * e[0] + c(3 / 4) * e[1] - c(1 / 8) * e[2]
     if count == n:
@@ -751,6 +756,7 @@ def predict(e: np.ndarray, count: int, stencil: str) -> np.ndarray:
 
 
 def level_step(step: float, level: int, p: Pyramid) -> float:
+    """The step of a level, in 64-bit floats."""
     g = 1.0
     for _ in range(level):
         g = min(g * p.growth, p.most)
@@ -789,6 +795,7 @@ def coefficients_of(basis: str, frames: int) -> int:
 
 
 def inverse_haar(c: np.ndarray) -> np.ndarray:
+    """From the coarsest step: x1 = a s + b d, x2 = b s - a d."""
     weights = [[1] * len(c)]  # of the sums before each step
     while len(weights[-1]) > 1:
         m = weights[-1]
@@ -819,6 +826,7 @@ ODD_WAVELET = np.array([-T1, -T3Q, T9, 0, -T9, T3Q, T1])[:, None]
 
 
 def inverse_multi(c: np.ndarray, frames: int) -> np.ndarray:
+    """Level by level to fine coefficients, then to samples; mids take the samples of their nodes."""
     f, used = c[:3], 3
     while used < len(c):
         n = len(f) - 1  # intervals of the finer level
@@ -922,9 +930,6 @@ class Archive:
         self._places()
         self._totals()
 
-    def close(self) -> None:
-        self.data.close()
-
     # ---- sections 3 and 4
 
     def _header(self) -> None:
@@ -983,17 +988,18 @@ class Archive:
         """Leaves, window sections and metadata follow each other without a gap but padding."""
         m = self.metadata
         per_channel = -(-m.blocks // BLOCKS_PER_LEAF)
-        need(self.footer.blocks == m.blocks * m.channels * len(m.windows), "footer", "count of blocks does not fit the metadata")
-        need(len(self.leaves) == per_channel * m.channels * len(m.windows), "footer", "count of leaves does not fit")
+        runs = m.channels * len(m.windows)
+        need(self.footer.blocks == m.blocks * runs, "footer", "count of blocks does not fit the metadata")
+        need(len(self.leaves) == per_channel * runs, "footer", "count of leaves does not fit the metadata")
         at = align(128 + FRAME.size + len(m.start))
         leaves = iter(self.leaves)
-        for number, w in enumerate(m.windows):
+        for number in range(len(m.windows)):
             for channel in range(m.channels):
                 for first in range(0, m.blocks, BLOCKS_PER_LEAF):
                     at = self._place(next(leaves), (number, channel, first), at)
-            at = align(at + FRAME.size + len(m.window_section(w)))
+            at = align(at + FRAME.size + len(m.window_section(number)))
         end = self.footer.metadata_offset
-        need(at == end, "metadata", f"do not follow what is before, which ends at byte {at}", end)
+        need(at == end, "metadata", f"is not at byte {at}, where what is before ends", end)
 
     def _place(self, leaf, key: tuple, at: int) -> int:
         """Checks a leaf's entry, and returns where the next thing begins."""
@@ -1032,7 +1038,8 @@ class Archive:
         r.end()
         at = leaf.data_offset
         for i, b in enumerate(blocks):
-            need((b.window, b.block, b.channel) == (leaf.window, leaf.first_block + i, leaf.channel), place, "blocks are not in order")
+            key = (leaf.window, leaf.first_block + i, leaf.channel)
+            need((b.window, b.block, b.channel) == key, place, "blocks are not in order")
             check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize)
             part_at = at + FRAME.size + len(b.bytes)
             for p in b.parts:
@@ -1117,7 +1124,8 @@ class Archive:
                 for number in range(len(self.metadata.windows)):
                     f.write(self.window(number, 0))
         except Damaged:
-            os.remove(path)  # half a series could be taken for a whole one
+            if os.path.isfile(path):
+                os.remove(path)  # half a series could be taken for a whole one
             raise
 
     # ---- check
@@ -1127,7 +1135,7 @@ class Archive:
         m, f = self.metadata, self.footer
         at = self._padding(self._repeats(b"STRT", 128, m.start, (0, 0, 0), "start"))
         lost, leaves = 0, iter(range(len(self.leaves)))
-        for number, w in enumerate(m.windows):
+        for number in range(len(m.windows)):
             for _ in range(len(self.leaves) // len(m.windows)):
                 i = next(leaves)
                 for b in self.leaf(i):
@@ -1135,7 +1143,7 @@ class Archive:
                     lost += b.lost
                 at = self._padding(at + FRAME.size + self.leaves[i].stored)
             place = f"window section {number}"
-            at = self._padding(self._repeats(b"WNDW", at, m.window_section(w), (number, 0, 0), place))
+            at = self._padding(self._repeats(b"WNDW", at, m.window_section(number), (number, 0, 0), place))
         self._padding(f.metadata_offset + FRAME.size + f.metadata_stored)
         self._padding(f.root_offset + FRAME.size + f.root_stored)
         return lost
@@ -1201,7 +1209,6 @@ def extract_many(path: str) -> None:
             archive = Archive(source)
             archive.check(decode=False)
             archive.extract(out)
-            archive.close()
             print(f"ok {source}", flush=True)
         except (Damaged, OSError) as e:
             print(f"damaged {source}: {e}", flush=True)

@@ -36,6 +36,9 @@ pub(crate) struct ExtractArgs {
     /// npy or raw [default: by the ending of OUT; npy for -]
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Take damaged and lost blocks for missing samples (NaN, or the declared value, or 0) and give the rest; exit code 3
+    #[arg(long)]
+    skip_damaged: bool,
     /// Read the file instead of mapping it
     #[arg(long)]
     no_mmap: bool,
@@ -55,7 +58,10 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
     let access = Access::unless(args.no_mmap);
-    let file = CoefficientFile::open(&args.file, access)?;
+    let mut file = CoefficientFile::open(&args.file, access)?;
+    if args.skip_damaged {
+        file = file.skip_damaged()?;
+    }
     let config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
         region: args.region.map_or(Ok(file.grid.whole()), |r| r.resolve(&file.grid))?,
@@ -71,7 +77,9 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     }
     let report = extract(&file, &config, &args.output, &mut out, &args.common.progress("frames"))?;
     out.commit()?;
-    args.common.report(&report, args.output == Path::new(STANDARD))
+    args.common.detail(format_args!("{} of the file's {} bytes were read", report.file_bytes_read, report.file_bytes));
+    args.common.report(&report, args.output == Path::new(STANDARD))?;
+    file.refuse_skipped()
 }
 
 fn format_of(path: &Path) -> Result<Format> {

@@ -5,6 +5,7 @@ mod append;
 mod convert;
 mod extract;
 mod info;
+mod recover;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -23,6 +24,7 @@ Examples:
   wavesplat info run.wspl
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
+  wavesplat recover damaged.wspl -o saved.wspl
 Pictures are made by wavesplat-render."
 )]
 struct Cli {
@@ -37,6 +39,7 @@ enum Command {
     Info(info::InfoArgs),
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),
+    Recover(recover::RecoverArgs),
 }
 
 fn main() -> ExitCode {
@@ -46,5 +49,6 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Extract(args) => extract::run(&args),
+        Command::Recover(args) => recover::run(&args),
     })
 }

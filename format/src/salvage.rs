@@ -1,0 +1,320 @@
+//! What is whole of a damaged file, found without trusting its directory, and a new file of it (FORMAT.md section 12).
+
+use crate::block::{BlockId, EncodedBlock, EncodedPart};
+use crate::bytes::{Check, Fields};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
+use crate::footer::FOOTER;
+use crate::header::FileId;
+use crate::leaf::{LeafEntry, leaves_of};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
+use crate::metadata::Metadata;
+use crate::reader::read_header;
+use crate::section::{FRAME, Owner, decompress, read, section_at};
+use crate::window::{Basis, Window, WindowRecord};
+use crate::writer::{Summary, Writer};
+use crate::{Error, Result, Storage};
+use memchr::memmem::Finder;
+use std::collections::BTreeMap;
+use std::io::Write;
+
+/// What was found whole in a damaged file; parts of blocks are not yet looked at.
+#[derive(Debug)]
+pub struct Salvage {
+    id: FileId,
+    /// With the windows that are described.
+    metadata: Metadata,
+    /// Windows of which nothing says how they are coded.
+    undescribed: Vec<u32>,
+    /// Where the header of each block is, and the section of each leaf.
+    blocks: BTreeMap<BlockId, u64>,
+    leaves: BTreeMap<BlockId, u64>,
+    /// Blocks after the last window that is described.
+    unfinished: u64,
+}
+
+/// What became of a damaged file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Salvaged {
+    /// The new file.
+    pub summary: Summary,
+    /// Blocks of it that are lost, in order.
+    pub lost: Vec<BlockId>,
+    /// Windows of it of which nothing said how they were coded; all their blocks are lost.
+    pub undescribed: Vec<u32>,
+    /// Blocks that were left behind, of a last window that was not finished or whose record is gone.
+    pub unfinished: u64,
+}
+
+/// What the sections of a file say.
+#[derive(Default)]
+struct Found {
+    start: Option<Metadata>,
+    /// The last metadata, which is of the most windows.
+    metadata: Option<Metadata>,
+    windows: BTreeMap<u32, WindowRecord>,
+    blocks: BTreeMap<BlockId, u64>,
+    leaves: BTreeMap<BlockId, u64>,
+}
+
+/// The tags of sections that are looked for.
+const TAGS: [&[u8; 4]; 5] = [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"META"];
+
+/// Bytes that are searched at a time.
+const STRETCH: u64 = 1 << 20;
+
+impl Salvage {
+    /// Looks through a whole file; `searched` is told how many more bytes were. Takes some 60 bytes of memory for each block.
+    ///
+    /// # Errors
+    /// Nothing says which file it is, or how large its volume is: nothing can be saved. Or the storage's.
+    pub fn search(storage: &impl Storage, searched: &mut dyn FnMut(u64)) -> Result<Self> {
+        if let Err(newer @ Error::Unsupported(_)) = read_header(storage) {
+            return Err(newer);
+        }
+        let mut ids = candidates(storage)?;
+        let mut whole = false;
+        let mut found = Found::default();
+        let finders = TAGS.map(Finder::new);
+        for offset in (0..storage.len()).step_by(STRETCH as usize) {
+            let len = (STRETCH + 3).min(storage.len() - offset); // a tag may lie across
+            let mut bytes = vec![0; len as usize];
+            storage.read_at(offset, &mut bytes)?;
+            let mut places: Vec<(usize, &[u8; 4])> = Vec::new();
+            for (tag, finder) in TAGS.iter().zip(&finders) {
+                places.extend(finder.find_iter(&bytes).map(|at| (at, *tag)));
+            }
+            places.sort_unstable();
+            for (at, tag) in places {
+                let at = offset + at as u64;
+                if let Some(id) =
+                    ids.iter().copied().find(|id| found.take(storage, *id, tag, at).is_ok_and(|took| took))
+                {
+                    (ids, whole) = (vec![id], true);
+                }
+            }
+            searched(len.min(STRETCH));
+        }
+        found.put_together(ids.first().copied().filter(|_| whole))
+    }
+
+    /// The metadata of the file that [`Self::write`] makes, but for counts.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// Writes a file of all that is whole; `done` is called after every block.
+    pub fn write<W: Write>(&self, storage: &impl Storage, out: W, done: &mut dyn FnMut()) -> Result<(W, Salvaged)> {
+        let mut writer = Writer::new(out, self.id, &self.metadata)?;
+        let mut lost = Vec::new();
+        for window in 0..self.metadata.windows.len() as u32 {
+            let mut record = self.metadata.record(window);
+            (record.window.coded, record.window.outliers) = (0, 0);
+            for (first, count) in leaves_of(&self.metadata, window) {
+                let entries = self.leaf(storage, first, count);
+                for (block, entry) in (first.block..).zip(entries) {
+                    let id = BlockId { block, ..first };
+                    match self.block(storage, id, entry)? {
+                        Some(block) => {
+                            record.window.count(&block);
+                            writer.append(&block)?;
+                        }
+                        None => {
+                            lost.push(id);
+                            writer.append_lost(id)?;
+                        }
+                    }
+                    done();
+                }
+            }
+            writer.end_window(record)?;
+        }
+        let (out, summary) = writer.finish()?;
+        let (undescribed, unfinished) = (self.undescribed.clone(), self.unfinished);
+        Ok((out, Salvaged { summary, lost, undescribed, unfinished }))
+    }
+
+    /// What the leaf of some blocks says of each, where it is whole.
+    fn leaf(&self, storage: &impl Storage, first: BlockId, count: u32) -> Vec<Option<BlockEntry>> {
+        let leaf = LeafEntry { count: count as u16, ..LeafEntry::new(first, 0) };
+        let entries = self.leaves.get(&first).and_then(|at| {
+            let (extent, stored) = section_at(storage, self.id, Owner::Leaf(first), *at, leaf.most_raw()).ok()?;
+            let raw = (extent.raw_len as usize <= leaf.most_raw()).then(|| decompress(&stored, extent.raw_len))?;
+            leaf.parse(&raw.ok()?).ok()
+        });
+        entries.map_or(vec![None; count as usize], |entries| entries.into_iter().map(Some).collect())
+    }
+
+    /// A block, if it is whole and can be decoded; an error if the storage fails.
+    fn block(&self, storage: &impl Storage, id: BlockId, told: Option<BlockEntry>) -> Result<Option<EncodedBlock>> {
+        if self.undescribed.contains(&id.window) {
+            return Ok(None);
+        }
+        let own = self.blocks.get(&id).and_then(|at| entry_at(storage, self.id, id, *at).ok());
+        for entry in own.into_iter().chain(told).filter(|entry| !entry.lost) {
+            match self.parts(storage, &entry) {
+                Ok(block) => return Ok(Some(block)),
+                Err(failed @ Error::Io(_)) => return Err(failed),
+                Err(_) => {}
+            }
+        }
+        Ok(None)
+    }
+
+    fn parts(&self, storage: &impl Storage, entry: &BlockEntry) -> Result<EncodedBlock> {
+        let geometry = self.metadata.geometry(entry.id).ok_or(Error::Lost(entry.id))?;
+        let part = |part: &PartEntry| {
+            let PartEntry { kind, stats, raw_len, .. } = *part;
+            geometry.check(part).map_err(Error::Invalid)?;
+            let stored = part.read(storage, self.id, entry.id)?;
+            decompress(&stored, raw_len).map_err(Error::Invalid)?;
+            Ok(EncodedPart { kind, stats, raw_len, stored })
+        };
+        entry.check().map_err(Error::Invalid)?;
+        let parts = entry.parts.iter().map(part).collect::<Result<_>>()?;
+        Ok(EncodedBlock { id: entry.id, stats: entry.stats, parts })
+    }
+}
+
+/// What the file's identity may be: as its header says, or its footer.
+fn candidates(storage: &impl Storage) -> Result<Vec<FileId>> {
+    let places = [Some(32), storage.len().checked_sub(FOOTER as u64)];
+    let mut ids = Vec::new();
+    for place in places.into_iter().flatten().filter(|place| place + 16 <= storage.len()) {
+        let mut id = [0; 16];
+        storage.read_at(place, &mut id)?;
+        ids.push(FileId(id));
+    }
+    Ok(ids)
+}
+
+/// A block's entry by its header at `at`, its parts where they follow there, whatever their offsets were.
+fn entry_at(storage: &impl Storage, file: FileId, id: BlockId, at: u64) -> Result<BlockEntry> {
+    let owner = Owner::Block(id);
+    let (_, bytes) = section_at(storage, file, owner, at, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let mut fields = Fields::new(&bytes);
+    let entry = BlockEntry::decode(&mut fields).and_then(|entry| fields.end().map(|()| entry));
+    let mut entry = entry.map_err(|what| owner.corrupt(at, what))?;
+    let mut offset = at + entry.header_len();
+    for part in &mut entry.parts {
+        part.offset = offset;
+        offset = offset.saturating_add(part.stored_len.into());
+    }
+    Ok(entry)
+}
+
+impl Found {
+    /// Takes in what begins at `at` with a tag; whether it is a section of the file `id`.
+    fn take(&mut self, storage: &impl Storage, id: FileId, tag: &[u8; 4], at: u64) -> Result<bool> {
+        let record = |owner: Owner| section_at(storage, id, owner, at, MAX_METADATA).map(|(_, record)| record);
+        match tag {
+            b"STRT" => self.start = Metadata::parse_start(&record(Owner::Start)?).ok().or(self.start.take()),
+            b"META" => self.metadata = Metadata::parse(&record(Owner::Metadata)?).ok().or(self.metadata.take()),
+            b"BLCK" => {
+                let block = id_at(storage, at)?;
+                entry_at(storage, id, block, at)?;
+                self.blocks.entry(block).or_insert(at);
+            }
+            b"LEAF" => return self.take_leaf(storage, id, at),
+            _ => {
+                let record = window_at(storage, id, at)?;
+                self.windows.entry(record.number).or_insert(record);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes in a leaf, of which only its content says whose it is.
+    fn take_leaf(&mut self, storage: &impl Storage, id: FileId, at: u64) -> Result<bool> {
+        let most = BLOCKS_PER_LEAF as usize * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS);
+        let frame = read(storage, Owner::Root, at, FRAME as u64)?;
+        let mut fields = Fields::new(&frame[4..]);
+        let (Ok(stored_len), Ok(raw_len)) = (fields.u32(), fields.u32()) else { return Ok(false) };
+        if stored_len as usize > most || raw_len as usize > most {
+            return Ok(false);
+        }
+        let stored = read(storage, Owner::Root, at + FRAME as u64, stored_len.into())?;
+        let Ok(raw) = decompress(&stored, raw_len) else { return Ok(false) };
+        let Ok(first) = BlockEntry::decode(&mut Fields::new(&raw)) else { return Ok(false) };
+        section_at(storage, id, Owner::Leaf(first.id), at, most)?;
+        self.leaves.entry(first.id).or_insert(at);
+        Ok(true)
+    }
+
+    fn put_together(self, id: Option<FileId>) -> Result<Salvage> {
+        let nothing = |what: &str| Error::Invalid(format!("nothing can be saved: {what}"));
+        let Self { start, metadata, mut windows, blocks, leaves } = self;
+        for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
+            windows.entry(number).or_insert_with(|| m.record(number));
+        }
+        let id = id.ok_or_else(|| nothing("no section of it is whole"))?;
+        let start = metadata.map(|m| m.start()).or(start);
+        let mut all = start.ok_or_else(|| nothing("start and metadata are gone, which say how large the volume is"))?;
+        let mut undescribed = Vec::new();
+        for (_, record) in windows {
+            bridge(&mut all, &record, &mut undescribed).map_err(|what| nothing(&what))?;
+            all.push(record).map_err(|what| nothing(&what))?;
+        }
+        if all.frames == 0 {
+            return Err(nothing("no window of it was finished"));
+        }
+        let unfinished = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
+        Ok(Salvage { id, metadata: all, undescribed, blocks, leaves, unfinished })
+    }
+}
+
+/// The block whose header is at `at`, by its own word.
+fn id_at(storage: &impl Storage, at: u64) -> Result<BlockId> {
+    let mut bytes = [0; 10];
+    storage.read_at(at.saturating_add(FRAME as u64), &mut bytes)?;
+    let mut fields = Fields::new(&bytes);
+    let mut id = || Ok(BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? });
+    id().map_err(|what: String| Owner::Root.corrupt(at, what))
+}
+
+/// The window section at `at`, which says of itself which window it ends.
+fn window_at(storage: &impl Storage, file: FileId, at: u64) -> Result<WindowRecord> {
+    let mut number = [0; 4];
+    storage.read_at(at.saturating_add(FRAME as u64), &mut number)?;
+    let owner = Owner::Window(u32::from_le_bytes(number));
+    let (_, record) = section_at(storage, file, owner, at, MAX_METADATA)?;
+    WindowRecord::parse(&record).map_err(|what| owner.corrupt(at, what))
+}
+
+/// Fills the windows before `record` that nothing describes: lost ones, as equally long as may be.
+fn bridge(all: &mut Metadata, record: &WindowRecord, undescribed: &mut Vec<u32>) -> Check {
+    let time = record.times.first().copied(); // of frames that nothing tells, that of the next one told
+    for number in all.windows.len() as u32..record.number {
+        let left = record.window.first_frame.saturating_sub(all.frames);
+        let frames = u32::try_from(left / u64::from(record.number - number)).unwrap_or(u32::MAX);
+        let window = lost_window(all.frames, frames);
+        let times = time.map_or(Vec::new(), |time| vec![time; frames.min(MAX_WINDOW_FRAMES) as usize]);
+        all.push(WindowRecord { number, window, times })?;
+        undescribed.push(number);
+    }
+    Ok(())
+}
+
+/// A window of which nothing is known.
+fn lost_window(first_frame: u64, frames: u32) -> Window {
+    Window {
+        first_frame,
+        frames,
+        basis: Basis::Samples,
+        coefficients: frames,
+        levels: vec![frames],
+        functions: Vec::new(),
+        pyramid: None,
+        coarseness: 0.0,
+        range: (f64::INFINITY, f64::NEG_INFINITY),
+        digest: 0,
+        delta: 0.0,
+        reached: 0.0,
+        share: 0.0,
+        squared_error: 0.0,
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
+        missing: 0,
+        coded: 0,
+        outliers: 0,
+    }
+}

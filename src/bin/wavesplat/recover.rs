@@ -1,0 +1,76 @@
+//! `wavesplat recover`
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use wavesplat::cli::{CommonArgs, print, spare_inputs};
+use wavesplat::error::{Error, Result};
+use wavesplat::mapped::{Access, FileBytes};
+use wavesplat::output::{Output, STANDARD};
+use wavesplat::recover::{RecoverReport, recover};
+use wavesplat::resume;
+
+/// Save what is whole of a damaged coefficient file
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  wavesplat recover damaged.wspl -o saved.wspl
+  wavesplat recover run.wspl.part -o run-so-far.wspl
+A new file is written, and the damaged one is not touched. Blocks of which anything is damaged are lost in the new file: they
+are listed here, and whatever reads them says so (--skip-damaged leaves them out). If no block is lost, the new file is the
+one that was damaged, byte for byte. Exit code 3 if anything is lost.")]
+pub(crate) struct RecoverArgs {
+    /// Damaged or unfinished coefficient file
+    file: PathBuf,
+    /// File to write, or - for standard output
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+    /// Read the file instead of mapping it
+    #[arg(long)]
+    no_mmap: bool,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
+    args.common.start()?;
+    let damaged = FileBytes::open(&args.file, Access::unless(args.no_mmap))?;
+    spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
+    let mut out = Output::create(&args.output, args.force)?;
+    let report = recover(&damaged, &args.output, &mut out, &args.common.progress("blocks"))?;
+    out.commit_if(resume::check_structure)?;
+    let to_stdout = args.output == Path::new(STANDARD);
+    if !args.common.json && !args.common.quiet {
+        if to_stdout { args.common.note(text(&report).trim_end()) } else { print(&text(&report))? }
+    }
+    args.common.report(&report, to_stdout)?;
+    match lost(&report) {
+        Some(what) => Err(Error::input(&args.file, what)),
+        None => Ok(()),
+    }
+}
+
+fn lost(r: &RecoverReport) -> Option<String> {
+    let (blocks, behind) = (r.blocks_lost, r.blocks_left_behind);
+    let what = format!("{blocks} blocks are lost, and {behind} of an unfinished window were left behind");
+    (blocks + behind > 0).then_some(what)
+}
+
+fn text(r: &RecoverReport) -> String {
+    let mut text =
+        format!("{} frames in {} windows, {} blocks, {} bytes: saved\n", r.frames, r.windows, r.blocks, r.bytes);
+    for run in &r.lost {
+        let (from, to) = run.frames;
+        let (window, first, last) = (run.window, run.first, run.last);
+        text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}\n");
+    }
+    for window in &r.windows_undescribed {
+        text += &format!("  nothing says how window {window} was coded\n");
+    }
+    if r.blocks_left_behind > 0 {
+        text += &format!("  left behind: {} blocks of a window that was not finished\n", r.blocks_left_behind);
+    }
+    text
+}

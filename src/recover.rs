@@ -1,0 +1,75 @@
+//! A damaged coefficient file to a whole one of what can be saved. The damaged one is only read.
+
+use crate::error::{Error, Result};
+use crate::mapped::FileBytes;
+use crate::progress::Progress;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use wavesplat_format::{BlockId, Salvage};
+
+/// What was saved, and what not.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RecoverReport {
+    /// Frames of the new file.
+    pub frames: u64,
+    /// Its windows.
+    pub windows: usize,
+    /// Its blocks.
+    pub blocks: u64,
+    /// Its bytes.
+    pub bytes: u64,
+    /// Blocks of it whose samples are lost.
+    pub blocks_lost: u64,
+    /// Where these are: runs of blocks of a window.
+    pub lost: Vec<Run>,
+    /// Windows of it of which nothing said how they were coded: of these all blocks are lost.
+    pub windows_undescribed: Vec<u32>,
+    /// Whole blocks that were left behind, of a window at the end that was not finished or whose record is gone.
+    pub blocks_left_behind: u64,
+}
+
+/// Some blocks of a window, one after another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Run {
+    /// The window, counted from 0.
+    pub window: u32,
+    /// Its frames.
+    pub frames: (u64, u64),
+    /// The first of the blocks.
+    pub first: u32,
+    /// The last.
+    pub last: u32,
+}
+
+/// Writes all of `damaged` that is whole to `out`, which `name` stands for in messages.
+pub fn recover(damaged: &FileBytes, name: &Path, out: impl Write, progress: &dyn Progress) -> Result<RecoverReport> {
+    let failed = |source| Error::CoefficientFile { path: damaged.path().into(), source };
+    let salvage = Salvage::search(damaged, &mut |_| {}).map_err(failed)?;
+    let metadata = salvage.metadata();
+    progress.start(Some(metadata.blocks()));
+    let saved = salvage.write(damaged, out, &mut || progress.advance(1));
+    let (mut out, saved) = saved.map_err(|source| Error::CoefficientFile { path: name.into(), source })?;
+    out.flush().map_err(|e| Error::io(name, "writing", e))?;
+    damaged.check_unchanged()?;
+    progress.finish();
+    let frames = |window: u32| {
+        let window = &metadata.windows[window as usize];
+        (window.first_frame, window.first_frame + u64::from(window.frames))
+    };
+    let run = |run: &[BlockId]| {
+        let (first, last) = (run[0], run[run.len() - 1]);
+        Run { window: first.window, frames: frames(first.window), first: first.block, last: last.block }
+    };
+    let follows = |a: &BlockId, b: &BlockId| a.window == b.window && a.channel == b.channel && a.block + 1 == b.block;
+    Ok(RecoverReport {
+        frames: metadata.frames,
+        windows: metadata.windows.len(),
+        blocks: saved.summary.blocks,
+        bytes: saved.summary.bytes,
+        blocks_lost: saved.lost.len() as u64,
+        lost: saved.lost.chunk_by(follows).map(run).collect(),
+        windows_undescribed: saved.undescribed,
+        blocks_left_behind: saved.unfinished,
+    })
+}
