@@ -25,7 +25,7 @@ pub struct RecoverReport {
     pub lost: Vec<Run>,
     /// Windows of it of which nothing said how they were coded: of these all blocks are lost.
     pub windows_undescribed: Vec<u32>,
-    /// Whole blocks that were left behind, of a window at the end that was not finished or whose record is gone.
+    /// Whole blocks that were left behind, since they are of later windows, of which nothing says how they were coded.
     pub blocks_left_behind: u64,
 }
 
@@ -70,6 +70,6 @@ pub fn recover(damaged: &FileBytes, name: &Path, out: impl Write, progress: &dyn
         blocks_lost: saved.lost.len() as u64,
         lost: saved.lost.chunk_by(follows).map(run).collect(),
         windows_undescribed: saved.undescribed,
-        blocks_left_behind: saved.unfinished,
+        blocks_left_behind: saved.left_behind,
     })
 }

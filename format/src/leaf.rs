@@ -6,6 +6,7 @@ use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, finite_amount, is_am
 use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::section::{Extent, section_end};
+use crate::window::WINDOW_END;
 
 /// Bytes of a leaf's entry in the root.
 pub(crate) const LEAF_ENTRY: usize = 128;
@@ -195,7 +196,7 @@ pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item 
 }
 
 /// Whether these are all leaves of the metadata, window after window from where the start section ends on; where the last
-/// window's record ends.
+/// window ends.
 pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u64> {
     let per_window = metadata.leaves_per_window() as usize;
     let count = per_window as u64 * metadata.windows.len() as u64;
@@ -206,9 +207,10 @@ pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u
         .try_fold(metadata.start_end()?, |end, (number, leaves)| check_window(metadata, number, leaves, end))
 }
 
-/// Whether these are all leaves of a window whose blocks follow the byte `end`; where its record ends.
+/// Whether these are all leaves of a window that begins after the byte `end`; where it ends.
 pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> Check<u64> {
     let window = metadata.windows.get(number as usize).ok_or("no such window")?;
+    end = section_end(align(end), metadata.record(number).encode()?.len());
     for ((id, count), leaf) in leaves_of(metadata, number).zip(leaves) {
         let same = leaf.first() == id && u32::from(leaf.count) == count;
         ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;
@@ -221,6 +223,5 @@ pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry
     ensure(leaves.iter().all(held) && sum(|l| l.missing) <= window.missing, || {
         format!("window {number}: errors, values or missing samples differ from its record")
     })?;
-    let record = metadata.record(number).encode()?;
-    Ok(section_end(align(end), record.len()))
+    Ok(section_end(align(end), WINDOW_END))
 }

@@ -51,7 +51,7 @@ pub use reader::Reader;
 pub use salvage::{Salvage, Salvaged};
 pub use sample::SampleType;
 pub use unfinished::Unfinished;
-pub use window::{Basis, Window, WindowRecord};
+pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};
 
 use std::io;

@@ -8,7 +8,7 @@ use crate::directory::finite_amount;
 use crate::header::HEADER;
 use crate::limits::*;
 use crate::section::section_end;
-use crate::window::{Window, WindowRecord};
+use crate::window::{Window, WindowEnd, WindowRecord};
 use crate::{BlockGeometry, BlockId, Error, Result, SampleType};
 use bincode::{Decode, Encode, config};
 
@@ -153,19 +153,26 @@ impl Metadata {
         Ok(section_end(HEADER as u64, record.len()))
     }
 
-    /// The record of a window that there is.
+    /// How a window that there is begins.
     pub(crate) fn record(&self, number: u32) -> WindowRecord {
-        let window = self.windows[number as usize].clone();
+        let window = self.windows[number as usize].begun();
         let first = window.first_frame as usize;
         let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
         WindowRecord { number, window, times }
     }
 
+    /// How it ends.
+    pub(crate) fn end(&self, number: u32) -> WindowEnd {
+        WindowEnd::of(number, &self.windows[number as usize])
+    }
+
     /// Adds a window; the reason if it cannot be the next one.
-    pub(crate) fn push(&mut self, record: WindowRecord) -> Check {
+    pub(crate) fn push(&mut self, record: WindowRecord, end: &WindowEnd) -> Check {
         let WindowRecord { number, window, times } = record;
-        ensure(number as usize == self.windows.len(), || format!("window {number} where another belongs"))?;
-        self.check_window(self.windows.len(), &window, self.frames)?;
+        let next = self.windows.len();
+        ensure([number, end.number] == [next as u32; 2], || format!("window {number} where {next} belongs"))?;
+        let window = window.with(end);
+        self.check_window(next, &window, self.frames)?;
         let timed = times.is_empty() && self.times.is_empty()
             || times.len() == window.frames as usize && self.times.len() as u64 == self.frames;
         ensure(timed && times.iter().all(|t| t.is_finite()), || "times of some frames alone, or not finite".into())?;

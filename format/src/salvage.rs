@@ -10,7 +10,7 @@ use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES}
 use crate::metadata::Metadata;
 use crate::reader::read_header;
 use crate::section::{FRAME, Owner, decompress, read, section_at};
-use crate::window::{Basis, Window, WindowRecord};
+use crate::window::{Basis, Window, WindowEnd, WindowRecord};
 use crate::writer::{Summary, Writer};
 use crate::{Error, Result, Storage};
 use memchr::memmem::Finder;
@@ -21,15 +21,17 @@ use std::io::Write;
 #[derive(Debug)]
 pub struct Salvage {
     id: FileId,
-    /// With the windows that are described.
+    /// With the windows that are described, without what their blocks add up to.
     metadata: Metadata,
+    /// What that is where it is known.
+    ends: BTreeMap<u32, WindowEnd>,
     /// Windows of which nothing says how they are coded.
     undescribed: Vec<u32>,
     /// Where the header of each block is, and the section of each leaf.
     blocks: BTreeMap<BlockId, u64>,
     leaves: BTreeMap<BlockId, u64>,
     /// Blocks after the last window that is described.
-    unfinished: u64,
+    left_behind: u64,
 }
 
 /// What became of a damaged file.
@@ -41,8 +43,8 @@ pub struct Salvaged {
     pub lost: Vec<BlockId>,
     /// Windows of it of which nothing said how they were coded; all their blocks are lost.
     pub undescribed: Vec<u32>,
-    /// Blocks that were left behind, of a last window that was not finished or whose record is gone.
-    pub unfinished: u64,
+    /// Whole blocks that were left behind, since they are of later windows, of which nothing says how they were coded.
+    pub left_behind: u64,
 }
 
 /// What the sections of a file say.
@@ -52,12 +54,13 @@ struct Found {
     /// The last metadata, which is of the most windows.
     metadata: Option<Metadata>,
     windows: BTreeMap<u32, WindowRecord>,
+    ends: BTreeMap<u32, WindowEnd>,
     blocks: BTreeMap<BlockId, u64>,
     leaves: BTreeMap<BlockId, u64>,
 }
 
 /// The tags of sections that are looked for.
-const TAGS: [&[u8; 4]; 5] = [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"META"];
+const TAGS: [&[u8; 4]; 6] = [b"STRT", b"WNDW", b"BLCK", b"LEAF", b"WEND", b"META"];
 
 /// Bytes that are searched at a time.
 const STRETCH: u64 = 1 << 20;
@@ -107,15 +110,15 @@ impl Salvage {
         let mut writer = Writer::new(out, self.id, &self.metadata)?;
         let mut lost = Vec::new();
         for window in 0..self.metadata.windows.len() as u32 {
-            let mut record = self.metadata.record(window);
-            (record.window.coded, record.window.outliers) = (0, 0);
+            writer.begin_window(self.metadata.record(window))?;
+            let mut end = WindowEnd::of_nothing(window);
             for (first, count) in leaves_of(&self.metadata, window) {
                 let entries = self.leaf(storage, first, count);
                 for (block, entry) in (first.block..).zip(entries) {
                     let id = BlockId { block, ..first };
                     match self.block(storage, id, entry)? {
                         Some(block) => {
-                            record.window.count(&block);
+                            end.add(&block);
                             writer.append(&block)?;
                         }
                         None => {
@@ -126,11 +129,20 @@ impl Salvage {
                     done();
                 }
             }
-            writer.end_window(record)?;
+            writer.end_window(&self.end(end))?;
         }
         let (out, summary) = writer.finish()?;
-        let (undescribed, unfinished) = (self.undescribed.clone(), self.unfinished);
-        Ok((out, Salvaged { summary, lost, undescribed, unfinished }))
+        let (undescribed, left_behind) = (self.undescribed.clone(), self.left_behind);
+        Ok((out, Salvaged { summary, lost, undescribed, left_behind }))
+    }
+
+    /// What a window comes to: as it is known, but for what blocks that are lost held; or else as its blocks add up.
+    fn end(&self, added: WindowEnd) -> WindowEnd {
+        let WindowEnd { coded, outliers, .. } = added;
+        match self.ends.get(&added.number) {
+            Some(known) => WindowEnd { coded, outliers, ..*known },
+            None => WindowEnd { share: if added.reached > 0.0 { 1.0 } else { 0.0 }, ..added },
+        }
     }
 
     /// What the leaf of some blocks says of each, where it is whole.
@@ -215,9 +227,13 @@ impl Found {
                 self.blocks.entry(block).or_insert(at);
             }
             b"LEAF" => return self.take_leaf(storage, id, at),
-            _ => {
-                let record = window_at(storage, id, at)?;
+            b"WNDW" => {
+                let record = WindowRecord::parse(&numbered(storage, id, at, Owner::Window)?).map_err(Error::Invalid)?;
                 self.windows.entry(record.number).or_insert(record);
+            }
+            _ => {
+                let end = WindowEnd::parse(&numbered(storage, id, at, Owner::WindowEnd)?).map_err(Error::Invalid)?;
+                self.ends.entry(end.number).or_insert(end);
             }
         }
         Ok(true)
@@ -242,23 +258,26 @@ impl Found {
 
     fn put_together(self, id: Option<FileId>) -> Result<Salvage> {
         let nothing = |what: &str| Error::Invalid(format!("nothing can be saved: {what}"));
-        let Self { start, metadata, mut windows, blocks, leaves } = self;
+        let Self { start, metadata, mut windows, mut ends, blocks, leaves } = self;
         for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
             windows.entry(number).or_insert_with(|| m.record(number));
+            ends.entry(number).or_insert_with(|| m.end(number));
         }
         let id = id.ok_or_else(|| nothing("no section of it is whole"))?;
+        let last = blocks.keys().map(|id| id.window).max();
+        windows.retain(|number, _| Some(*number) <= last || ends.contains_key(number)); // not one that was just begun
         let start = metadata.map(|m| m.start()).or(start);
         let mut all = start.ok_or_else(|| nothing("start and metadata are gone, which say how large the volume is"))?;
         let mut undescribed = Vec::new();
-        for (_, record) in windows {
+        for (number, record) in windows {
             bridge(&mut all, &record, &mut undescribed).map_err(|what| nothing(&what))?;
-            all.push(record).map_err(|what| nothing(&what))?;
+            all.push(record, &WindowEnd::of_nothing(number)).map_err(|what| nothing(&what))?;
         }
         if all.frames == 0 {
-            return Err(nothing("no window of it was finished"));
+            return Err(nothing("no window of it was begun"));
         }
-        let unfinished = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
-        Ok(Salvage { id, metadata: all, undescribed, blocks, leaves, unfinished })
+        let left_behind = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
+        Ok(Salvage { id, metadata: all, ends, undescribed, blocks, leaves, left_behind })
     }
 }
 
@@ -271,13 +290,11 @@ fn id_at(storage: &impl Storage, at: u64) -> Result<BlockId> {
     id().map_err(|what: String| Owner::Root.corrupt(at, what))
 }
 
-/// The window section at `at`, which says of itself which window it ends.
-fn window_at(storage: &impl Storage, file: FileId, at: u64) -> Result<WindowRecord> {
+/// What is stored in the section at `at`, which says of itself which window it is of.
+fn numbered(storage: &impl Storage, file: FileId, at: u64, owner: fn(u32) -> Owner) -> Result<Vec<u8>> {
     let mut number = [0; 4];
     storage.read_at(at.saturating_add(FRAME as u64), &mut number)?;
-    let owner = Owner::Window(u32::from_le_bytes(number));
-    let (_, record) = section_at(storage, file, owner, at, MAX_METADATA)?;
-    WindowRecord::parse(&record).map_err(|what| owner.corrupt(at, what))
+    section_at(storage, file, owner(u32::from_le_bytes(number)), at, MAX_METADATA).map(|(_, record)| record)
 }
 
 /// Fills the windows before `record` that nothing describes: lost ones, as equally long as may be.
@@ -288,7 +305,7 @@ fn bridge(all: &mut Metadata, record: &WindowRecord, undescribed: &mut Vec<u32>)
         let frames = u32::try_from(left / u64::from(record.number - number)).unwrap_or(u32::MAX);
         let window = lost_window(all.frames, frames);
         let times = time.map_or(Vec::new(), |time| vec![time; frames.min(MAX_WINDOW_FRAMES) as usize]);
-        all.push(WindowRecord { number, window, times })?;
+        all.push(WindowRecord { number, window, times }, &WindowEnd::of_nothing(number))?;
         undescribed.push(number);
     }
     Ok(())

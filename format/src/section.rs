@@ -49,6 +49,7 @@ pub(crate) enum Owner {
     Root,
     Start,
     Window(u32),
+    WindowEnd(u32),
 }
 
 impl Owner {
@@ -63,6 +64,7 @@ impl Owner {
             Self::Root => (none, [19, 0]),
             Self::Start => (none, [20, 0]),
             Self::Window(window) => (BlockId { window, ..none }, [21, 0]),
+            Self::WindowEnd(window) => (BlockId { window, ..none }, [22, 0]),
         }
     }
 
@@ -76,6 +78,7 @@ impl Owner {
             Self::Root => *b"ROOT",
             Self::Start => *b"STRT",
             Self::Window(_) => *b"WNDW",
+            Self::WindowEnd(_) => *b"WEND",
         }
     }
 
@@ -106,7 +109,8 @@ impl fmt::Display for Owner {
             Self::Metadata => f.write_str("metadata"),
             Self::Root => f.write_str("directory root"),
             Self::Start => f.write_str("start"),
-            Self::Window(window) => write!(f, "record of window {window}"),
+            Self::Window(window) => write!(f, "beginning of window {window}"),
+            Self::WindowEnd(window) => write!(f, "end of window {window}"),
         }
     }
 }

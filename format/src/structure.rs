@@ -5,11 +5,11 @@ use crate::header::HEADER;
 use crate::leaf::LeafEntry;
 use crate::limits::{ALIGN, align};
 use crate::reader::Reader;
-use crate::section::{Extent, Owner, frame, read};
+use crate::section::{Extent, FRAME, Owner, frame, read};
 use crate::{Error, Result, Storage};
 
 impl<S: Storage> Reader<S> {
-    /// Checks what is not inside leaves' stretches: start, records of windows, padding. Together with [`Reader::open`],
+    /// Checks what is not inside leaves' stretches: start, beginnings and ends of windows, padding. Together with [`Reader::open`],
     /// and [`Reader::check_leaf`] and [`Reader::check_parts`] of all leaves and blocks, this finds any changed bit of the
     /// file. `found` is called with all that is wrong; an error if the storage fails.
     pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
@@ -17,9 +17,12 @@ impl<S: Storage> Reader<S> {
         let start = metadata.start().encode()?;
         note(self.check_section(Owner::Start, HEADER as u64, &start), found)?;
         for window in 0..metadata.windows.len() as u32 {
-            let end = self.leaves(window).last().map_or(0, |leaf| leaf.extent().end());
-            let record = metadata.record(window).encode().map_err(Error::Invalid)?;
-            note(self.check_section(Owner::Window(window), align(end), &record), found)?;
+            let (begin, end) = (metadata.record(window).encode(), metadata.end(window).encode());
+            let (begin, end) = begin.and_then(|begin| Ok((begin, end?))).map_err(Error::Invalid)?;
+            let [Some(first), Some(last)] = [self.leaves(window).first(), self.leaves(window).last()] else { continue };
+            let at = first.data_offset - align((FRAME + begin.len()) as u64);
+            note(self.check_section(Owner::Window(window), at, &begin), found)?;
+            note(self.check_section(Owner::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
         note(self.check_padding(self.footer.metadata.end()), found)?;
         note(self.check_padding(self.footer.root.end()), found)

@@ -176,14 +176,16 @@ pub(crate) fn write<'a>(
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
 ) -> Result<(Vec<u8>, Summary)> {
     let mut writer = Writer::new(Vec::new(), ID, metadata)?;
+    writer.begin_window(metadata.record(0))?;
     for block in blocks {
         let ended = writer.metadata().windows.len() as u32;
         if block.id.window > ended {
-            writer.end_window(metadata.record(ended))?;
+            writer.end_window(&metadata.end(ended))?;
+            writer.begin_window(metadata.record(ended + 1))?;
         }
         writer.append(block)?;
     }
-    writer.end_window(metadata.record(metadata.windows.len() as u32 - 1))?;
+    writer.end_window(&metadata.end(metadata.windows.len() as u32 - 1))?;
     writer.finish()
 }
 

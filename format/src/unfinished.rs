@@ -9,7 +9,7 @@ use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::reader::read_header;
 use crate::section::{Owner, decompress, section_at};
-use crate::window::WindowRecord;
+use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
 use crate::{Error, Result, Storage};
 
 /// Whole windows at the beginning of a file, from which [`crate::Writer::go_on`] goes on.
@@ -71,15 +71,15 @@ impl Unfinished {
     /// Takes in the next window, if it is whole.
     fn window(&mut self, storage: &impl Storage) -> Result<()> {
         let number = self.metadata.windows.len() as u32;
-        let owner = Owner::Window(number);
-        let mut found = Found { at: self.end, ..Found::default() };
+        let (begun, record) = section_at(storage, self.id, Owner::Window(number), align(self.end), MAX_METADATA)?;
+        let mut found = Found { at: begun.end(), ..Found::default() };
         for (first, count) in leaves_of(&self.metadata, number) {
             found.leaf(storage, self.id, first, count)?;
         }
-        let at = align(found.at);
-        let (extent, record) = section_at(storage, self.id, owner, at, MAX_METADATA)?;
+        let (owner, at) = (Owner::WindowEnd(number), align(found.at));
+        let (extent, end) = section_at(storage, self.id, owner, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
-            .and_then(|record| self.metadata.push(record))
+            .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &found.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not where it belongs".into()));
         if let Err(what) = checked {

@@ -4,7 +4,7 @@ use crate::bytes::{Check, ensure};
 use crate::directory::{finite_amount, is_amount, is_range};
 use crate::limits::*;
 use crate::metadata::{CONFIG, whole};
-use crate::{EncodedBlock, PartKind, Pyramid};
+use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
 /// The transform along time; new kinds are appended.
@@ -76,16 +76,42 @@ pub struct Window {
     pub outliers: u64,
 }
 
-/// What the section at a window's end holds: with it and the file's start, all before it can be read.
+/// What the section before a window's blocks holds: with it and the file's start, they can be decoded.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct WindowRecord {
     /// Its number, from 0.
     pub number: u32,
-    /// The window.
+    /// The window as it is before its first block: what adds up from blocks is still that of none.
     pub window: Window,
     /// Time of each of its frames; empty: frame numbers.
     pub times: Vec<f64>,
 }
+
+/// What the section after a window's blocks holds: what they add up to.
+#[derive(Debug, Clone, Copy, PartialEq, Encode, Decode)]
+pub struct WindowEnd {
+    /// Its number, from 0.
+    pub number: u32,
+    /// [`Window::reached`]
+    pub reached: f64,
+    /// [`Window::share`]
+    pub share: f64,
+    /// [`Window::squared_error`]
+    pub squared_error: f64,
+    /// [`Window::min`]
+    pub min: f64,
+    /// [`Window::max`]
+    pub max: f64,
+    /// [`Window::missing`]
+    pub missing: u64,
+    /// [`Window::coded`]
+    pub coded: u64,
+    /// [`Window::outliers`]
+    pub outliers: u64,
+}
+
+/// Bytes of the record of a window's end.
+pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
 impl WindowRecord {
     pub(crate) fn encode(&self) -> Check<Vec<u8>> {
@@ -94,20 +120,61 @@ impl WindowRecord {
 
     /// The record that is exactly `bytes`; the rest of the metadata says whether it can be.
     pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        whole(bytes, "window record")
+        let record: Self = whole(bytes, "window record")?;
+        ensure(record.window == record.window.begun(), || "a window that begins with blocks".into())?;
+        Ok(record)
     }
 }
 
-impl Window {
-    /// Adds what a block holds to what the window does.
-    pub(crate) fn count(&mut self, block: &EncodedBlock) {
+impl WindowEnd {
+    /// Before the first block.
+    pub fn of_nothing(number: u32) -> Self {
+        let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (reached, share, squared_error, missing, coded, outliers) = (0.0, 0.0, 0.0, 0, 0, 0);
+        Self { number, reached, share, squared_error, min, max, missing, coded, outliers }
+    }
+
+    /// Of a window that is whole.
+    pub fn of(number: u32, window: &Window) -> Self {
+        let Window { reached, share, squared_error, min, max, missing, coded, outliers, .. } = *window;
+        Self { number, reached, share, squared_error, min, max, missing, coded, outliers }
+    }
+
+    /// Adds a block, but for its share, which it does not tell.
+    pub fn add(&mut self, block: &EncodedBlock) {
+        let BlockStats { reached, squared_error, min, max, .. } = block.stats;
+        self.reached = self.reached.max(reached);
+        self.squared_error += squared_error;
+        (self.min, self.max) = (self.min.min(min), self.max.max(max));
         for part in &block.parts {
             match part.kind {
                 PartKind::Level(_) => self.coded += part.stats.count,
                 PartKind::Outliers => self.outliers += part.stats.count,
-                PartKind::Missing | PartKind::Exact => {}
+                PartKind::Missing => self.missing += part.stats.count,
+                PartKind::Exact => {}
             }
         }
+    }
+
+    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
+        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+    }
+
+    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
+        whole(bytes, "record of a window's end")
+    }
+}
+
+impl Window {
+    /// As it is before its first block.
+    pub(crate) fn begun(&self) -> Self {
+        self.with(&WindowEnd::of_nothing(0))
+    }
+
+    /// As it is with what its blocks add up to.
+    pub fn with(&self, end: &WindowEnd) -> Self {
+        let WindowEnd { reached, share, squared_error, min, max, missing, coded, outliers, .. } = *end;
+        Self { reached, share, squared_error, min, max, missing, coded, outliers, ..self.clone() }
     }
 
     /// Level parts that a block can have.

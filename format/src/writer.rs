@@ -10,7 +10,7 @@ use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::section::{Extent, Owner, compress_directory, frame};
 use crate::unfinished::Unfinished;
-use crate::window::WindowRecord;
+use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
 use std::io::Write;
 
@@ -40,7 +40,8 @@ pub struct Writer<W: Write> {
     metadata: Metadata,
     /// Where the last of them ends.
     ended: u64,
-    /// The last block, of the window that is being written.
+    /// The window that is being written, and its last block.
+    window: Option<WindowRecord>,
     last: Option<BlockId>,
     stored: u64,
     /// The leaf being filled and its entries' bytes.
@@ -68,8 +69,8 @@ impl<W: Write> Writer<W> {
 
     fn at(out: W, begun: Unfinished) -> Self {
         let Unfinished { id, metadata, end, leaves, stored } = begun;
-        let (sound, last, leaf, entries) = (true, None, None, Vec::new());
-        Self { out, id, at: end, sound, metadata, ended: end, last, stored, leaf, entries, leaves }
+        let (sound, window, last, leaf, entries) = (true, None, None, None, Vec::new());
+        Self { out, id, at: end, sound, metadata, ended: end, window, last, stored, leaf, entries, leaves }
     }
 
     /// Where the bytes go.
@@ -82,7 +83,21 @@ impl<W: Write> Writer<W> {
         &self.metadata
     }
 
-    /// Appends a block. Blocks come ordered by window, channel and block, none left out; [`Error::Invalid`] otherwise
+    /// Begins the next window. With this, every block of it can be decoded whatever becomes of the rest.
+    pub fn begin_window(&mut self, record: WindowRecord) -> Result<()> {
+        self.begin()?;
+        let bytes = record.encode().map_err(Error::Invalid)?;
+        let next = WindowRecord::parse(&bytes).and_then(|record| {
+            let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
+            ensure(next, || format!("window {} out of order", record.number))
+        });
+        next.map_err(Error::Invalid)?;
+        self.section(Owner::Window(record.number), &bytes, bytes.len())?;
+        (self.window, self.sound) = (Some(record), true);
+        Ok(())
+    }
+
+    /// Appends a block of the window that was begun. Blocks come ordered by window, channel and block, none left out; [`Error::Invalid`] otherwise
     /// and for statistics that no block can have.
     pub fn append(&mut self, block: &EncodedBlock) -> Result<()> {
         self.put(block, false)
@@ -113,21 +128,22 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Ends a window, all of whose blocks were appended: writes the end of its directory and its record. From here on the
-    /// window can be read whatever becomes of the rest. [`Error::Invalid`] if the record does not describe the blocks.
-    pub fn end_window(&mut self, record: WindowRecord) -> Result<()> {
+    /// Ends the window, all of whose blocks were appended: writes the end of its directory and what they add up to.
+    /// [`Error::Invalid`] if they do not.
+    pub fn end_window(&mut self, end: &WindowEnd) -> Result<()> {
         self.begin()?;
         self.flush_leaf()?;
         let number = self.metadata.windows.len() as u32;
-        let bytes = record.encode().map_err(Error::Invalid)?;
-        self.metadata.push(record).map_err(Error::Invalid)?;
+        let bytes = end.encode().map_err(Error::Invalid)?;
+        let record = self.window.take().ok_or_else(|| Error::Invalid(format!("window {number} was not begun")))?;
+        self.metadata.push(record, end).map_err(Error::Invalid)?;
         let leaves =
             &self.leaves[self.leaves.len().min(number as usize * self.metadata.leaves_per_window() as usize)..];
         let whole = leaves.len() as u64 == self.metadata.leaves_per_window();
         let checked = ensure(whole, || format!("window {number}: blocks are missing"))
             .and_then(|()| check_window(&self.metadata, number, leaves, self.ended));
         checked.map_err(Error::Invalid)?;
-        self.section(Owner::Window(number), &bytes, bytes.len())?;
+        self.section(Owner::WindowEnd(number), &bytes, bytes.len())?;
         (self.ended, self.last, self.sound) = (self.at, None, true);
         Ok(())
     }
@@ -137,7 +153,7 @@ impl<W: Write> Writer<W> {
     pub fn finish(mut self) -> Result<(W, Summary)> {
         self.begin()?;
         let record = self.metadata.encode()?;
-        let ended = self.last.is_none() && self.metadata.frames > 0;
+        let ended = self.window.is_none() && self.metadata.frames > 0;
         ensure(ended, || "a file without windows, or within one".into()).map_err(Error::Invalid)?;
         let metadata = self.section(Owner::Metadata, &record, record.len())?;
         let root = self.write_root()?;
@@ -161,7 +177,7 @@ impl<W: Write> Writer<W> {
     fn check_follows(&self, id: BlockId) -> Result<()> {
         let window = self.metadata.windows.len() as u32;
         let follows = match self.last {
-            None => id == BlockId { window, block: 0, channel: 0 },
+            None => self.window.is_some() && id == BlockId { window, block: 0, channel: 0 },
             Some(last) => {
                 let next_block = BlockId { block: last.block.wrapping_add(1), ..last };
                 let next_channel = BlockId { block: 0, channel: last.channel.wrapping_add(1), ..last };

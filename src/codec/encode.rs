@@ -24,19 +24,13 @@ pub struct Encoder {
     raw: Vec<u8>,
 }
 
-/// A coded block, and what the window's record adds up.
+/// A coded block, and what it does not tell itself.
 #[derive(Debug)]
 pub struct Encoded {
     /// What the file stores.
     pub block: EncodedBlock,
     /// The largest share of its bound that a series uses, rounded up.
     pub share: f64,
-    /// Nonzero coefficients.
-    pub coded: u64,
-    /// Samples stored exactly because they missed the bound.
-    pub outliers: u64,
-    /// Missing samples.
-    pub missing: u64,
 }
 
 impl Encoder {
@@ -78,7 +72,7 @@ impl Encoder {
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
             parts.sort_by_key(|part| part.kind); // an exact part stands after it
         }
-        Ok(Encoded::new(EncodedBlock { id, stats, parts }, share, missing.count))
+        Ok(Encoded { block: EncodedBlock { id, stats, parts }, share })
     }
 
     /// Codes every series by itself. None if the block must be stored exactly.
@@ -191,16 +185,6 @@ impl Parts {
     fn new(tally: &Tally, step: f64, dropped: f64, parts: Vec<EncodedPart>) -> Self {
         let &Tally { min, max, reached, squared_error, share, .. } = tally;
         Self { stats: BlockStats { step, min, max, reached, squared_error, dropped }, share, parts }
-    }
-}
-
-impl Encoded {
-    fn new(block: EncodedBlock, share: f64, missing: u64) -> Self {
-        let count =
-            |wanted: fn(PartKind) -> bool| block.parts.iter().filter(|p| wanted(p.kind)).map(|p| p.stats.count).sum();
-        let coded = count(|kind| matches!(kind, PartKind::Level(_)));
-        let outliers = count(|kind| kind == PartKind::Outliers);
-        Self { block, share, coded, outliers, missing }
     }
 }
 

@@ -4,12 +4,11 @@ use super::{Begun, ConvertConfig, ConvertReport, EncodedBatch, Plan, WindowJob};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::report::{PromiseReport, WindowReport};
-use crate::scan::join_ranges;
 use crossbeam::channel::Receiver;
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use wavesplat_format::{Metadata, Window, WindowRecord, Writer};
+use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
 
 pub(super) struct Recorder<'a, W: Write> {
     name: &'a Path,
@@ -18,8 +17,8 @@ pub(super) struct Recorder<'a, W: Write> {
     /// The file's writer; made when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
-    /// The window whose blocks are coming.
-    window: Option<Window>,
+    /// What the blocks of the window so far add up to.
+    window: Option<WindowEnd>,
     frames_before: u64,
     busy: Duration,
 }
@@ -51,22 +50,17 @@ impl<'a, W: Write> Recorder<'a, W> {
             self.writer = Some(Writer::new(out, batch.window.id, &self.plan.start).map_err(failed)?);
         }
         let writer = self.writer.as_mut().expect("made with the first batch");
-        let window = self.window.get_or_insert_with(|| window_record(&batch.window));
+        if self.window.is_none() {
+            writer.begin_window(window_record(&batch.window)).map_err(failed)?;
+        }
+        let window = self.window.get_or_insert(WindowEnd::of_nothing(batch.window.index));
         for encoded in &batch.blocks {
-            let stats = encoded.block.stats;
-            window.reached = window.reached.max(stats.reached);
-            window.squared_error += stats.squared_error;
-            (window.min, window.max) = join_ranges((window.min, window.max), (stats.min, stats.max));
+            window.add(&encoded.block);
             window.share = window.share.max(encoded.share);
-            window.coded += encoded.coded;
-            window.outliers += encoded.outliers;
-            window.missing += encoded.missing;
             writer.append(&encoded.block).map_err(failed)?;
         }
         if let Some(window) = self.window.take_if(|_| batch.last) {
-            let times = batch.window.times.clone();
-            let number = batch.window.index;
-            writer.end_window(WindowRecord { number, window, times }).map_err(failed)?;
+            writer.end_window(&window).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
         }
         Ok(())
@@ -117,9 +111,11 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 }
 
-fn window_record(job: &WindowJob) -> Window {
-    let scheme = &job.codec.scheme;
-    Window {
+/// How a window begins.
+fn window_record(job: &WindowJob) -> WindowRecord {
+    let (scheme, WindowEnd { number, reached, share, squared_error, min, max, missing, coded, outliers }) =
+        (&job.codec.scheme, WindowEnd::of_nothing(job.index));
+    let window = Window {
         first_frame: job.first_frame,
         frames: job.codec.frames() as u32,
         basis: scheme.basis,
@@ -131,13 +127,14 @@ fn window_record(job: &WindowJob) -> Window {
         range: job.range,
         digest: job.digest,
         delta: job.codec.promise.delta,
-        reached: 0.0,
-        share: 0.0,
-        squared_error: 0.0,
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        missing: 0,
-        coded: 0,
-        outliers: 0,
-    }
+        reached,
+        share,
+        squared_error,
+        min,
+        max,
+        missing,
+        coded,
+        outliers,
+    };
+    WindowRecord { number, window, times: job.times.clone() }
 }

@@ -24,7 +24,7 @@ use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowRecord, Writer};
+use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord, Writer};
 
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
@@ -83,6 +83,10 @@ pub(crate) fn stored_with_a_lie(
     let mut encoder = Encoder::new(config.level).unwrap();
     let mut writer = Writer::new(Vec::new(), file.id(), &metadata).unwrap();
     for window in 0..file.metadata().windows.len() as u32 {
+        let times = metadata.times.get(file.window_range(window)).unwrap_or_default().to_vec();
+        let begun = WindowEnd::of_nothing(window);
+        let record = WindowRecord { number: window, window: metadata.windows[window as usize].with(&begun), times };
+        writer.begin_window(record).unwrap();
         let (codec, frames) = (file.codec(window).unwrap(), file.window_range(window));
         let samples = memory.clone().window(frames.start, frames.len()).unwrap();
         for block in 0..file.blocks.len() {
@@ -95,9 +99,7 @@ pub(crate) fn stored_with_a_lie(
             }
             writer.append(&encoded).unwrap();
         }
-        let times = metadata.times.get(frames).unwrap_or_default().to_vec();
-        let record = WindowRecord { number: window, window: metadata.windows[window as usize].clone(), times };
-        writer.end_window(record).unwrap();
+        writer.end_window(&WindowEnd::of(window, &metadata.windows[window as usize])).unwrap();
     }
     writer.finish().unwrap().0
 }

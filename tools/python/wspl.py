@@ -79,7 +79,10 @@ LEAF = Layout(
 
 # Kinds of parts and sections (section 4).
 LEVEL, OUTLIERS, MISSING, EXACT = 0, 1, 2, 3
-KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21}
+KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22}
+
+# What the blocks of a window add up to before the first one: reached, share, squared_error, min, max, then counts.
+NO_BLOCKS = struct.pack("<ddddd", 0, 0, 0, math.inf, -math.inf) + bytes(24)
 
 # Variants, in the order of section 6.
 SAMPLES = ["u8", "i8", "u16", "i16", "u32", "i32", "f16", "f32", "f64"]
@@ -216,7 +219,7 @@ class Window:
     missing: int
     coded: int
     outliers: int
-    bytes: bytes  # the record itself: a window section repeats it
+    bytes: bytes  # the record itself: window section and end repeat it
 
     @staticmethod
     def read(r: Record) -> "Window":
@@ -324,10 +327,15 @@ class Metadata:
         return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(number, self.dims))
 
     def window_section(self, number: int) -> bytes:
-        """The record of a window section: the window's number, the window, then its times."""
+        """The record of a window section: the window's number, the window before its first block, then its times."""
         w = self.windows[number]
         times = self.times[w.first_frame : w.first_frame + w.frames]
-        return struct.pack("<I", number) + w.bytes + struct.pack("<Q", len(times)) + times.tobytes()
+        window = w.bytes[: -len(NO_BLOCKS)] + NO_BLOCKS
+        return struct.pack("<I", number) + window + struct.pack("<Q", len(times)) + times.tobytes()
+
+    def window_end(self, number: int) -> bytes:
+        """The record of a window's end: the window's number, and what its blocks add up to."""
+        return struct.pack("<I", number) + self.windows[number].bytes[-len(NO_BLOCKS) :]
 
 
 def read_bound(r: Record) -> dict:
@@ -985,7 +993,7 @@ class Archive:
     # ---- section 5
 
     def _places(self) -> None:
-        """Leaves, window sections and metadata follow each other without a gap but padding."""
+        """Window sections, blocks, leaves, window's ends and metadata follow each other without a gap but padding."""
         m = self.metadata
         per_channel = -(-m.blocks // BLOCKS_PER_LEAF)
         runs = m.channels * len(m.windows)
@@ -994,10 +1002,11 @@ class Archive:
         at = align(128 + FRAME.size + len(m.start))
         leaves = iter(self.leaves)
         for number in range(len(m.windows)):
+            at = align(at + FRAME.size + len(m.window_section(number)))
             for channel in range(m.channels):
                 for first in range(0, m.blocks, BLOCKS_PER_LEAF):
                     at = self._place(next(leaves), (number, channel, first), at)
-            at = align(at + FRAME.size + len(m.window_section(number)))
+            at = align(at + FRAME.size + len(m.window_end(number)))
         end = self.footer.metadata_offset
         need(at == end, "metadata", f"is not at byte {at}, where what is before ends", end)
 
@@ -1136,14 +1145,17 @@ class Archive:
         at = self._padding(self._repeats(b"STRT", 128, m.start, (0, 0, 0), "start"))
         lost, leaves = 0, iter(range(len(self.leaves)))
         for number in range(len(m.windows)):
+            where = (number, 0, 0)
+            place = f"window section {number}"
+            at = self._padding(self._repeats(b"WNDW", at, m.window_section(number), where, place))
             for _ in range(len(self.leaves) // len(m.windows)):
                 i = next(leaves)
                 for b in self.leaf(i):
                     at = self._check_block(b, at, decode)
                     lost += b.lost
                 at = self._padding(at + FRAME.size + self.leaves[i].stored)
-            place = f"window section {number}"
-            at = self._padding(self._repeats(b"WNDW", at, m.window_section(number), (number, 0, 0), place))
+            place = f"end of window {number}"
+            at = self._padding(self._repeats(b"WEND", at, m.window_end(number), where, place))
         self._padding(f.metadata_offset + FRAME.size + f.metadata_stored)
         self._padding(f.root_offset + FRAME.size + f.root_stored)
         return lost

@@ -54,7 +54,9 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
 
 fn lost(r: &RecoverReport) -> Option<String> {
     let (blocks, behind) = (r.blocks_lost, r.blocks_left_behind);
-    let what = format!("{blocks} blocks are lost, and {behind} of an unfinished window were left behind");
+    let more =
+        if behind > 0 { format!(", and {behind} more of windows that nothing describes") } else { String::new() };
+    let what = format!("{blocks} of {} blocks are lost{more}", r.blocks);
     (blocks + behind > 0).then_some(what)
 }
 
@@ -70,7 +72,7 @@ fn text(r: &RecoverReport) -> String {
         text += &format!("  nothing says how window {window} was coded\n");
     }
     if r.blocks_left_behind > 0 {
-        text += &format!("  left behind: {} blocks of a window that was not finished\n", r.blocks_left_behind);
+        text += &format!("  left behind: {} blocks of later windows that nothing describes\n", r.blocks_left_behind);
     }
     text
 }
