@@ -27,6 +27,8 @@ pub struct RecoverReport {
     pub windows_undescribed: Vec<u32>,
     /// Whole blocks that were left behind, since they are of later windows, of which nothing says how they were coded.
     pub blocks_left_behind: u64,
+    /// Whether it is known that there were no more windows than these.
+    pub all_known: bool,
 }
 
 /// Some blocks of a window, one after another.
@@ -71,5 +73,6 @@ pub fn recover(damaged: &FileBytes, name: &Path, out: impl Write, progress: &dyn
         lost: saved.lost.chunk_by(follows).map(run).collect(),
         windows_undescribed: saved.undescribed,
         blocks_left_behind: saved.left_behind,
+        all_known: saved.all_known,
     })
 }

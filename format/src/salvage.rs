@@ -32,6 +32,8 @@ pub struct Salvage {
     leaves: BTreeMap<BlockId, u64>,
     /// Blocks after the last window that is described.
     left_behind: u64,
+    /// Whether the metadata were found, which say how many windows there are.
+    all_known: bool,
 }
 
 /// What became of a damaged file.
@@ -45,6 +47,8 @@ pub struct Salvaged {
     pub undescribed: Vec<u32>,
     /// Whole blocks that were left behind, since they are of later windows, of which nothing says how they were coded.
     pub left_behind: u64,
+    /// Whether it is known that there were no more windows.
+    pub all_known: bool,
 }
 
 /// What the sections of a file say.
@@ -132,8 +136,8 @@ impl Salvage {
             writer.end_window(&self.end(end))?;
         }
         let (out, summary) = writer.finish()?;
-        let (undescribed, left_behind) = (self.undescribed.clone(), self.left_behind);
-        Ok((out, Salvaged { summary, lost, undescribed, left_behind }))
+        let (undescribed, left_behind, all_known) = (self.undescribed.clone(), self.left_behind, self.all_known);
+        Ok((out, Salvaged { summary, lost, undescribed, left_behind, all_known }))
     }
 
     /// What a window comes to: as it is known, but for what blocks that are lost held; or else as its blocks add up.
@@ -266,7 +270,7 @@ impl Found {
         let id = id.ok_or_else(|| nothing("no section of it is whole"))?;
         let last = blocks.keys().map(|id| id.window).max();
         windows.retain(|number, _| Some(*number) <= last || ends.contains_key(number)); // not one that was just begun
-        let start = metadata.map(|m| m.start()).or(start);
+        let (all_known, start) = (metadata.is_some(), metadata.map(|m| m.start()).or(start));
         let mut all = start.ok_or_else(|| nothing("start and metadata are gone, which say how large the volume is"))?;
         let mut undescribed = Vec::new();
         for (number, record) in windows {
@@ -277,7 +281,7 @@ impl Found {
             return Err(nothing("no window of it was begun"));
         }
         let left_behind = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
-        Ok(Salvage { id, metadata: all, ends, undescribed, blocks, leaves, left_behind })
+        Ok(Salvage { id, metadata: all, ends, undescribed, blocks, leaves, left_behind, all_known })
     }
 }
 

@@ -47,7 +47,12 @@ pub(super) fn read(
     for index in done.before.. {
         let started = Instant::now();
         let known = done.windows.get(index);
-        let Some(window) = reader.next(source, known.map_or(config.window, |w| w.frames as usize))? else { break };
+        let Some(window) = reader.next(source, known.map_or(config.window, |w| w.frames as usize))? else {
+            match known {
+                Some(_) => return Err(reader.ended(done)),
+                None => break,
+            }
+        };
         if let Some(known) = known {
             reader.recognise(window.as_ref(), known, done)?;
             busy += started.elapsed();
@@ -92,6 +97,13 @@ impl WindowReader<'_> {
         Ok(Some(source.window(first, count)?).filter(|window| window.frames() > 0))
     }
 
+    /// The error of a source that has fewer frames than it had.
+    fn ended(&self, done: &Done) -> Error {
+        let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
+        let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
+        Error::Changed { path: done.name.clone(), what }
+    }
+
     /// The source's frame that comes next.
     fn first(&self) -> usize {
         (self.frames - self.before) as usize
@@ -111,7 +123,10 @@ impl WindowReader<'_> {
         let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
         if Some(id) != done.id || seen.digest != known.digest || window.frames() != known.frames as usize {
             let (first, end) = (known.first_frame, known.first_frame + u64::from(known.frames));
-            let what = format!("frames {first}..{end} are not those that were converted before");
+            let what = format!(
+                "frames {first}..{end} are not those that were converted before, of which {} holds the windows",
+                done.name.display()
+            );
             return Err(Error::Changed { path: window.name(0).into(), what });
         }
         self.take_over(known);

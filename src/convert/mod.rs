@@ -41,7 +41,7 @@ use record::Recorder;
 use serde::Serialize;
 pub use settings::{of_file, setting};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use wavesplat_format::{Basis, BlockId, FileId, Metadata, Unfinished, Window};
@@ -291,6 +291,7 @@ struct Done {
     windows: Vec<Window>,
     /// [`Begun::before`]
     before: usize,
+    name: PathBuf,
 }
 
 impl Done {
@@ -300,7 +301,7 @@ impl Done {
         if let Some(what) = settings::difference(&held.start(), &plan.start) {
             return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
         }
-        Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before })
+        Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before, name: name.into() })
     }
 }
 

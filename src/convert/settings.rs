@@ -66,7 +66,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata) -> Option<String> {
         ];
         let ours = OURS.into_iter().chain(["frames", "region"]);
         let settings = ours.map(|name| (name, setting(m, name).unwrap_or("none").to_string()));
-        given.into_iter().chain(settings).collect::<Vec<_>>()
+        settings.chain(given).collect::<Vec<_>>()
     };
     let pairs = of(before).into_iter().zip(of(now));
     let mut differ = pairs.filter(|(before, now)| before != now);

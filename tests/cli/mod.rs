@@ -8,7 +8,9 @@ mod help;
 mod memory;
 mod modes;
 mod pipes;
+mod recover;
 mod render;
+mod resume;
 mod usage;
 
 use std::ffi::OsStr;
@@ -135,6 +137,12 @@ impl Run {
         assert!(!self.out.is_empty(), "{}: nothing on standard output", self.args);
         let found = Self { out: Vec::new(), ..self };
         found.fails(code, words)
+    }
+
+    /// [`Self::fails`] or [`Self::finds`], as the program came to it.
+    #[track_caller]
+    fn fails_or_finds(self, code: i32, words: &[&str]) -> Self {
+        if self.out.is_empty() { self.fails(code, words) } else { self.finds(code, words) }
     }
 
     fn text(&self) -> &str {

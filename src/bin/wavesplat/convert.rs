@@ -166,13 +166,9 @@ pub(crate) fn finish(
     common: &CommonArgs,
     still: &dyn Fn() -> Result<()>,
 ) -> Result<()> {
-    if let Some(begun) = &begun {
-        let (frames, windows) = (begun.unfinished.metadata().frames, begun.unfinished.metadata().windows.len());
-        common.note(format_args!("{}: goes on after {frames} frames in {windows} windows", name.display()));
-    }
     let report = go_on(source, config, begun, name, &mut out, &common.progress("blocks"));
-    let report = report.inspect_err(|_| {
-        if let Some(part) = out.part().filter(|_| out.is_kept()) {
+    let report = report.inspect_err(|error| {
+        if let Some(part) = out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_))) {
             common.note(format_args!("{}: what is finished is kept; --resume goes on with it", part.display()));
         }
     })?;
@@ -296,8 +292,9 @@ fn summary(r: &ConvertReport, bound: Bound) -> String {
         }
     };
     let estimate = r.promise.caution();
+    let before = if r.frames_before > 0 { format!(", {} of them from before", r.frames_before) } else { String::new() };
     format!(
-        "{} frames, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
+        "{} frames{before}, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
         r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample
     )
 }

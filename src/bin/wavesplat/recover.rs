@@ -17,7 +17,8 @@ Examples:
   wavesplat recover run.wspl.part -o run-so-far.wspl
 A new file is written, and the damaged one is not touched. Blocks of which anything is damaged are lost in the new file: they
 are listed here, and whatever reads them says so (--skip-damaged leaves them out). If no block is lost, the new file is the
-one that was damaged, byte for byte. Exit code 3 if anything is lost.")]
+one that was damaged, byte for byte (where the end of a file is gone, some statistics are counted anew). Exit code 3 if anything
+is lost.")]
 pub(crate) struct RecoverArgs {
     /// Damaged or unfinished coefficient file
     file: PathBuf,
@@ -57,7 +58,13 @@ fn lost(r: &RecoverReport) -> Option<String> {
     let more =
         if behind > 0 { format!(", and {behind} more of windows that nothing describes") } else { String::new() };
     let what = format!("{blocks} of {} blocks are lost{more}", r.blocks);
-    (blocks + behind > 0).then_some(what)
+    let end = "its end is gone, and with it all frames after these, if there were any";
+    match (blocks + behind > 0, r.all_known) {
+        (false, true) => None,
+        (false, false) => Some(end.into()),
+        (true, true) => Some(what),
+        (true, false) => Some(format!("{what}; {end}")),
+    }
 }
 
 fn text(r: &RecoverReport) -> String {

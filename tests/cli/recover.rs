@@ -1,0 +1,121 @@
+//! What is whole of a damaged file is saved and shown; what is not is named, and never shown for what it was.
+
+use super::{Archive, Work, floats, read_npy};
+
+/// Five windows of eight frames, in 24 blocks each.
+fn work() -> (Work, Vec<u8>) {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([24, 14, 10], 40).npy());
+    work.wavesplat("convert a.npy -o a.wspl --window 8 --block 6 --tolerance 1e-3").ok();
+    let file = work.read("a.wspl");
+    (work, file)
+}
+
+fn of_place(file: &[u8], tag: &[u8; 4], number: usize) -> usize {
+    file.windows(4).enumerate().filter(|(_, bytes)| bytes == tag).nth(number).unwrap().0
+}
+
+#[test]
+fn without_its_directory_a_file_is_recovered_to_the_same_bytes() {
+    let (work, file) = work();
+    let len = file.len();
+    for cut in [1, 100, 127] {
+        work.write("cut.wspl", &file[..len - cut]);
+        work.wavesplat("recover cut.wspl -o saved.wspl --force").ok();
+        assert!(work.read("saved.wspl") == file, "cut by {cut}");
+    }
+    for (tag, number) in
+        [(b"ROOT", 0), (b"LEAF", 0), (b"LEAF", 4), (b"STRT", 0), (b"WNDW", 2), (b"WEND", 4), (b"BLCK", 50)]
+    {
+        let mut bad = file.clone();
+        bad[of_place(&file, tag, number) + 20] ^= 1; // in the checksum of its frame
+        work.write("bad.wspl", &bad);
+        work.wavesplat("verify bad.wspl").fails_or_finds(3, &["bad.wspl", "byte"]);
+        work.wavesplat("recover bad.wspl -o saved.wspl --force").ok();
+        assert!(work.read("saved.wspl") == file, "{} damaged", String::from_utf8_lossy(tag));
+    }
+    let mut bad = file.clone();
+    bad[..64].fill(0);
+    work.write("bad.wspl", &bad);
+    work.wavesplat("recover bad.wspl -o saved.wspl --force").ok();
+    assert!(work.read("saved.wspl") == file, "without a header, by the footer's id");
+}
+
+#[test]
+fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
+    let (work, file) = work();
+    work.write("half.wspl", &file[..of_place(&file, b"WEND", 1) + 100]);
+    let run = work.wavesplat("recover half.wspl -o saved.wspl").finds(3, &["half.wspl", "its end is gone"]);
+    assert!(run.err.contains("frames after these"));
+    work.wavesplat("verify saved.wspl").ok();
+    work.wavesplat("extract saved.wspl -o saved.raw").ok();
+    work.wavesplat("extract a.wspl -o a.raw --frames 0:16").ok();
+    assert!(work.read("saved.raw") == work.read("a.raw"));
+    work.write("within.wspl", &file[..of_place(&file, b"BLCK", 24 + 20)]);
+    let report =
+        work.wavesplat("recover within.wspl -o within-saved.wspl --json").finds(3, &["4 of 48 blocks are lost"]);
+    assert_eq!(report.args, "recover within.wspl -o within-saved.wspl --json");
+}
+
+#[test]
+fn a_damaged_block_is_lost_and_all_others_are_shown() {
+    let (work, file) = work();
+    let mut bad = file.clone();
+    let at = of_place(&file, b"BLCK", 24 + 7) + 500; // in a part of block 7 of window 1
+    bad[at] ^= 1;
+    work.write("bad.wspl", &bad);
+    work.wavesplat("recover bad.wspl -o saved.wspl").finds(3, &["1 of 120 blocks are lost"]);
+    work.wavesplat("verify saved.wspl").finds(3, &["window 1 block 7", "lost before the file was recovered"]);
+    work.wavesplat("verify bad.wspl").finds(3, &["window 1 block 7", "checksum"]);
+    let shown = |name: &str| {
+        let reading = format!("extract {name} -o out.npy --force");
+        work.wavesplat(&reading).fails(3, &[name, "window 1 block 7"]);
+        work.wavesplat(&format!("{reading} --skip-damaged")).fails(3, &["1 damaged blocks were left out", "block 7"]);
+        floats(&read_npy(&work.read("out.npy")).1)
+    };
+    let (saved, damaged) = (shown("saved.wspl"), shown("bad.wspl"));
+    work.wavesplat("extract a.wspl -o out.npy --force").ok();
+    let whole = floats(&read_npy(&work.read("out.npy")).1);
+    let block = |i: usize| {
+        let (frame, x, y, z) = (i / 3360, i % 24, i / 24 % 14, i / 336 % 10);
+        (8..16).contains(&frame) && (18..24).contains(&x) && (6..12).contains(&y) && z < 6
+    };
+    for (i, v) in whole.iter().enumerate() {
+        for found in [saved[i], damaged[i]] {
+            assert!(
+                if block(i) { found.is_nan() } else { found.to_bits() == v.to_bits() },
+                "sample {i}: {found}, not {v}"
+            );
+        }
+    }
+    for name in ["saved.wspl", "bad.wspl"] {
+        let rendering = format!("{name} --frames 10 --size 40x40 -o out.npy --force --splat-error 0");
+        work.render(&rendering).fails(3, &[name, "window 1 block 7"]);
+        work.render(&format!("{rendering} --skip-damaged")).fails(3, &["1 damaged blocks were left out"]);
+        let skipped = floats(&read_npy(&work.read("out.npy")).1);
+        work.wavesplat("extract bad.wspl -o frames.npy --force --skip-damaged").fails(3, &["left out"]);
+        work.wavesplat("convert frames.npy -o nan.wspl --tolerance 0 --missing mask --force").ok();
+        work.render(&rendering.replace(name, "nan.wspl")).ok();
+        let masked = floats(&read_npy(&work.read("out.npy")).1);
+        let same = |(a, b): (&f32, &f32)| a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-6;
+        assert!(skipped.iter().zip(&masked).all(same), "{name}: as if the block's samples were missing");
+    }
+    work.render("bad.wspl --frames 0 --size 40x40 -o first.npy").ok(); // the block is not in this frame
+}
+
+#[test]
+fn what_no_one_can_save_is_said() {
+    let (work, file) = work();
+    work.write("text.wspl", "hello\n".repeat(1000));
+    work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be saved"]);
+    work.write("start.wspl", &file[..700]);
+    work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be saved"]);
+    let mut newer = file.clone();
+    newer[16] = 1; // a feature of a later version
+    let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();
+    newer[120..128].copy_from_slice(&sum);
+    work.write("newer.wspl", &newer);
+    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 0"]);
+    work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace what is read"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
+}
