@@ -97,8 +97,13 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
 }
 
 /// Packs and compresses a block's content.
-pub(crate) fn encode(id: BlockId, content: &Content, size: usize, compressor: &mut Compressor) -> EncodedBlock {
-    let mut parts = Vec::new();
+pub(crate) fn encode(
+    id: BlockId,
+    content: &Content,
+    geometry: &BlockGeometry<'_>,
+    compressor: &mut Compressor,
+) -> EncodedBlock {
+    let (size, mut parts) = (geometry.sample_size, Vec::new());
     let mut part = |kind, count: usize, energy: f64, largest: f64, raw: &[u8]| {
         let stats = PartStats { count: count as u64, energy, largest };
         parts.push(compressor.part(kind, stats, raw).expect("fits"));
@@ -107,7 +112,10 @@ pub(crate) fn encode(id: BlockId, content: &Content, size: usize, compressor: &m
         let square = |&code: &i32| f64::from(code).powi(2);
         let largest = codes.iter().map(|&code| f64::from(code).abs()).fold(0.0, f64::max);
         let mut raw = Vec::new();
-        pack_codes(codes, &mut raw);
+        match &geometry.window.pyramid {
+            Some(_) => pack_cells(codes, &geometry.boxes(level), &mut raw),
+            None => pack_codes(codes, &mut raw),
+        }
         let count = codes.iter().filter(|&&code| code != 0).count();
         if count > 0 {
             part(PartKind::Level(level), count, codes.iter().map(square).sum(), largest, &raw);
@@ -140,8 +148,9 @@ pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, C
         for channel in 0..metadata.channels {
             for block in 0..metadata.blocks_per_channel() {
                 let id = BlockId { window, block, channel };
-                let content = content(&metadata.geometry(id).expect("in the archive"), &mut random);
-                found.push((encode(id, &content, metadata.sample.size(), &mut compressor), content));
+                let geometry = metadata.geometry(id).expect("in the archive");
+                let content = content(&geometry, &mut random);
+                found.push((encode(id, &content, &geometry, &mut compressor), content));
             }
         }
     }
@@ -149,7 +158,8 @@ pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, C
     found
 }
 
-fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)]) {
+pub(crate) fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)]) {
+    metadata.windows.iter_mut().for_each(|w| (w.coded, w.outliers, w.missing) = (0, 0, 0));
     for (block, _) in blocks {
         let window = &mut metadata.windows[block.id.window as usize];
         for part in &block.parts {
@@ -175,6 +185,15 @@ pub(crate) fn write<'a>(
     metadata: &Metadata,
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
 ) -> Result<(Vec<u8>, Summary)> {
+    write_but(metadata, blocks, None)
+}
+
+/// As [`write`], one of the blocks as lost.
+pub(crate) fn write_but<'a>(
+    metadata: &Metadata,
+    blocks: impl IntoIterator<Item = &'a EncodedBlock>,
+    lost: Option<BlockId>,
+) -> Result<(Vec<u8>, Summary)> {
     let mut writer = Writer::new(Vec::new(), ID, metadata)?;
     writer.begin_window(metadata.record(0))?;
     for block in blocks {
@@ -183,14 +202,20 @@ pub(crate) fn write<'a>(
             writer.end_window(&metadata.end(ended))?;
             writer.begin_window(metadata.record(ended + 1))?;
         }
-        writer.append(block)?;
+        if lost == Some(block.id) { writer.append_lost(block.id)? } else { writer.append(block)? }
     }
     writer.end_window(&metadata.end(metadata.windows.len() as u32 - 1))?;
     writer.finish()
 }
 
-/// Opens a file and reads everything in it.
+/// Opens a file and reads everything in it; [`Error::Lost`] for a lost block.
 pub(crate) fn verify(file: &[u8]) -> Result<Vec<(BlockId, Content)>> {
+    let read = read_all(file)?.into_iter();
+    read.map(|(entry, content)| Ok((entry.id, content.ok_or(Error::Lost(entry.id))?))).collect()
+}
+
+/// Opens a file and reads everything in it; lost blocks have no content.
+pub(crate) fn read_all(file: &[u8]) -> Result<Vec<(BlockEntry, Option<Content>)>> {
     let reader = Reader::open(file)?;
     let mut wrong = Vec::new();
     reader.check_structure(&mut |error| wrong.push(error))?;
@@ -200,8 +225,8 @@ pub(crate) fn verify(file: &[u8]) -> Result<Vec<(BlockId, Content)>> {
             let blocks = reader.leaf(leaf)?;
             reader.check_leaf(leaf, &blocks, &mut |error| wrong.push(error))?;
             for block in blocks {
-                reader.check_parts(&block)?;
-                found.push((block.id, read_content(&reader, &block)?));
+                let content = if block.lost { None } else { Some(read_content(&reader, &block)?) };
+                found.push((block, content));
             }
         }
     }

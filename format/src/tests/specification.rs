@@ -149,7 +149,7 @@ fn the_dump_is_a_file() {
     let outliers = Outliers { positions: vec![5], samples: vec![2, 1] };
     let content = Content { levels, outliers, ..Content::default() };
     let id = BlockId { window: 0, block: 0, channel: 0 };
-    let block = encode(id, &content, 2, &mut Compressor::new(3).expect("level 3"));
+    let block = encode(id, &content, &metadata.geometry(id).expect("there"), &mut Compressor::new(3).expect("level 3"));
     (metadata.windows[0].coded, metadata.windows[0].outliers) = (3, 1);
     let file = file(&metadata, &[(block, content.clone())]);
     assert_eq!(verify(&file).expect("whole"), [(id, content)]);

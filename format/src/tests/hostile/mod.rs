@@ -1,5 +1,9 @@
 //! Whatever the bytes, there is an error or the right answer: no panic, and no read beyond the file.
 
+mod cuts;
+mod fat;
+mod forge;
+
 use crate::footer::{FOOTER, Footer};
 use crate::header::HEADER;
 use crate::section::{Extent, FRAME, Owner, compress_directory, decompress, frame};
