@@ -24,8 +24,8 @@ impl<S: Storage> Reader<S> {
             note(self.check_section(Owner::Window(window), at, &begin), found)?;
             note(self.check_section(Owner::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
-        note(self.check_padding(self.footer.metadata.end()), found)?;
-        note(self.check_padding(self.footer.root.end()), found)
+        note(check_padding(self.storage(), self.footer.metadata.end()), found)?;
+        note(check_padding(self.storage(), self.footer.root.end()), found)
     }
 
     /// Checks the headers of a leaf's blocks, of these entries, and all padding between them.
@@ -37,16 +37,16 @@ impl<S: Storage> Reader<S> {
             let owner = Owner::Block(block.id);
             note(self.check_content(owner, at, &entry), found)?;
             let end = at + block.header_len() + block.stored_len();
-            note(self.check_padding(end), found)?;
+            note(check_padding(self.storage(), end), found)?;
             at = align(end);
         }
-        note(self.check_padding(leaf.extent().end()), found)
+        note(check_padding(self.storage(), leaf.extent().end()), found)
     }
 
     /// Whether a section holds this content, and zeros follow.
     fn check_section(&self, owner: Owner, offset: u64, content: &[u8]) -> Result<()> {
         let end = self.check_content(owner, offset, content)?;
-        self.check_padding(end)
+        check_padding(self.storage(), end)
     }
 
     /// Whether a section holds this content, uncompressed; its end.
@@ -59,17 +59,18 @@ impl<S: Storage> Reader<S> {
         }
         Ok(extent.end())
     }
+}
 
-    /// Whether zeros reach from `from` to the next aligned place.
-    fn check_padding(&self, from: u64) -> Result<()> {
-        let mut padding = [0; ALIGN as usize];
-        let padding = &mut padding[..(align(from) - from) as usize];
-        self.storage().read_at(from, padding)?;
-        if padding.iter().any(|&byte| byte != 0) {
-            return Err(Error::Corrupt { offset: from, place: "padding".into(), what: "not zero".into() });
-        }
-        Ok(())
+/// Whether zeros reach from `from` to the next aligned place.
+pub(crate) fn check_padding(storage: &impl Storage, from: u64) -> Result<()> {
+    let corrupt = |what: &str| Error::Corrupt { offset: from, place: "padding".into(), what: what.into() };
+    let mut padding = [0; ALIGN as usize];
+    let padding = &mut padding[..(align(from) - from) as usize];
+    if align(from) > storage.len() {
+        return Err(corrupt("cut short"));
     }
+    storage.read_at(from, padding)?;
+    if padding.iter().all(|&byte| byte == 0) { Ok(()) } else { Err(corrupt("not zero")) }
 }
 
 /// Passes on what is wrong with the file; an error if the storage failed.

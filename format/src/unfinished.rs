@@ -8,7 +8,8 @@ use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::reader::read_header;
-use crate::section::{Owner, decompress, section_at};
+use crate::section::{Extent, Owner, decompress, section_at};
+use crate::structure::check_padding;
 use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
 use crate::{Error, Result, Storage};
 
@@ -41,7 +42,7 @@ impl Unfinished {
     /// A header or start that is not whole: nothing can be gone on with. Or the storage's.
     pub fn read(storage: &impl Storage) -> Result<Self> {
         let id = read_header(storage)?.id;
-        let (extent, record) = section_at(storage, id, Owner::Start, HEADER as u64, MAX_METADATA)?;
+        let (extent, record) = plain_at(storage, id, Owner::Start, HEADER as u64, MAX_METADATA)?;
         let metadata = Metadata::parse_start(&record).map_err(|what| Owner::Start.corrupt(HEADER as u64, what))?;
         let mut found = Self { id, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
         loop {
@@ -71,13 +72,15 @@ impl Unfinished {
     /// Takes in the next window, if it is whole.
     fn window(&mut self, storage: &impl Storage) -> Result<()> {
         let number = self.metadata.windows.len() as u32;
-        let (begun, record) = section_at(storage, self.id, Owner::Window(number), align(self.end), MAX_METADATA)?;
-        let mut found = Found { at: begun.end(), ..Found::default() };
+        let mut found = Found { at: self.end, ..Found::default() };
+        let at = found.pad(storage)?;
+        let (begun, record) = plain_at(storage, self.id, Owner::Window(number), at, MAX_METADATA)?;
+        found.at = begun.end();
         for (first, count) in leaves_of(&self.metadata, number) {
             found.leaf(storage, self.id, first, count)?;
         }
-        let (owner, at) = (Owner::WindowEnd(number), align(found.at));
-        let (extent, end) = section_at(storage, self.id, owner, at, WINDOW_END)?;
+        let (owner, at) = (Owner::WindowEnd(number), found.pad(storage)?);
+        let (extent, end) = plain_at(storage, self.id, owner, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &found.leaves, self.end))
@@ -93,6 +96,11 @@ impl Unfinished {
 }
 
 impl Found {
+    /// Where the next section begins, after zeros.
+    fn pad(&self, storage: &impl Storage) -> Result<u64> {
+        check_padding(storage, self.at).map(|()| align(self.at))
+    }
+
     /// Takes in the next leaf and its blocks.
     fn leaf(&mut self, storage: &impl Storage, id: FileId, first: BlockId, count: u32) -> Result<()> {
         let mut leaf = LeafEntry::new(first, align(self.at));
@@ -102,7 +110,7 @@ impl Found {
             leaf.add(&entry);
             entries.push(entry);
         }
-        let (owner, at) = (Owner::Leaf(first), align(self.at));
+        let (owner, at) = (Owner::Leaf(first), self.pad(storage)?);
         let (extent, stored) = section_at(storage, id, owner, at, leaf.most_raw())?;
         let most = extent.raw_len as usize <= leaf.most_raw();
         let same = ensure(most, || "too long".into())
@@ -118,7 +126,7 @@ impl Found {
 
     /// Takes in the next block.
     fn block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
-        let (entry, end) = block_at(storage, id, block, align(self.at))?;
+        let (entry, end) = block_at(storage, id, block, self.pad(storage)?)?;
         for part in &entry.parts {
             part.read(storage, id, block)?;
             self.stored += u64::from(part.stored_len);
@@ -128,10 +136,17 @@ impl Found {
     }
 }
 
+/// As [`section_at`], of a section that is not compressed.
+fn plain_at(storage: &impl Storage, file: FileId, owner: Owner, offset: u64, most: usize) -> Result<(Extent, Vec<u8>)> {
+    let (extent, content) = section_at(storage, file, owner, offset, most)?;
+    let same = ensure(extent.raw_len == extent.stored_len, || format!("{} bytes in its frame", extent.raw_len));
+    same.map_err(|what| owner.corrupt(offset, what)).map(|()| (extent, content))
+}
+
 /// The entry in a block's own header at `offset`, and where its parts end; the parts themselves are not read.
 pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
     let owner = Owner::Block(id);
-    let (_, bytes) = section_at(storage, file, owner, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let (_, bytes) = plain_at(storage, file, owner, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
     let mut fields = Fields::new(&bytes);
     let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
         fields.end()?;

@@ -2,6 +2,7 @@
 
 mod cuts;
 mod fat;
+mod flips;
 mod forge;
 
 use crate::footer::{FOOTER, Footer};
