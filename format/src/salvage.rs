@@ -5,7 +5,7 @@ use crate::bytes::{Check, Fields};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
 use crate::footer::FOOTER;
 use crate::header::FileId;
-use crate::leaf::{LeafEntry, leaves_of};
+use crate::leaf::{LeafEntry, MIN_BLOCK, leaves_of};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
 use crate::metadata::Metadata;
 use crate::reader::read_header;
@@ -66,6 +66,9 @@ struct Found {
 /// The tags of sections that are looked for.
 const TAGS: [&[u8; 4]; 6] = [b"STRT", b"WNDW", b"BLCK", b"LEAF", b"WEND", b"META"];
 
+/// How many times the damaged file's bytes the blocks of a new one take at least: records may lie about what was lost.
+const MOST_LOST: u64 = 64;
+
 /// Bytes that are searched at a time.
 const STRETCH: u64 = 1 << 20;
 
@@ -101,7 +104,7 @@ impl Salvage {
             }
             searched(len.min(STRETCH));
         }
-        found.put_together(ids.first().copied().filter(|_| whole))
+        found.put_together(ids.first().copied().filter(|_| whole), storage.len())
     }
 
     /// The metadata of the file that [`Self::write`] makes, but for counts.
@@ -260,7 +263,7 @@ impl Found {
         Ok(true)
     }
 
-    fn put_together(self, id: Option<FileId>) -> Result<Salvage> {
+    fn put_together(self, id: Option<FileId>, len: u64) -> Result<Salvage> {
         let nothing = |what: &str| Error::Invalid(format!("nothing can be saved: {what}"));
         let Self { start, metadata, mut windows, mut ends, blocks, leaves } = self;
         for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
@@ -273,6 +276,12 @@ impl Found {
         let (all_known, start) = (metadata.is_some(), metadata.map(|m| m.start()).or(start));
         let mut all = start.ok_or_else(|| nothing("start and metadata are gone, which say how large the volume is"))?;
         let mut undescribed = Vec::new();
+        let count = windows.last_key_value().map_or(0, |(number, _)| u64::from(*number) + 1);
+        let per_window = u64::from(all.blocks_per_channel()) * u64::from(all.channels);
+        let told = count.saturating_mul(per_window).saturating_mul(MIN_BLOCK);
+        if told > len.saturating_mul(MOST_LOST) {
+            return Err(nothing("it is too short for as many blocks as its records tell of"));
+        }
         for (number, record) in windows {
             bridge(&mut all, &record, &mut undescribed).map_err(|what| nothing(&what))?;
             all.push(record, &WindowEnd::of_nothing(number)).map_err(|what| nothing(&what))?;

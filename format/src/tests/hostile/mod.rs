@@ -177,3 +177,23 @@ fn forged_headers_and_footers_are_safe() {
         assert!(verify(&[&file[..start], &footer[..]].concat()).is_err());
     }
 }
+
+#[test]
+fn windows_that_are_said_to_have_been_lost_take_no_memory() {
+    let fat::Original { file, .. } = fat::lean();
+    let bomb = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
+        (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
+        (forge::Piece::Window, 3) => {
+            bytes[..4].copy_from_slice(&[0xFF; 4]);
+            bytes[4..12].copy_from_slice(&(1u64 << 40).to_le_bytes());
+        }
+        _ => {}
+    });
+    let _ = Salvage::search(&bomb, &mut |_| {});
+    let large = forge::Pieces::new(&file).forge(&mut |piece, _, bytes| {
+        if matches!(piece, forge::Piece::Metadata | forge::Piece::Start) {
+            bytes[..24].copy_from_slice(&[1u64 << 31, 1, 1].map(u64::to_le_bytes).concat());
+        }
+    });
+    assert!(matches!(Salvage::search(&large, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
+}
