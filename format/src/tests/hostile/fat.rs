@@ -133,12 +133,6 @@ fn read_through(file: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// How often a test tries: as told, times `WAVESPLAT_CASES`.
-pub(super) fn cases(count: u64) -> u64 {
-    let times = std::env::var("WAVESPLAT_CASES").ok().and_then(|times| times.parse().ok());
-    count * times.unwrap_or(1)
-}
-
 /// Says what a test tried, and sees to it that this was enough.
 #[allow(clippy::print_stderr, reason = "a table of what was tried is made of these")]
 pub(super) fn tell(suite: &str, tries: u64, intended: u64, began: Instant) {

@@ -25,22 +25,6 @@ pub(crate) enum Piece {
     Footer,
 }
 
-impl Piece {
-    pub(crate) const ALL: [Self; 11] = [
-        Self::Header,
-        Self::Start,
-        Self::Frame,
-        Self::Raw,
-        Self::Stored,
-        Self::Entry,
-        Self::Leaf,
-        Self::Window,
-        Self::Metadata,
-        Self::Root,
-        Self::Footer,
-    ];
-}
-
 /// Changes a piece of a kind and number, counted from 0 in the file.
 pub(crate) type Change<'a> = &'a mut dyn FnMut(Piece, usize, &mut Vec<u8>);
 

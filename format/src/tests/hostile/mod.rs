@@ -2,6 +2,7 @@
 
 mod cuts;
 mod fat;
+mod fields;
 mod flips;
 mod forge;
 
