@@ -1,16 +1,21 @@
 //! The programs as programs: arguments, files, pipes, messages and exit codes.
 
 mod convert;
+mod crowd;
 mod damage;
 mod errors;
 mod extract;
+mod faults;
 mod help;
+mod job;
+mod killed;
 mod memory;
 mod modes;
 mod pipes;
 mod recover;
 mod render;
 mod resume;
+mod streams;
 mod usage;
 
 use std::ffi::OsStr;

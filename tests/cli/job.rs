@@ -1,0 +1,130 @@
+//! A command that is disturbed, what its files may be meanwhile, and how it is brought to its end.
+
+use super::{Archive, Run, Work};
+use std::fs;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+pub(super) struct Job {
+    pub(super) work: Work,
+    pub(super) line: String,
+    /// What completes what a disturbed run left.
+    again: String,
+    /// The first output, if there is one before.
+    before: Option<Vec<u8>>,
+    pub(super) outputs: Vec<(String, Vec<u8>)>,
+    /// What an undisturbed run takes.
+    pub(super) duration: Duration,
+}
+
+pub(super) const FILE: &str = "out.wspl";
+
+impl Job {
+    fn new(work: Work, line: &str, again: &str, outputs: &[&str]) -> Self {
+        let before = fs::read(work.path(outputs[0])).ok();
+        let line = format!("$WAVESPLAT {line}").replace("$WAVESPLAT render", "$RENDER");
+        let job =
+            Self { again: format!("{line} {again}"), work, line, before, outputs: Vec::new(), duration: Duration::MAX };
+        let mut job = job;
+        for _ in 0..2 {
+            outputs.iter().for_each(|name| drop(fs::remove_file(job.work.path(name))));
+            job.put_back();
+            let started = Instant::now();
+            job.run("").ok();
+            job.duration = job.duration.min(started.elapsed());
+        }
+        job.outputs = outputs.iter().map(|name| ((*name).into(), job.work.read(name))).collect();
+        job.reset();
+        job
+    }
+
+    /// A conversion; `input` is `a.npy`, or `-` for what is in it.
+    pub(super) fn convert(archive: &Archive, input: &str, options: &str) -> Self {
+        let work = Work::new();
+        work.write("a.npy", archive.npy());
+        let from = if input == "-" { "< a.npy" } else { "" };
+        Self::new(work, &format!("convert {input} -o {FILE} {options} {from}"), "--resume", &[FILE])
+    }
+
+    /// The last frames added to a file of the first.
+    pub(super) fn append(archive: &Archive, first: usize, options: &str) -> Self {
+        let work = Work::new();
+        let of = |range: std::ops::Range<usize>| {
+            let len = archive.frame_len();
+            let values = archive.values[range.start * len..range.end * len].to_vec();
+            Archive { dims: archive.dims, frames: range.len(), values }.npy()
+        };
+        work.write("a.npy", of(first..archive.frames));
+        work.write("first.npy", of(0..first));
+        work.wavesplat(&format!("convert first.npy -o {FILE} {options}")).ok();
+        let threads = if options.contains("--threads 1") { "--threads 1" } else { "" };
+        Self::new(work, &format!("append {FILE} a.npy {threads}"), "--resume", &[FILE])
+    }
+
+    /// Pictures or samples of a file `a.wspl`.
+    pub(super) fn of_file(archive: &Archive, line: &str, outputs: &[&str]) -> Self {
+        let work = Work::new();
+        work.write("a.npy", archive.npy());
+        work.wavesplat("convert a.npy -o a.wspl --window 4 --tolerance 0.001").ok();
+        Self::new(work, line, "--force", outputs)
+    }
+
+    fn put_back(&self) {
+        if let Some(before) = &self.before {
+            self.work.write(FILE, before);
+        }
+    }
+
+    /// As before any run.
+    pub(super) fn reset(&self) {
+        for (name, _) in &self.outputs {
+            for name in [name.clone(), format!("{name}.part")] {
+                let _ = fs::remove_file(self.work.path(name)); // if it is there
+            }
+        }
+        self.put_back();
+    }
+
+    /// The command with more arguments, after some words for the shell.
+    pub(super) fn command(&self, words: &str, more: &str) -> Command {
+        let mut command = self.work.command("sh");
+        command.args(["-c", &format!("{words} {} {more}", self.line)]);
+        command
+    }
+
+    pub(super) fn run(&self, more: &str) -> Run {
+        Run::of(&self.line, self.command("exec", more).output().unwrap())
+    }
+
+    /// Whether its outputs are all there; each is as before or whole, nothing else.
+    #[track_caller]
+    pub(super) fn is_done(&self) -> bool {
+        let is_whole = |(name, right): &(String, Vec<u8>)| {
+            let found = fs::read(self.work.path(name)).ok();
+            let whole = found.as_ref() == Some(right);
+            assert!(whole || found == self.before, "{}: {name} is neither the old nor the new file", self.line);
+            whole
+        };
+        self.outputs.iter().filter(|output| is_whole(output)).count() == self.outputs.len()
+    }
+
+    /// Brings what was disturbed to its end; what that run said.
+    #[track_caller]
+    pub(super) fn complete(&self) -> Option<Run> {
+        let done = self.is_done();
+        let run = (!done).then(|| self.work.shell(&format!("exec {}", self.again)).ok());
+        assert!(self.is_done(), "{}: completed to other bytes", self.again);
+        let known =
+            |name: &str| self.outputs.iter().any(|(output, _)| output == name) || self.work_files().contains(&name);
+        for name in self.work.names().iter().filter(|name| !known(name)) {
+            // Another name of the finished file is all that a run may leave that died between giving one and taking one.
+            let same = done && name.strip_suffix(".part").is_some_and(known);
+            assert!(same, "{}: left {name}", self.line);
+        }
+        run
+    }
+
+    fn work_files(&self) -> &'static [&'static str] {
+        &["a.npy", "first.npy", "a.wspl"]
+    }
+}

@@ -1,0 +1,103 @@
+//! Programs killed at any time: nothing under a final name but what belongs there, and the same bytes in the end.
+#![cfg(unix)]
+
+use super::Archive;
+use super::job::{FILE, Job};
+use crate::common::random::Random;
+use crate::common::{report, times};
+use std::os::unix::process::ExitStatusExt;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+#[derive(Debug, Default)]
+struct Tally {
+    rounds: usize,
+    kills: usize,
+    /// Kills that the program did not outrun.
+    hits: usize,
+    /// Runs that completed a killed one.
+    resumes: usize,
+    /// Those that found whole windows.
+    went_on: usize,
+    verified: usize,
+}
+
+impl Tally {
+    fn round(&mut self, job: &Job, random: &mut Random) {
+        job.reset();
+        let kills = match random.below(20) {
+            0 | 1 => 3,
+            2..=6 => 2, // the second one during a resume
+            _ => 1,
+        };
+        for kill in 0..kills {
+            self.kill(job, if kill == 0 { "" } else { "--resume" }, job.duration.mul_f64(random.unit()));
+            if job.is_done() {
+                break;
+            }
+            if job.line.contains("append") && self.kills.is_multiple_of(8) {
+                job.work.wavesplat(&format!("verify {FILE} -q")).ok();
+                self.verified += 1;
+            }
+        }
+        let run = job.complete();
+        self.resumes += usize::from(run.is_some());
+        self.went_on += usize::from(run.is_some_and(|run| run.err.contains("goes on after")));
+        self.rounds += 1;
+    }
+
+    fn kill(&mut self, job: &Job, more: &str, after: Duration) {
+        let mut command = job.command("exec", more);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(after);
+        child.kill().unwrap();
+        self.kills += 1;
+        self.hits += usize::from(child.wait().unwrap().signal() == Some(9));
+    }
+
+    fn check(&self, started: Instant, rounds: usize) {
+        report(&format!("{self:?} in {:.1?}", started.elapsed()));
+        assert!(self.rounds >= rounds && self.kills >= rounds);
+        assert!(2 * self.hits > self.kills, "most kills came too late");
+        assert!(4 * self.went_on > self.rounds, "few runs had anything to go on with");
+    }
+}
+
+fn archive() -> Archive {
+    Archive::smooth([26, 24, 20], 40)
+}
+
+fn rounds(jobs: &[Job], rounds: usize, seed: u64) {
+    let (started, mut random, mut tally) = (Instant::now(), Random(seed), Tally::default());
+    for round in 0..rounds * times() {
+        tally.round(&jobs[round % jobs.len()], &mut random);
+    }
+    tally.check(started, rounds * times());
+}
+
+#[test]
+fn a_conversion_killed_at_any_time_is_resumed_to_the_same_bytes() {
+    let jobs = [
+        ("a.npy", "--window 8"),
+        ("a.npy", "--window 4 --threads 1 --basis haar"),
+        ("-", "--window 9 --basis multi --bound rms --memory 64MiB"),
+        ("a.npy", "--window 6 --basis learned --bound relative --floor 0.1"),
+        ("a.npy", "--window 5 --basis pyramid --tolerance 0"),
+        ("a.npy", "--window 8 --basis haar --bound sampled --no-mmap"),
+        ("-", "--window 8 --threads 1 --level 9 --block 16"),
+    ];
+    let jobs = jobs.map(|(input, options)| Job::convert(&archive(), input, options));
+    rounds(&jobs, 210, 1);
+}
+
+#[test]
+fn a_killed_append_leaves_the_file_and_is_resumed_to_the_same_bytes() {
+    let jobs = [
+        (16, "--window 4"),
+        (12, "--window 4 --threads 1 --basis haar"),
+        (9, "--window 9 --basis multi --bound rms"),
+        (13, "--window 5 --basis pyramid --tolerance 0"), // after a window that is short
+    ];
+    let jobs = jobs.map(|(first, options)| Job::append(&archive(), first, options));
+    rounds(&jobs, 90, 2);
+}
