@@ -54,6 +54,11 @@ pub enum Error {
     },
 }
 
+/// Why bytes cannot be read that a file had when it was opened; inside an [`io::Error`].
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("became shorter while it was being read")]
+pub struct BecameShorter;
+
 /// The library's result.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -75,9 +80,12 @@ impl Error {
 
     /// The programs' exit code: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or input changed.
     pub fn exit_code(&self) -> u8 {
+        if let Some(system) = self.system() {
+            let is_shorter = system.get_ref().is_some_and(|inner| inner.is::<BecameShorter>());
+            return if is_shorter { 4 } else { 1 };
+        }
         match self {
             Self::Io { .. } => 1,
-            Self::CoefficientFile { source: wavesplat_format::Error::Io(_), .. } => 1,
             Self::Usage(_) => 2,
             Self::Input { .. } | Self::CoefficientFile { .. } => 3,
             Self::Changed { .. } | Self::BoundMissed { .. } => 4,
@@ -86,11 +94,16 @@ impl Error {
 
     /// Whether the reader of our output went away, which ends a program quietly.
     pub fn is_broken_pipe(&self) -> bool {
+        self.system().is_some_and(|system| system.kind() == io::ErrorKind::BrokenPipe)
+    }
+
+    /// What the system said, if it said anything.
+    fn system(&self) -> Option<&io::Error> {
         match self {
             Self::Io { source, .. } | Self::CoefficientFile { source: wavesplat_format::Error::Io(source), .. } => {
-                source.kind() == io::ErrorKind::BrokenPipe
+                Some(source)
             }
-            _ => false,
+            _ => None,
         }
     }
 }

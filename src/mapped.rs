@@ -6,7 +6,7 @@
 //! call [`explain_sigbus`] so that the user reads which file failed instead of "Bus error".
 #![allow(unsafe_code)]
 
-use crate::error::{Error, Result};
+use crate::error::{BecameShorter, Error, Result};
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::fs::File;
@@ -88,7 +88,10 @@ impl FileBytes {
         };
         match (&self.map, &self.file) {
             (Some(map), _) => out.copy_from_slice(&map.bytes()[offset as usize..end as usize]),
-            (None, Some(file)) => file.read_exact_at(out, offset)?,
+            (None, Some(file)) => file.read_exact_at(out, offset).map_err(|e| match e.kind() {
+                io::ErrorKind::UnexpectedEof => io::Error::new(e.kind(), BecameShorter),
+                _ => e,
+            })?,
             (None, None) => {} // no bytes at all
         }
         self.read.fetch_add(out.len() as u64, Ordering::Relaxed);
