@@ -165,6 +165,7 @@ pub fn verify(
             report.blocks += entries.len() as u64;
             progress.advance(leaf.count.into());
         }
+        frames.map_or(Ok(()), |frames| frames.check_unchanged())?;
     }
     file.check_unchanged()?;
     progress.finish();
