@@ -1,5 +1,6 @@
 //! The programs as programs: arguments, files, pipes, messages and exit codes.
 
+mod ceilings;
 mod convert;
 mod crowd;
 mod damage;
