@@ -9,10 +9,10 @@
 use crate::error::{BecameShorter, Error, Result};
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
@@ -34,14 +34,40 @@ impl Access {
     }
 }
 
-/// An open file, its length and modification time as they were at open.
+/// What tells that a file is still the same, with the same content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct State {
+    /// Length in bytes.
+    pub len: u64,
+    modified: Option<SystemTime>,
+    device: u64,
+    inode: u64,
+}
+
+impl State {
+    fn of(meta: &Metadata) -> Self {
+        Self { len: meta.len(), modified: meta.modified().ok(), device: meta.dev(), inode: meta.ino() }
+    }
+
+    /// An error if a file that was in this state is `now` in another.
+    pub fn check(&self, path: &Path, now: &Self) -> Result<()> {
+        let what = match now {
+            now if now == self => return Ok(()),
+            now if now.len != self.len => format!("{} bytes, now {}", self.len, now.len),
+            now if now.modified != self.modified => "it has a new modification time".into(),
+            _ => "it is another file".into(),
+        };
+        Err(Error::Changed { path: path.into(), what: format!("changed while it was being read: {what}") })
+    }
+}
+
+/// An open file, and its state as it was at open.
 #[derive(Debug)]
 pub struct FileBytes {
     path: PathBuf,
     /// Closed once mapped: an archive may have more files than a process may hold open.
     file: Option<File>,
-    len: u64,
-    modified: Option<SystemTime>,
+    state: State,
     map: Option<RegisteredMap>,
     read: AtomicU64,
 }
@@ -55,13 +81,15 @@ impl FileBytes {
         if !meta.is_file() {
             return Err(Error::input(path, "not a regular file"));
         }
-        let len = meta.len();
+        let state = State::of(&meta);
         let map = match access {
-            Access::Map if len > 0 => Some(RegisteredMap::new(&file, path).map_err(|e| Error::io(path, "mapping", e))?),
+            Access::Map if state.len > 0 => {
+                Some(RegisteredMap::new(&file, path).map_err(|e| Error::io(path, "mapping", e))?)
+            }
             _ => None,
         };
         let file = map.is_none().then_some(file);
-        Ok(Self { path: path.into(), file, len, modified: meta.modified().ok(), map, read: AtomicU64::new(0) })
+        Ok(Self { path: path.into(), file, state, map, read: AtomicU64::new(0) })
     }
 
     /// The path it was opened by.
@@ -71,19 +99,24 @@ impl FileBytes {
 
     /// Length in bytes at open.
     pub fn len(&self) -> u64 {
-        self.len
+        self.state.len
+    }
+
+    /// Its state at open.
+    pub fn state(&self) -> State {
+        self.state
     }
 
     /// Whether the file was empty at open.
     pub fn is_empty(&self) -> bool {
-        self.len == 0
+        self.state.len == 0
     }
 
     /// Copies `out.len()` bytes from `offset`.
     pub fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        let end = offset.checked_add(out.len() as u64).filter(|end| *end <= self.len);
+        let end = offset.checked_add(out.len() as u64).filter(|end| *end <= self.len());
         let Some(end) = end else {
-            let what = format!("bytes {offset}.. +{} lie beyond the end at {}", out.len(), self.len);
+            let what = format!("bytes {offset}.. +{} lie beyond the end at {}", out.len(), self.len());
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, what));
         };
         match (&self.map, &self.file) {
@@ -108,24 +141,16 @@ impl FileBytes {
         self.map.is_some()
     }
 
-    /// An error if the file's length or modification time is no longer what it was at open.
+    /// An error if what has the file's name is no longer in the state that the file had at open.
     pub fn check_unchanged(&self) -> Result<()> {
         let now = self.path.metadata().map_err(|e| Error::io(&self.path, "checking", e))?;
-        if now.len() != self.len {
-            let what = format!("changed while it was being read: {} bytes, now {}", self.len, now.len());
-            return Err(Error::Changed { path: self.path.clone(), what });
-        }
-        if now.modified().ok() != self.modified {
-            let what = "changed while it was being read: it has a new modification time".into();
-            return Err(Error::Changed { path: self.path.clone(), what });
-        }
-        Ok(())
+        self.state.check(&self.path, &State::of(&now))
     }
 }
 
 impl wavesplat_format::Storage for FileBytes {
     fn len(&self) -> u64 {
-        self.len
+        self.state.len
     }
 
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {

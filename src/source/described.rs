@@ -3,7 +3,7 @@
 use super::frames::Shape;
 use super::{Parsed, base64};
 use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
+use crate::mapped::{FileBytes, State};
 use crate::volume::Grid;
 use std::path::PathBuf;
 
@@ -23,8 +23,8 @@ pub(super) struct Files {
 pub(super) struct Part {
     /// The file.
     pub(super) path: PathBuf,
-    /// Its length in bytes when it was checked.
-    pub(super) len: u64,
+    /// Its state when it was checked.
+    pub(super) state: State,
     /// Number of frames.
     pub(super) frames: usize,
     /// Whether its samples have their most significant byte first.

@@ -32,11 +32,11 @@ pub(super) struct Array {
 
 /// Reads the header of one file and checks its size.
 pub(super) fn describe(path: &Path) -> Result<Described> {
-    let len = FileBytes::open(path, Access::Read)?.len();
+    let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let Array { shape, frames, big_endian, start } = read_header(&mut BufReader::with_capacity(256, file), path)?;
-    check_size(len, start, &shape, frames).map_err(|e| Error::input(path, e))?;
-    let part = Part { path: path.into(), len, frames, big_endian, at: At::Byte(start) };
+    check_size(state.len, start, &shape, frames).map_err(|e| Error::input(path, e))?;
+    let part = Part { path: path.into(), state, frames, big_endian, at: At::Byte(start) };
     Ok(Described::plain(shape, vec![part]))
 }
 

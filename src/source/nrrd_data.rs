@@ -28,7 +28,7 @@ pub(super) fn parts(
     let skip = skip(header).map_err(refused)?;
     let part = |data: &FileBytes, start, frames| {
         let at = At::Byte(skip.start(data, start, shape, frames)?);
-        Ok(Part { path: data.path().into(), len: data.len(), frames, big_endian, at })
+        Ok(Part { path: data.path().into(), state: data.state(), frames, big_endian, at })
     };
     let Some(named) = header.get("datafile") else {
         if !header.closed {

@@ -34,12 +34,12 @@ pub(super) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
 /// Checks one file against the options.
 pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
     let (shape, frames) = shape(options)?;
-    let len = FileBytes::open(path, Access::Read)?.len();
+    let state = FileBytes::open(path, Access::Read)?.state();
     let count = frames.unwrap_or(1);
-    check_size(len, options.offset, &shape, count)
-        .map_err(|what| Error::input(path, format!("{what}{}", advice(len, &shape, options))))?;
+    check_size(state.len, options.offset, &shape, count)
+        .map_err(|what| Error::input(path, format!("{what}{}", advice(state.len, &shape, options))))?;
     let at = At::Byte(options.offset);
-    let part = Part { path: path.into(), len, frames: count, big_endian: options.big_endian, at };
+    let part = Part { path: path.into(), state, frames: count, big_endian: options.big_endian, at };
     Ok(Described::plain(shape, vec![part]))
 }
 

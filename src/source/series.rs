@@ -99,10 +99,7 @@ impl Series {
     fn bytes(&self, part: &Part) -> Result<Bytes> {
         let access = if matches!(part.at, At::Byte(_)) { self.access } else { Access::Read };
         let file = FileBytes::open(&part.path, access)?;
-        if file.len() != part.len {
-            let what = format!("had {} bytes when it was first looked at, now {}", part.len, file.len());
-            return Err(Error::Changed { path: part.path.clone(), what });
-        }
+        part.state.check(&part.path, &file.state())?;
         match part.at {
             At::Byte(_) => Ok(Bytes::File(file)),
             At::Base64(place) => {

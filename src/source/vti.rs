@@ -147,7 +147,7 @@ fn appended(file: &FileBytes, array: &Array, tag_end: u64) -> Result<u64> {
 }
 
 fn described(header: &Header, array: &Array, shape: Shape, file: &FileBytes, at: At) -> Described {
-    let part = Part { path: file.path().into(), len: file.len(), frames: 1, big_endian: header.big_endian, at };
+    let part = Part { path: file.path().into(), state: file.state(), frames: 1, big_endian: header.big_endian, at };
     let mut described = Described::plain(shape, vec![part]);
     let shift = if array.of == Association::Cells { 0.5 } else { 0.0 };
     described.spacing = header.spacing;

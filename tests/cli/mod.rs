@@ -12,6 +12,7 @@ mod job;
 mod killed;
 mod memory;
 mod modes;
+mod mutated;
 mod pipes;
 mod recover;
 mod render;

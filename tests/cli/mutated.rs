@@ -1,0 +1,157 @@
+//! Files that others change while they are read: noticed and named, or the result is that of one state of the file.
+#![cfg(unix)]
+
+use super::{Archive, Run, Work};
+use crate::common::random::Random;
+use crate::common::{report, times};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::os::unix::fs::FileExt;
+use std::time::{Duration, Instant};
+
+/// What happens to a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Change {
+    CutInHalf,
+    CutByOne,
+    Emptied,
+    Longer,
+    Overwritten,
+    Replaced,
+    Removed,
+}
+
+const CHANGES: [Change; 7] = [
+    Change::CutInHalf,
+    Change::CutByOne,
+    Change::Emptied,
+    Change::Longer,
+    Change::Overwritten,
+    Change::Replaced,
+    Change::Removed,
+];
+
+impl Change {
+    fn apply(self, work: &Work, name: &str) {
+        let (path, len) = (work.path(name), work.read(name).len() as u64);
+        let file = || File::options().write(true).open(&path).unwrap();
+        match self {
+            Self::CutInHalf => file().set_len(len / 2).unwrap(),
+            Self::CutByOne => file().set_len(len - 1).unwrap(),
+            Self::Emptied => file().set_len(0).unwrap(),
+            Self::Longer => file().write_all_at(b"more", len).unwrap(),
+            // One page, which a reader sees as it was or as it is.
+            Self::Overwritten => file().write_all_at(&[0x3f; 16], len / 2 & !0xfff).unwrap(),
+            Self::Replaced => fs::rename(work.path(format!("other_{name}")), &path).unwrap(),
+            Self::Removed => fs::remove_file(&path).unwrap(),
+        }
+    }
+}
+
+/// What a run said and left.
+#[derive(Debug, PartialEq, Eq)]
+struct Outcome {
+    code: Option<i32>,
+    error: Option<String>,
+    left: Option<Vec<u8>>,
+}
+
+/// A command, the file of it that is changed, and what it writes.
+struct Reading {
+    work: Work,
+    line: String,
+    victim: &'static str,
+    output: Option<&'static str>,
+    kept: BTreeMap<&'static str, Vec<u8>>,
+    duration: Duration,
+}
+
+impl Reading {
+    fn new(line: &str, victim: &'static str, output: Option<&'static str>) -> Self {
+        let (work, archive) = (Work::new(), Archive::smooth([40, 36, 30], 24));
+        let other = Archive { values: archive.values.iter().map(|v| 1.5 - v).collect(), ..archive.clone() };
+        work.write("a.npy", archive.npy());
+        work.write("other_a.npy", other.npy());
+        for name in ["a", "other_a"] {
+            work.wavesplat(&format!("convert {name}.npy -o {name}.wspl --window 4 --tolerance 0.001")).ok();
+        }
+        let names = ["a.npy", "other_a.npy", "a.wspl", "other_a.wspl"];
+        let kept = names.map(|name| (name, work.read(name))).into();
+        let line = format!("exec $WAVESPLAT {line}").replace("$WAVESPLAT render", "$RENDER");
+        Self { work, line, victim, output, kept, duration: Duration::ZERO }
+    }
+
+    fn reset(&self) {
+        for name in self.work.names() {
+            fs::remove_file(self.work.path(name)).unwrap();
+        }
+        self.kept.iter().for_each(|(name, bytes)| self.work.write(name, bytes));
+    }
+
+    /// What the command says and leaves when nothing is changed meanwhile.
+    fn result(&mut self) -> Outcome {
+        let started = Instant::now();
+        let run = self.work.shell(&self.line);
+        self.duration = started.elapsed();
+        self.outcome(run)
+    }
+
+    fn outcome(&self, run: Run) -> Outcome {
+        let left = self.output.and_then(|name| fs::read(self.work.path(name)).ok());
+        Outcome {
+            code: run.code,
+            error: run.err.lines().last().filter(|_| run.code != Some(0)).map(String::from),
+            left,
+        }
+    }
+
+    /// The results of both states of the file.
+    fn results(&mut self, change: Change) -> [Outcome; 2] {
+        self.reset();
+        change.apply(&self.work, self.victim);
+        let after = self.result();
+        self.reset();
+        [self.result(), after]
+    }
+
+    fn disturbed(&self, change: Change, share: f64) -> Outcome {
+        self.reset();
+        let child = self.work.command("sh").args(["-c", &self.line]).spawn().unwrap();
+        std::thread::sleep(self.duration.mul_f64(share));
+        change.apply(&self.work, self.victim);
+        self.outcome(Run::of(&self.line, child.wait_with_output().unwrap()))
+    }
+}
+
+#[test]
+fn what_changes_while_it_is_read_is_noticed_or_makes_no_difference() {
+    let (started, mut random, mut found) = (Instant::now(), Random(5), BTreeMap::new());
+    for (line, victim, output) in [
+        ("convert a.npy -o o.wspl --window 4 --block 16", "a.npy", Some("o.wspl")),
+        ("append other_a.wspl a.npy", "a.npy", None),
+        ("append a.wspl other_a.npy", "a.wspl", None),
+        ("render a.wspl -o o.npy --size 24x24", "a.wspl", Some("o.npy")),
+        ("extract a.wspl -o o.npy", "a.wspl", Some("o.npy")),
+        ("verify a.wspl", "a.wspl", None),
+        ("verify a.wspl --against a.npy", "a.npy", None),
+    ] {
+        let mut readings = ["", "--no-mmap"].map(|access| Reading::new(&format!("{line} {access}"), victim, output));
+        for (i, change) in (0..2).flat_map(|i| CHANGES.map(|change| (i, change))) {
+            let reading = &mut readings[i];
+            let results = reading.results(change);
+            for _ in 0..times() {
+                let run = reading.disturbed(change, random.unit());
+                *found.entry((change, run.code)).or_insert(0) += 1;
+                let what = format!("{} {change:?}: {:?} {:?}", reading.line, run.code, run.error);
+                assert!(results.contains(&run) || noticed(&run, change, victim), "{what}");
+            }
+        }
+    }
+    report(&format!("{found:?} in {:.1?}", started.elapsed()));
+}
+
+/// Whether a run says of the file that it changed or is damaged, and leaves nothing.
+fn noticed(run: &Outcome, change: Change, victim: &str) -> bool {
+    let code = matches!(run.code, Some(3 | 4)) || run.code == Some(1) && change == Change::Removed;
+    code && run.error.as_ref().is_some_and(|error| error.contains(victim)) && run.left.is_none()
+}
