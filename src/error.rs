@@ -81,7 +81,7 @@ impl Error {
     /// The programs' exit code: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or input changed.
     pub fn exit_code(&self) -> u8 {
         if let Some(system) = self.system() {
-            let is_shorter = system.get_ref().is_some_and(|inner| inner.is::<BecameShorter>());
+            let is_shorter = system.get_ref().is_some_and(|inner| inner.downcast_ref::<BecameShorter>().is_some());
             return if is_shorter { 4 } else { 1 };
         }
         match self {

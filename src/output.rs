@@ -144,16 +144,17 @@ impl Output {
         right(&part.path)?;
         part.keep = true; // if its name cannot be given, the work must not be lost
         let doing = || format!("giving the finished {} this name", part.path.display());
-        part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))
+        part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))?;
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let synced = File::open(folder).and_then(|folder| folder.sync_all());
+        synced.map_err(|e| Error::io(&self.path, "it is complete; writing its name to the disk", e))
     }
 }
 
 impl Part {
     /// Opens and locks `NAME.part`; one that nobody holds is left over from a run that died.
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
-        let mut name = OsString::from(path);
-        name.push(".part");
-        let part = PathBuf::from(name);
+        let part = part_of(path);
         let failed = |e| Error::io(path, "creating", e);
         loop {
             let file =
@@ -168,12 +169,10 @@ impl Part {
                 Err(TryLockError::Error(e)) => return Err(failed(e)),
             }
             // Between opening and locking, its last owner may have given the file its final name; or have died before
-            // it took the other one away.
-            let is_at = |path: &Path| {
-                let (file, there) = (file.metadata().ok(), fs::metadata(path).ok());
-                file.zip(there).is_some_and(|(a, b)| (a.dev(), a.ino()) == (b.dev(), b.ino()))
-            };
-            match (is_at(&part), is_at(path)) {
+            // it took this one away from a finished file.
+            let (own, there) = (file.metadata().map_err(failed)?, fs::metadata(&part));
+            let is_there = there.is_ok_and(|there| (there.dev(), there.ino()) == (own.dev(), own.ino()));
+            match (is_there, own.nlink() > 1) {
                 (true, true) => fs::remove_file(&part).map_err(failed)?,
                 (true, false) if path.exists() && !replace => {
                     if file.metadata().is_ok_and(|m| m.len() == 0) {
@@ -204,17 +203,13 @@ impl Part {
 
     fn rename(&self, path: &Path) -> io::Result<()> {
         if self.replace {
-            fs::rename(&self.path, path)?;
-        } else {
-            match fs::hard_link(&self.path, path) {
-                Err(e) if e.kind() != io::ErrorKind::AlreadyExists => fs::rename(&self.path, path)?, // no hard links here
-                Err(e) => return Err(e),
-                Ok(()) => fs::remove_file(&self.path)?,
-            }
+            return fs::rename(&self.path, path);
         }
-        match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => File::open(folder)?.sync_all(),
-            _ => File::open(".")?.sync_all(),
+        match fs::hard_link(&self.path, path) {
+            Ok(()) => fs::remove_file(&self.path),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(e),
+            Err(_) if path.exists() => Err(io::ErrorKind::AlreadyExists.into()),
+            Err(_) => fs::rename(&self.path, path), // no hard links here
         }
     }
 }
@@ -240,6 +235,13 @@ impl Write for Output {
             _ => Ok(()),
         }
     }
+}
+
+/// The name of the unfinished file that is to become `path`.
+pub fn part_of(path: &Path) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(".part");
+    name.into()
 }
 
 fn exists(path: &Path) -> Error {

@@ -7,6 +7,8 @@ use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
 use crate::mapped::{Access, FileBytes};
 use crate::output::Output;
+use crate::scan::scan;
+use crate::source::{Archive, FrameSource};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -107,15 +109,34 @@ pub fn check(part: &Path) -> Result<()> {
     CoefficientFile::open(part, Access::Read)?.check_stored()
 }
 
-/// As [`check`], of a file that may have lost blocks: all but the blocks themselves.
-pub fn check_structure(part: &Path) -> Result<()> {
-    let mut wrong = None;
-    CoefficientFile::open(part, Access::Read)?.check_structure(&mut |error| wrong = wrong.take().or(Some(error)))?;
-    wrong.map_or(Ok(()), Err)
-}
-
 /// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
 pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Option<usize>) -> Result<bool> {
     let file = CoefficientFile::open(path, Access::Read)?;
     Ok(file.metadata().start() == *like && frames.is_none_or(|frames| frames == file.frames()))
+}
+
+/// Whether a file ends with windows of just the frames of `source`, by their digests.
+///
+/// # Errors
+/// Also of a source whose number of frames is not known.
+pub fn ends_with(file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
+    let Archive { grid, sample, frames, .. } = source.archive().clone();
+    let Some(frames) = frames else {
+        let what = "--resume: nothing tells whether a stream was appended already; to append it, leave --resume out";
+        return Err(Error::usage(what));
+    };
+    let (windows, missing_value) = (&file.metadata().windows, file.metadata().missing_value);
+    let first = windows.iter().position(|w| w.first_frame as usize + frames == file.frames());
+    if (first.is_none(), grid.dims, sample) != (false, file.grid.dims, file.sample()) {
+        return Ok(false);
+    }
+    let mut at = 0;
+    for known in &windows[first.unwrap_or(0)..] {
+        let window = source.window(at, known.frames as usize)?;
+        at += known.frames as usize;
+        if scan(window.as_ref(), &grid, sample, missing_value)?.digest != known.digest {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }

@@ -10,6 +10,8 @@ pub(super) struct Job {
     pub(super) line: String,
     /// What completes what a disturbed run left.
     again: String,
+    /// What a run says that went on after no more than there was before.
+    pub(super) before_alone: String,
     /// The first output, if there is one before.
     before: Option<Vec<u8>>,
     pub(super) outputs: Vec<(String, Vec<u8>)>,
@@ -21,10 +23,18 @@ pub(super) const FILE: &str = "out.wspl";
 
 impl Job {
     fn new(work: Work, line: &str, again: &str, outputs: &[&str]) -> Self {
+        let before_alone = ", 0 of them from before".to_string();
         let before = fs::read(work.path(outputs[0])).ok();
         let line = format!("$WAVESPLAT {line}").replace("$WAVESPLAT render", "$RENDER");
-        let job =
-            Self { again: format!("{line} {again}"), work, line, before, outputs: Vec::new(), duration: Duration::MAX };
+        let job = Self {
+            again: format!("{line} {again}"),
+            work,
+            line,
+            before_alone,
+            before,
+            outputs: Vec::new(),
+            duration: Duration::MAX,
+        };
         let mut job = job;
         for _ in 0..2 {
             outputs.iter().for_each(|name| drop(fs::remove_file(job.work.path(name))));
@@ -58,7 +68,8 @@ impl Job {
         work.write("first.npy", of(0..first));
         work.wavesplat(&format!("convert first.npy -o {FILE} {options}")).ok();
         let threads = if options.contains("--threads 1") { "--threads 1" } else { "" };
-        Self::new(work, &format!("append {FILE} a.npy {threads}"), "--resume", &[FILE])
+        let job = Self::new(work, &format!("append {FILE} a.npy {threads}"), "--resume", &[FILE]);
+        Self { before_alone: format!(", {first} of them from before"), ..job }
     }
 
     /// Pictures or samples of a file `a.wspl`.

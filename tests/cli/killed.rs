@@ -1,8 +1,8 @@
 //! Programs killed at any time: nothing under a final name but what belongs there, and the same bytes in the end.
 #![cfg(unix)]
 
-use super::Archive;
 use super::job::{FILE, Job};
+use super::{Archive, Run};
 use crate::common::random::Random;
 use crate::common::{report, times};
 use std::os::unix::process::ExitStatusExt;
@@ -42,7 +42,8 @@ impl Tally {
         }
         let run = job.complete();
         self.resumes += usize::from(run.is_some());
-        self.went_on += usize::from(run.is_some_and(|run| run.err.contains("goes on after")));
+        let more = |run: &Run| run.err.contains("of them from before") && !run.err.contains(&job.before_alone);
+        self.went_on += usize::from(run.is_some_and(|run| more(&run)));
         self.rounds += 1;
     }
 

@@ -32,8 +32,10 @@ fn whole_windows_that_are_appended_are_as_if_converted_at_once() {
         let (work, _) = work();
         work.wavesplat(&format!("convert all.npy -o all.wspl {settings}")).ok();
         work.wavesplat(&format!("convert first.npy -o grown.wspl {settings}")).ok();
-        work.wavesplat("append grown.wspl rest.npy").ok();
+        work.wavesplat("append grown.wspl rest.npy --resume").ok();
         assert!(work.read("grown.wspl") == work.read("all.wspl"), "{settings}");
+        work.wavesplat("append grown.wspl rest.npy --resume").ok();
+        assert!(work.read("grown.wspl") == work.read("all.wspl"), "{settings}, once more");
         let pipe = format!("cat first.npy | $WAVESPLAT convert - -o piped.wspl {settings}");
         work.shell(&pipe).ok();
         work.shell("cat rest.npy | $WAVESPLAT append piped.wspl -").ok();

@@ -70,7 +70,7 @@ fn wherever_a_stream_ends_its_whole_windows_are_kept() {
         let left: &[&str] = if whole > 0 { &["out.wspl.part"] } else { &[] };
         assert_eq!(work.names(), left, "ended at {end}");
         let run = work.piped(&format!("{ARGS} --resume"), &bytes).ok();
-        assert!(whole == 0 || run.err.contains(&format!("goes on after {whole} frames")), "{end}: {}", run.err);
+        assert!(whole == 0 || run.err.contains(&format!(", {whole} of them from before")), "{end}: {}", run.err);
         assert!(work.read("out.wspl") == right, "ended at {end}");
     }
     report(&format!("{} ends in {:.1?}", ends.len(), started.elapsed()));

@@ -7,8 +7,8 @@ use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use wavesplat::convert::{Begun, ConvertConfig, of_file, setting};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::output::STANDARD;
-use wavesplat::resume::{Earlier, open_successor};
+use wavesplat::output::{STANDARD, part_of};
+use wavesplat::resume::{Earlier, ends_with, open_successor};
 
 /// Add later frames to a coefficient file
 #[derive(Debug, Args)]
@@ -28,7 +28,8 @@ pub(crate) struct AppendArgs {
     /// Only these frames of INPUTS: a:b, a:b:step, the end left out
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<FrameRange>,
-    /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
+    /// Go on with what an earlier run of this command left unfinished, if it did, to the same bytes; and do nothing if FILE
+    /// ends with these frames already
     #[arg(long)]
     resume: bool,
     /// Begin anew, whatever an earlier run left unfinished
@@ -54,6 +55,10 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));
     }
     spare_inputs(&args.inputs, &args.file)?;
+    if args.resume && !part_of(&args.file).exists() && ends_with(&file, source.as_mut())? {
+        args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
+        return Ok(());
+    }
     let (out, unfinished) = open_successor(&file, Earlier::by(args.force, args.resume))?;
     let begun = Begun { unfinished, before: file.metadata().windows.len() };
     finish(source.as_mut(), &config, Some(begun), &args.file, out, &args.common, &|| file.check_unchanged())

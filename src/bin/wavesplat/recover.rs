@@ -41,7 +41,7 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
     spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
     let report = recover(&damaged, &args.output, &mut out, &args.common.progress("blocks"))?;
-    out.commit_if(resume::check_structure)?;
+    out.commit_if(resume::check)?;
     let to_stdout = args.output == Path::new(STANDARD);
     if !args.common.json && !args.common.quiet {
         if to_stdout { args.common.note(text(&report).trim_end()) } else { print(&text(&report))? }
