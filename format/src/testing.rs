@@ -185,16 +185,17 @@ pub(crate) fn write<'a>(
     metadata: &Metadata,
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
 ) -> Result<(Vec<u8>, Summary)> {
-    write_but(metadata, blocks, None)
+    write_but(metadata, blocks, ID, None)
 }
 
-/// As [`write`], one of the blocks as lost.
+/// As [`write`], as the file `id`, one of the blocks as lost.
 pub(crate) fn write_but<'a>(
     metadata: &Metadata,
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
+    id: FileId,
     lost: Option<BlockId>,
 ) -> Result<(Vec<u8>, Summary)> {
-    let mut writer = Writer::new(Vec::new(), ID, metadata)?;
+    let mut writer = Writer::new(Vec::new(), id, metadata)?;
     writer.begin_window(metadata.record(0))?;
     for block in blocks {
         let ended = writer.metadata().windows.len() as u32;

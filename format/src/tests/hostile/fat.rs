@@ -34,7 +34,7 @@ fn original(dims: [u64; 3], channels: u16, seed: u64) -> Original {
     let lost = blocks[1].0.id;
     blocks[1].0.parts.clear();
     count(&mut metadata, &blocks);
-    let (file, _) = write_but(&metadata, blocks.iter().map(|(block, _)| block), Some(lost)).expect("complete");
+    let (file, _) = write_but(&metadata, blocks.iter().map(|(block, _)| block), ID, Some(lost)).expect("complete");
     let read = read_all(&file).expect("whole");
     let blocks = read.into_iter().map(|block| (block.0.id, block)).collect();
     Original { blocks, file, metadata, checked: RefCell::default() }

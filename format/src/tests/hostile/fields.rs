@@ -15,7 +15,7 @@ fn sections(file: &[u8], tag: &[u8; 4]) -> Vec<std::ops::Range<usize>> {
 }
 
 fn is_section(bytes: &[u8]) -> bool {
-    [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"META", b"ROOT"].iter().any(|tag| bytes.starts_with(&tag[..]))
+    [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"WEND", b"META", b"ROOT"].iter().any(|tag| bytes.starts_with(&tag[..]))
 }
 
 /// The file with its length in the footer as it is.
@@ -41,7 +41,7 @@ fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
         }
     };
     let file = &original.file;
-    for tag in [b"BLCK", b"LEAF", b"WNDW"] {
+    for tag in [b"BLCK", b"LEAF", b"WNDW", b"WEND"] {
         let all = sections(file, tag);
         for (number, a) in all.iter().enumerate() {
             let (before, own, after) = (&file[..a.start], &file[a.clone()], &file[a.end..]);
@@ -66,7 +66,7 @@ fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
 fn sections_of_another_file_that_claims_the_same_identity_are_refused() {
     let (Original { file, .. }, other, began) = (fat(), strange(ID), Instant::now());
     let mut tries = 0;
-    for tag in [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"META", b"ROOT"] {
+    for tag in [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"WEND", b"META", b"ROOT"] {
         for (own, foreign) in sections(&file, tag).into_iter().zip(sections(&other, tag)) {
             if file[own.clone()] != other[foreign.clone()] {
                 let spliced = resized([&file[..own.start], &other[foreign], &file[own.end..]].concat());
@@ -82,16 +82,7 @@ fn sections_of_another_file_that_claims_the_same_identity_are_refused() {
 fn strange(id: FileId) -> Vec<u8> {
     let mut metadata = fat().metadata;
     let blocks = blocks(&mut metadata, 99);
-    let mut writer = Writer::new(Vec::new(), id, &metadata).expect("memory");
-    for (block, _) in &blocks {
-        let ended = writer.metadata().windows.len() as u32;
-        if block.id.window > ended {
-            writer.end_window(metadata.record(ended)).expect("whole");
-        }
-        writer.append(block).expect("in order");
-    }
-    writer.end_window(metadata.record(3)).expect("whole");
-    writer.finish().expect("complete").0
+    write_but(&metadata, blocks.iter().map(|(block, _)| block), id, None).expect("complete").0
 }
 
 /// Entries of a leaf, or of the root, in other places; the leaf's blocks themselves are where they were.

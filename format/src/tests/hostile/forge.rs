@@ -19,6 +19,7 @@ pub(crate) enum Piece {
     /// The raw bytes of a leaf.
     Leaf,
     Window,
+    End,
     Metadata,
     /// The raw bytes of the root.
     Root,
@@ -47,6 +48,7 @@ enum Section {
     Block(Block),
     Leaf(Packed),
     Window(Vec<u8>),
+    End(Vec<u8>),
     Metadata(Vec<u8>),
     Root(Packed),
 }
@@ -111,7 +113,7 @@ impl Pieces {
 
     /// The file with changes.
     pub(crate) fn forge(&self, change: Change<'_>) -> Vec<u8> {
-        let mut forger = Forger { pieces: self, change, counts: [0; 11], out: Vec::new(), leaves: Vec::new() };
+        let mut forger = Forger { pieces: self, change, counts: [0; 12], out: Vec::new(), leaves: Vec::new() };
         let mut header = self.header.clone();
         forger.change(Piece::Header, &mut header);
         let sum = xxh3_64(&header[..header.len().min(120)]);
@@ -143,6 +145,7 @@ fn section(bytes: &[u8], sections: &mut Vec<Section>) -> usize {
         }
         b"LEAF" => Section::Leaf(packed(stored, raw_len)),
         b"WNDW" => Section::Window(stored.to_vec()),
+        b"WEND" => Section::End(stored.to_vec()),
         b"META" => Section::Metadata(stored.to_vec()),
         _ => Section::Root(packed(stored, raw_len)),
     });
@@ -153,7 +156,7 @@ fn section(bytes: &[u8], sections: &mut Vec<Section>) -> usize {
 struct Forger<'a, 'b> {
     pieces: &'a Pieces,
     change: Change<'b>,
-    counts: [usize; 11],
+    counts: [usize; 12],
     out: Vec<u8>,
     /// The root's entries.
     leaves: Vec<u8>,
@@ -175,6 +178,7 @@ impl Forger<'_, '_> {
             Section::Block(block) => self.block(block, blocks),
             Section::Leaf(leaf) => self.leaf(leaf, blocks),
             Section::Window(record) => drop(self.record(Piece::Window, record, 21, u32_at(record, 0))),
+            Section::End(record) => drop(self.record(Piece::End, record, 22, u32_at(record, 0))),
             Section::Metadata(record) => put(footer, 24, &self.record(Piece::Metadata, record, 18, 0)),
             Section::Root(root) => put(footer, 48, &self.root(root)),
         }
@@ -186,7 +190,7 @@ impl Forger<'_, '_> {
         self.change(piece, &mut record);
         let mut owner = [0; 10];
         put(&mut owner, 0, &window.to_le_bytes());
-        let tag = [b"META", b"ROOT", b"STRT", b"WNDW"][usize::from(kind - 18)];
+        let tag = [b"META", b"ROOT", b"STRT", b"WNDW", b"WEND"][usize::from(kind - 18)];
         self.put_section(tag, &owner, kind, &record, record.len())
     }
 
