@@ -1,0 +1,189 @@
+//! Whole files: as they are, with forged checksums, cut, damaged.
+
+use super::forge::edits;
+use super::input::Input;
+use super::seeds::seed;
+use std::io::Write;
+use std::path::Path;
+use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::file::CoefficientFile;
+use wavesplat::mapped::Access;
+use wavesplat::progress::Silent;
+use wavesplat::volume::Region;
+use wavesplat_format::*;
+
+/// Bytes once decompressed that are read of a file, and blocks.
+const MOST_RAW: u64 = 16 << 20;
+const MOST_BLOCKS: u64 = 4096;
+
+/// A file as it is.
+pub fn file(data: &[u8]) {
+    let _ = read_all(data);
+}
+
+/// A record of metadata: what is read is written as it was.
+pub fn metadata(data: &[u8]) {
+    let Ok(metadata) = Metadata::decode(data) else { return };
+    assert_eq!(metadata.encode().expect("it was read"), data);
+    let start = metadata.start();
+    assert!(start.validate().is_ok() && start.frames == 0);
+    assert!(metadata.block_box(metadata.blocks_per_channel()).is_none());
+    for block in [0, metadata.blocks_per_channel() / 2, metadata.blocks_per_channel() - 1] {
+        let id = BlockId { window: metadata.windows.len() as u32 - 1, block, channel: metadata.channels - 1 };
+        let geometry = metadata.geometry(id).expect("a block of the archive");
+        let (first, size) = metadata.block_box(block).expect("a block of the archive");
+        assert!((0..3).all(|axis| size[axis] > 0 && first[axis] + size[axis] <= metadata.dims[axis]));
+        assert!(geometry.samples() as u64 <= limits::MAX_BLOCK_SAMPLES);
+        for level in 0..geometry.window.parts() as u8 {
+            assert!(geometry.codes(level).is_some_and(|codes| codes as u64 <= limits::MAX_BLOCK_SAMPLES));
+            geometry.max_raw_len(PartKind::Level(level));
+        }
+    }
+}
+
+/// A sound file with changes and checksums that fit, read by the format's package.
+pub fn forged(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (sound, seed) = seed(input.byte());
+    let edits = edits(&mut input);
+    let forged = seed.forge(&edits);
+    let read = read_all(&forged);
+    if edits.is_empty() {
+        assert!(forged == sound && read.is_ok(), "nothing was changed: {read:?}");
+    }
+}
+
+/// The same, decoded to samples by the library: some frames of all voxels, and one voxel of all frames.
+pub fn decode(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (_, seed) = seed(input.byte());
+    let file = seed.forge(&edits(&mut input));
+    with_file(&file, |path| {
+        let Ok(file) = CoefficientFile::open(path, Access::Read) else { return };
+        let long = |window: &Window| window.frames.max(window.coefficients) > 64;
+        let voxels = file.grid.dims.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).unwrap_or(usize::MAX);
+        if file.largest_block() > 1 << 16 || voxels > 1 << 16 || file.metadata().windows.iter().any(long) {
+            return; // takes long, for good reason
+        }
+        let whole = file.grid.whole();
+        let corner = Region { start: whole.end.map(|end| end - 1), end: whole.end };
+        for (frames, region) in [(file.frames().min(9), whole), (file.frames().min(999), corner)] {
+            let config = ExtractConfig { frames: (0..frames).collect(), region, memory: 256 << 20 };
+            let mut out = Vec::new();
+            if extract(&file, &config, path, &mut out, &Silent).is_ok() {
+                assert_eq!(out.len(), frames * region.voxels() * file.sample().size());
+            }
+        }
+    });
+}
+
+/// A file that was cut, or whose end is something else: what is whole of it is gone on with to a sound file.
+pub fn unfinished(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (_, seed) = seed(input.byte());
+    let cut = input.short();
+    let mut file = seed.forge(&edits(&mut input));
+    file.truncate(cut * 64); // all that matters begins there
+    let Ok(found) = Unfinished::read(&file) else { return };
+    let (end, frames) = (found.bytes() as usize, found.metadata().frames);
+    assert!(end <= file.len());
+    file.truncate(end);
+    assert_eq!(Unfinished::read(&file).map(|again| again.bytes()).ok(), Some(end as u64), "the same without the rest");
+    let metadata = found.metadata().clone();
+    let written = Writer::go_on(file, found).finish();
+    assert_eq!(written.is_ok(), frames > 0);
+    if let Ok((file, summary)) = written {
+        assert_eq!(summary.bytes, file.len() as u64);
+        let reader = Reader::open(&file).expect("it was just finished");
+        assert!(reader.metadata() == &metadata);
+    }
+}
+
+/// A damaged file: what is saved is a file, and of a sound one that was damaged it is what it was.
+pub fn salvage(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (sound, seed) = seed(input.byte());
+    let forge = input.below(2) == 1;
+    let damage = input.below(8);
+    let mut file = sound.to_vec();
+    let mut damages: Vec<[usize; 4]> = (0..damage)
+        .map(|_| [input.below(5), 16 * input.short() + input.below(16), input.short(), input.short()])
+        .collect();
+    if forge {
+        file = seed.forge(&edits(&mut input));
+    }
+    damages.drain(..).for_each(|how| hurt(&mut file, how));
+    let mut searched = 0;
+    let Ok(salvage) = Salvage::search(&file, &mut |bytes| searched += bytes) else { return };
+    assert_eq!(searched, file.len() as u64);
+    if salvage.metadata().blocks() > MOST_BLOCKS {
+        return; // all of them would be written as lost
+    }
+    let saved = salvage.write(&file, Vec::new(), &mut || ());
+    if forge {
+        saved.map(|(file, _)| Reader::open(&file).map(drop).expect("what was saved is a file")).unwrap_or_default();
+        return;
+    }
+    let (file, saved) = saved.expect("what was sound can be saved");
+    is_part_of(&file, sound, &saved);
+}
+
+/// Damages a file: bits, a hole, bytes that were left out, put in or brought from elsewhere.
+fn hurt(file: &mut Vec<u8>, [how, at, len, more]: [usize; 4]) {
+    let at = at % (file.len() + 1);
+    let end = (at + len).min(file.len());
+    match how {
+        0 => file.iter_mut().skip(at).take(1).for_each(|byte| *byte ^= 1 << (len % 8)),
+        1 => file[at..end].fill(0),
+        2 => drop(file.drain(at..end)),
+        3 => drop(file.splice(at..at, std::iter::repeat_n(0xAA, len % 1000))),
+        _ => {
+            let from = (64 * more) % (file.len() + 1);
+            let piece = file[from..(from + len).min(file.len())].to_vec();
+            file.splice(at..at, piece);
+        }
+    }
+}
+
+/// Whether every block that was saved is as it was.
+fn is_part_of(file: &[u8], sound: &[u8], saved: &Salvaged) {
+    read_all(file).expect("what was saved is sound");
+    let (new, old) = (Reader::open(file).expect("sound"), Reader::open(sound).expect("sound"));
+    assert!(new.metadata().dims == old.metadata().dims && new.metadata().frames <= old.metadata().frames);
+    assert!(!saved.lost.is_empty() || new.metadata().frames < old.metadata().frames || file == sound);
+    for leaf in (0..new.metadata().windows.len() as u32).flat_map(|window| new.leaves(window)) {
+        for block in new.leaf(leaf).expect("sound").iter().filter(|block| !block.lost) {
+            let other = old.entry(block.id).expect("sound");
+            assert!(block.stats == other.stats && block.parts.len() == other.parts.len(), "{}", block.id);
+            for (part, other_part) in block.parts.iter().zip(&other.parts) {
+                assert_eq!(new.part(block, part).expect("sound"), old.part(&other, other_part).expect("sound"));
+            }
+        }
+    }
+}
+
+/// Reads all of a file that is not too much; the first thing that is wrong, but for lost blocks.
+pub fn read_all(file: &[u8]) -> Result<()> {
+    let reader = Reader::open(file)?;
+    let (mut wrong, mut left) = (Vec::new(), MOST_RAW);
+    reader.check_structure(&mut |error| wrong.push(error))?;
+    for leaf in (0..reader.metadata().windows.len() as u32).flat_map(|window| reader.leaves(window)) {
+        let blocks = reader.leaf(leaf)?;
+        reader.check_leaf(leaf, &blocks, &mut |error| wrong.push(error))?;
+        for block in blocks.iter().filter(|block| !block.lost) {
+            let samples = reader.geometry(block.id)?.samples() as u64;
+            let raw = block.parts.iter().map(|part| u64::from(part.raw_len) + 4 * samples).sum();
+            let Some(less) = left.checked_sub(raw) else { return Ok(()) };
+            left = less;
+            reader.check_parts(block)?;
+        }
+    }
+    wrong.into_iter().next().map_or(Ok(()), Err)
+}
+
+/// Gives the path of a temporary file that holds some bytes.
+pub fn with_file<T>(bytes: &[u8], run: impl FnOnce(&Path) -> T) -> T {
+    let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
+    file.write_all(bytes).expect("writing a temporary file");
+    run(file.path())
+}

@@ -1,0 +1,90 @@
+//! What is inside a part once it is decompressed: what unpacks packs to the same bytes, what is packed unpacks.
+
+use super::input::Input;
+use wavesplat_format::*;
+
+/// Codes of coefficients: as payload of at most 65535 codes, and as codes to pack.
+pub fn codes(data: &[u8]) {
+    let mut input = Input::new(data);
+    let mut codes = vec![-1; input.short()];
+    let mut again = Vec::new();
+    if let Ok(count) = unpack_codes(input.rest(), &mut codes) {
+        assert_eq!(count, nonzero(&codes));
+        pack_codes(&codes, &mut again);
+        assert_eq!(again, input.rest(), "packs to what it was");
+    }
+    let codes = numbers(input.rest());
+    let (mut raw, mut back) = (Vec::new(), vec![-1; codes.len()]);
+    pack_codes(&codes, &mut raw);
+    assert_eq!(unpack_codes(&raw, &mut back), Ok(nonzero(&codes)));
+    assert_eq!(back, codes);
+}
+
+/// Codes on lattices, of at most 3 boxes with at most 12 codes along an axis.
+pub fn cells(data: &[u8]) {
+    let mut input = Input::new(data);
+    let mut extents = |_| [(); 4].map(|()| input.below(13));
+    let boxes: Vec<[usize; 4]> = (0..3).map(&mut extents).filter(|extents| !extents.contains(&0)).collect();
+    let volume = boxes.iter().map(|extents| extents.iter().product::<usize>()).sum();
+    let mut codes = vec![-1; volume];
+    if let Ok(count) = unpack_cells(input.rest(), &boxes, &mut codes) {
+        assert_eq!(count, nonzero(&codes));
+        cells_round_trip(&codes, &boxes);
+    }
+    let mut codes = numbers(input.rest());
+    codes.resize(volume, 0);
+    cells_round_trip(&codes, &boxes);
+}
+
+fn cells_round_trip(codes: &[i32], boxes: &[[usize; 4]]) {
+    let (mut raw, mut back) = (Vec::new(), vec![-1; codes.len()]);
+    pack_cells(codes, boxes, &mut raw);
+    assert!(raw.len() <= max_packed(boxes), "{} bytes of {boxes:?}", raw.len());
+    estimate_cells(codes, boxes);
+    assert_eq!(unpack_cells(&raw, boxes, &mut back), Ok(nonzero(codes)));
+    assert_eq!(back, codes);
+}
+
+/// Outliers, missing and exact samples of a block of at most 65535 samples.
+pub fn payloads(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (size, total) = (input.pick(&[1, 2, 4, 8]), input.short());
+    let (raw, mut again) = (input.rest(), Vec::new());
+    if let Ok(outliers) = unpack_outliers(raw, size, total) {
+        assert!(outliers.positions.is_sorted_by(|a, b| a < b));
+        assert!(outliers.positions.iter().all(|&at| (at as usize) < total));
+        pack_outliers(&outliers, size, &mut again);
+        assert_eq!(again, raw, "outliers");
+    }
+    if let Ok((mask, samples)) = unpack_missing(raw, size, total) {
+        assert_eq!(mask.len(), total);
+        again.clear();
+        pack_missing(&mask, &samples, size, &mut again);
+        assert_eq!(again, raw, "missing samples");
+    }
+    if let Ok(samples) = unpack_exact(raw, size, total) {
+        again.clear();
+        pack_exact(&samples, size, &mut again);
+        assert_eq!(again, raw, "exact samples");
+    }
+}
+
+fn nonzero(codes: &[i32]) -> usize {
+    codes.iter().filter(|&&code| code != 0).count()
+}
+
+/// Most codes are small: a byte each, but 128, after which four bytes are one.
+fn numbers(data: &[u8]) -> Vec<i32> {
+    let (mut input, mut codes) = (Input::new(data), Vec::new());
+    while !input.is_empty() {
+        codes.push(match input.byte() as i8 {
+            i8::MIN => {
+                let mut code = [0; 4];
+                input.bytes(4).iter().zip(&mut code).for_each(|(from, to)| *to = *from);
+                i32::from_le_bytes(code)
+            }
+            small => small.into(),
+        });
+    }
+    codes
+}

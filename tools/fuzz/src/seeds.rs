@@ -1,0 +1,23 @@
+//! Small sound files that are changed and damaged, one of each way in which blocks are coded.
+
+use super::forge::Seed;
+use std::sync::OnceLock;
+
+/// Their names and bytes, as `tools/tests/fuzz.rs` makes them.
+pub const SEEDS: [(&str, &[u8]); 7] = [
+    ("haar", include_bytes!("../seeds/haar.wspl")),
+    ("multi", include_bytes!("../seeds/multi.wspl")),
+    ("learned", include_bytes!("../seeds/learned.wspl")),
+    ("pyramid", include_bytes!("../seeds/pyramid.wspl")),
+    ("exact", include_bytes!("../seeds/exact.wspl")),
+    ("channels", include_bytes!("../seeds/channels.wspl")),
+    ("leaves", include_bytes!("../seeds/leaves.wspl")),
+];
+
+/// A file by its number, modulo how many there are.
+pub fn seed(number: u8) -> (&'static [u8], &'static Seed) {
+    static TAKEN_APART: [OnceLock<Seed>; SEEDS.len()] = [const { OnceLock::new() }; SEEDS.len()];
+    let number = usize::from(number) % SEEDS.len();
+    let file = SEEDS[number].1;
+    (file, TAKEN_APART[number].get_or_init(|| Seed::new(file)))
+}

@@ -1,0 +1,106 @@
+//! Frames as others wrote them: streams and files.
+
+use super::input::Input;
+use std::io::Cursor;
+use std::path::Path;
+use wavesplat::mapped::Access;
+use wavesplat::sample::{SampleType, swap_endian};
+use wavesplat::source::{FrameSource, OpenOptions, open, open_stream};
+
+/// Bytes of a frame that are read; larger ones are opened only.
+const MOST: usize = 1 << 20;
+
+/// A stream: an `.npy`, or headerless samples. What is read is what is in it.
+pub fn stream(data: &[u8]) {
+    let mut input = Input::new(data);
+    let flags = input.byte();
+    let mut options = OpenOptions { memory: if flags & 2 == 0 { 64 } else { MOST }, ..OpenOptions::default() };
+    if flags & 1 != 0 {
+        headerless(&mut input, &mut options);
+    }
+    let bytes = input.rest();
+    let Ok(mut source) = open_stream(Cursor::new(bytes.to_vec()), &options) else { return };
+    let Some(found) = read(&mut *source) else { return };
+    if options.sample.is_some() {
+        let skipped = &bytes[options.offset as usize..];
+        same(&found, &skipped[..found.len()], options.big_endian, source.archive().sample);
+    } else {
+        let big_endian = npy_is_big_endian(bytes);
+        same(&found, &bytes[bytes.len() - found.len()..], big_endian, source.archive().sample);
+    }
+}
+
+fn headerless(input: &mut Input<'_>, options: &mut OpenOptions) {
+    let dims = [(); 3].map(|()| input.below(9));
+    let frames = Some(input.below(9)).filter(|frames| *frames > 0);
+    options.dims = Some(dims.into_iter().chain(frames).collect());
+    options.sample = Some(input.pick(&SampleType::ALL));
+    options.big_endian = input.below(2) == 1;
+    options.offset = input.byte().into();
+}
+
+/// By the first sign of a byte order, which the type is said with.
+fn npy_is_big_endian(bytes: &[u8]) -> bool {
+    bytes.iter().find(|byte| b"<>|=".contains(byte)) == Some(&b'>')
+}
+
+fn same(found: &[u8], stored: &[u8], big_endian: bool, sample: SampleType) {
+    let mut stored = stored.to_vec();
+    if big_endian {
+        swap_endian(sample, &mut stored);
+    }
+    assert_eq!(found, stored, "samples");
+}
+
+/// All frames, three at a time; none if a frame is too large or cannot be read.
+fn read(source: &mut dyn FrameSource) -> Option<Vec<u8>> {
+    let region = source.archive().grid.whole();
+    let frame = region.voxels().checked_mul(source.archive().sample.size()).filter(|bytes| *bytes <= MOST)?;
+    let mut found = Vec::new();
+    for first in (0..).step_by(3) {
+        let left = source.archive().frames.map_or(3, |all| all - first).min(3);
+        let window = source.window(first, left).ok()?;
+        for index in 0..window.frames() {
+            let mut out = vec![0; frame];
+            window.read_box(index, &region, &mut out).expect("a frame that is there");
+            found.extend(out);
+        }
+        if window.frames() < 3 || source.archive().frames == Some(first + 3) || found.len() > 16 * MOST {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// An input file by its name, beside another with a little data.
+pub fn inputs(data: &[u8]) {
+    let mut input = Input::new(data);
+    let name = input.pick(&["a.nrrd", "a.nhdr", "a.vti", "a.pvd", "a.npy"]);
+    let variable = (input.below(8) == 7).then(|| "a".to_string());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("writing a temporary file");
+        path
+    };
+    write("b.raw", &[7; 96]);
+    write("b.npy", NPY);
+    let path = write(name, input.rest());
+    let options = OpenOptions { access: Access::Read, variable, ..OpenOptions::default() };
+    describe(&path, &options);
+}
+
+fn describe(path: &Path, options: &OpenOptions) {
+    let Ok(mut source) = open(&[path.to_path_buf()], options) else { return };
+    let archive = source.archive();
+    let frames = archive.frames.expect("files have a known number of frames");
+    assert!(frames > 0 && !archive.grid.whole().is_empty());
+    assert!(archive.times.is_empty() || archive.times.len() == frames);
+    assert!(archive.grid.spacing.iter().all(|s| s.is_finite() && *s > 0.0));
+    if frames < 1000 {
+        read(&mut *source);
+    }
+}
+
+/// One voxel of 2 bytes.
+pub const NPY: &[u8] = b"\x93NUMPY\x01\x00\x3e\x00{'descr':'|u1', 'fortran_order':False, 'shape':(1,1,1,2)}    \nab";

@@ -1,0 +1,219 @@
+//! What fuzzers found, and seeds of theirs, on any toolchain: no target of `tools/fuzz` panics on any of these files.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../fuzz/src/lib.rs"]
+pub mod fuzz;
+
+use fuzz::seeds::SEEDS;
+use fuzz::series::Case;
+use fuzz::{TARGETS, Target};
+use std::fs;
+use std::path::{Path, PathBuf};
+use wavesplat::bound::Bound;
+use wavesplat::convert::{ConvertConfig, MissingPolicy};
+use wavesplat::sample::{SampleType, store};
+use wavesplat::wavelet::Basis;
+use wavesplat_format::*;
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz").join(name)
+}
+
+/// The files of a folder by name; none where there is no folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<_> = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+/// Gives a target every file of a folder; how many there were.
+fn replay(folder: &Path, target: Target) -> usize {
+    let files = files(folder);
+    for file in &files {
+        let bytes = fs::read(file).unwrap();
+        let survived = std::panic::catch_unwind(|| target(&bytes)).is_ok();
+        assert!(survived, "{}: see above", file.display());
+    }
+    files.len()
+}
+
+#[test]
+fn no_target_panics_on_what_was_found() {
+    for (name, target) in TARGETS {
+        let seeds = replay(&folder("corpus").join(name), target);
+        assert!((1..=60).contains(&seeds), "{seeds} seeds of {name}");
+        replay(&folder("regressions").join(name), target);
+        target(&[]);
+    }
+    for kind in ["corpus", "regressions"] {
+        for found in files(&folder(kind)) {
+            let name = found.file_name().unwrap().to_str().unwrap();
+            assert!(TARGETS.iter().any(|(target, _)| *target == name), "{}: of no target", found.display());
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_taken_apart_is_put_together_again() {
+    for (number, (name, file)) in (0..).zip(SEEDS) {
+        let (sound, seed) = fuzz::seeds::seed(number);
+        assert_eq!((sound, seed.forge(&[])), (file, file.to_vec()), "{name}");
+    }
+}
+
+/// Frames of a wave in two windows; every 11th sample is missing, where there is no tolerance or a float can say so.
+fn case(sample: SampleType, basis: Basis, window: usize, tolerance: f64) -> Case {
+    let (dims, frames): ([usize; 3], _) = ([5, 4, 3], 2 * window);
+    let voxels = dims.iter().product::<usize>();
+    let holes = sample.is_float() || tolerance == 0.0;
+    let value = |i: usize| match (i % 11, i % 53) {
+        (10, _) if holes => f64::NAN,
+        (_, 52) => 90.0,
+        _ => 40.0 + 30.0 * libm::sin(i as f64 * 0.11 + (i / voxels) as f64 * 0.3),
+    };
+    let values: Vec<f64> = (0..voxels * frames).map(value).collect();
+    let mut bytes = vec![0; values.len() * sample.size()];
+    store(sample, &values, &mut bytes);
+    let (missing, block) = (MissingPolicy::Mask, Some(3));
+    let config = ConvertConfig { missing, block, ..ConvertConfig::new(basis, window, tolerance, 1 << 30) };
+    Case { dims, frames, sample, bytes, config }
+}
+
+/// A file of one frame of `blocks` voxels, each a block, some of them exact and the others empty.
+fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
+    let like = Reader::open(like).unwrap().metadata().clone();
+    let window =
+        Window { frames: 1, coefficients: 1, levels: vec![1], basis: Basis::Samples, ..like.windows[0].clone() };
+    let window = Window { pyramid: None, functions: Vec::new(), missing: 0, coded: 0, outliers: 0, ..window };
+    let metadata = Metadata { dims: [blocks, 1, 1], block_edge: 1, channels, ..like };
+    let mut writer = Writer::new(Vec::new(), FileId([7; 16]), &metadata).unwrap();
+    let mut compressor = Compressor::new(3).unwrap();
+    let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
+    for (channel, block) in (0..channels).flat_map(|channel| (0..blocks as u32).map(move |block| (channel, block))) {
+        let id = BlockId { window: 0, block, channel };
+        let mut parts = vec![compressor.part(PartKind::Exact, stats, &vec![50; metadata.sample.size()]).unwrap()];
+        parts.retain(|_| block % 8 == 0);
+        let stats = BlockStats { step: 0.0, min: 50.0, max: 50.0, reached: 0.0, squared_error: 0.0, dropped: 0.0 };
+        if block % 8 == 3 { writer.append_lost(id) } else { writer.append(&EncodedBlock { id, stats, parts }) }
+            .unwrap();
+    }
+    writer.end_window(WindowRecord { number: 0, window, times: Vec::new() }).unwrap();
+    writer.finish().unwrap().0
+}
+
+#[test]
+#[ignore = "makes the seeds of the corpus anew"]
+fn seeds_are_made() {
+    let mut multi = case(SampleType::F64, Basis::Multi, 5, 0.02);
+    multi.config.bound = Bound::Rms;
+    let exact = case(SampleType::U16, Basis::Haar, 4, 0.0).convert().unwrap();
+    let files = [
+        ("haar", case(SampleType::I16, Basis::Haar, 8, 0.01).convert().unwrap()),
+        ("multi", multi.convert().unwrap()),
+        ("learned", case(SampleType::F32, Basis::Learned, 6, 0.01).convert().unwrap()),
+        ("pyramid", case(SampleType::F16, Basis::Samples, 9, 0.03).convert().unwrap()),
+        ("channels", blocks(&exact, 3, 2)),
+        ("leaves", blocks(&exact, 520, 1)),
+        ("exact", exact),
+    ];
+    let mut corpus = Vec::new();
+    for (name, file) in &files {
+        fs::write(folder("seeds").join(format!("{name}.wspl")), file).unwrap();
+        if *name != "leaves" {
+            corpus.push(("file", name.to_string(), file.clone()));
+            let metadata = Reader::open(file).unwrap().metadata().encode().unwrap();
+            corpus.push(("metadata", name.to_string(), metadata));
+        }
+    }
+    changes(&mut corpus);
+    payloads(&mut corpus);
+    inputs(&mut corpus);
+    for (target, name, bytes) in corpus {
+        let folder = folder("corpus").join(target);
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join(name), bytes).unwrap();
+    }
+}
+
+type Corpus = Vec<(&'static str, String, Vec<u8>)>;
+
+/// For the targets that change a sound file: each of them, and each place.
+fn changes(corpus: &mut Corpus) {
+    for seed in 0..SEEDS.len() as u8 {
+        let edit = [2 * seed, 0, 20 * seed, 0, seed + 3, 1];
+        let name = SEEDS[usize::from(seed)].0.to_string();
+        for target in ["forged", "decode"] {
+            corpus.push((target, name.clone(), [&[seed][..], &edit].concat()));
+            corpus.push((target, format!("{name}-twice"), [&[seed][..], &edit, &[4, 0, 16, 0, 5, 4]].concat()));
+            corpus.push((target, format!("{name}-whole"), vec![seed]));
+        }
+        corpus.push(("unfinished", name.clone(), vec![seed, 0xFF, 0xFF]));
+        corpus.push(("unfinished", format!("{name}-cut"), [&[seed, 20, 0][..], &edit].concat()));
+        for how in 0..5 {
+            let damage = [how, 40 + how, 0, 3, 100, 0, 20, 0];
+            corpus.push(("salvage", format!("{name}-{how}"), [&[seed, 0, 1][..], &damage].concat()));
+        }
+        corpus.push(("salvage", format!("{name}-forged"), [&[seed, 1, 0][..], &edit].concat()));
+    }
+    for basis in 0..5 {
+        let settings = [4, 3, 2, 11, basis + 3, basis, basis % 4, basis, 3, 0, basis % 4, 0, 0, 2, basis % 3, 1];
+        corpus.push(("roundtrip", format!("basis-{basis}"), [&settings[..], &[1, 2, 3, 200, 100, 7]].concat()));
+    }
+}
+
+fn payloads(corpus: &mut Corpus) {
+    let codes: Vec<i32> = (0..48).map(|i| if i % 3 == 0 { (i - 20) * (i - 20) * (i - 20) } else { 0 }).collect();
+    let mut raw = Vec::new();
+    pack_codes(&codes, &mut raw);
+    corpus.push(("codes", "packed".into(), [&[48, 0][..], &raw].concat()));
+    raw.clear();
+    pack_cells(&codes, &[[4, 3, 2, 2]], &mut raw);
+    corpus.push(("cells", "packed".into(), [&[4, 3, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0][..], &raw].concat()));
+    raw.clear();
+    pack_cells(&[1; 12 * 12 * 12 + 5], &[[12, 12, 12, 1], [5, 1, 1, 1]], &mut raw);
+    corpus.push(("cells", "long".into(), [&[12, 12, 12, 1, 5, 1, 1, 1, 0, 0, 0, 0][..], &raw].concat()));
+    raw.clear();
+    pack_outliers(&Outliers { positions: vec![0, 3, 4], samples: vec![1, 2, 3, 4, 5, 6] }, 2, &mut raw);
+    corpus.push(("payloads", "outliers".into(), [&[1, 9, 0][..], &raw].concat()));
+    raw.clear();
+    pack_missing(&[true, false, true, false, false], &[1, 2, 3, 4, 5, 6, 7, 8], 4, &mut raw);
+    corpus.push(("payloads", "missing".into(), [&[2, 5, 0][..], &raw].concat()));
+    corpus.push(("payloads", "exact".into(), vec![0, 4, 0, 1, 2, 3, 4]));
+}
+
+fn inputs(corpus: &mut Corpus) {
+    let npy = fuzz::sources::NPY;
+    let vti = |array: &str, end: &str| {
+        format!(
+            "<VTKFile type=\"ImageData\" header_type=\"UInt32\"><ImageData WholeExtent=\"0 1 0 1 0 0\" Spacing=\"1 2 3\">\
+             <Piece Extent=\"0 1 0 1 0 0\"><PointData Scalars=\"a\"><DataArray Name=\"a\" type=\"UInt8\" {array}\
+             </PointData></Piece></ImageData>{end}"
+        )
+    };
+    let appended = "<AppendedData encoding=\"raw\">_\u{4}\0\0\0abcd</AppendedData></VTKFile>";
+    let base64 = "format=\"binary\">BAAAAA==YWJjZA==</DataArray>";
+    let nrrd = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 2 1 2\nencoding: raw\nspacings: 1 2 3 0.5\n";
+    let nhdr = nrrd.replace("2 2 1 2", "4 3 2 4") + "endian: little\ndata file: b.raw\n";
+    let lists = nrrd.replace("2 2 1 2", "4 6 4 1") + "data file: LIST\nb.raw\n";
+    let pvd =
+        "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"1\" file=\"b.npy\"/></Collection></VTKFile>";
+    let files = [
+        ("nrrd", 0, format!("{nrrd}\nabcdefgh")),
+        ("nhdr", 1, nhdr),
+        ("list", 1, lists),
+        ("vti-raw", 2, vti("format=\"appended\" offset=\"0\"/>", appended)),
+        ("vti-base64", 2, vti(base64, "</VTKFile>")),
+        ("pvd", 3, pvd.into()),
+    ];
+    for (name, kind, text) in files {
+        corpus.push(("inputs", name.into(), [&[kind, 0][..], text.as_bytes()].concat()));
+    }
+    corpus.push(("inputs", "npy".into(), [&[4, 0][..], npy].concat()));
+    corpus.push(("stream", "npy".into(), [&[0][..], npy].concat()));
+    corpus.push(("stream", "raw".into(), [&[1, 2, 1, 1, 2, 2, 1, 1][..], b"xabcdefgh"].concat()));
+    for text in
+        ["1:9:2", "-3:", ":", "7", "1:2,5,-1", "0:4,:,1:", "2x3x4x5", "512MiB", "1,2.5,-3e4", "0.5,1", "640x480"]
+    {
+        corpus.push(("values", text.replace(':', "_"), [&[99, 0, 9, 9, 9][..], text.as_bytes()].concat()));
+    }
+}
