@@ -85,7 +85,7 @@ impl FromStr for FrameRange {
         match parts.as_slice() {
             [one] => {
                 let first: i64 = one.parse().map_err(|_| wrong())?;
-                Ok(Self { start: Some(first), end: (first != -1).then_some(first + 1), step: 1 })
+                Ok(Self { start: Some(first), end: (first != -1).then_some(first.saturating_add(1)), step: 1 })
             }
             [a, b] => Ok(Self { start: end(a)?, end: end(b)?, step: 1 }),
             [a, b, s] => {
