@@ -183,7 +183,7 @@ impl RegionSpec {
             start: std::array::from_fn(|a| self.0[a].0.unwrap_or(0)),
             end: std::array::from_fn(|a| self.0[a].1.unwrap_or(grid.dims[a])),
         };
-        if region.is_empty() || !grid.whole().contains(&region) {
+        if !grid.whole().contains(&region) || region.is_empty() {
             let [x, y, z] = grid.dims;
             return Err(Error::usage(format!("--region: empty, or not within the volume of {x}x{y}x{z} voxels")));
         }
