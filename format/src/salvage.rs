@@ -1,7 +1,7 @@
 //! What is whole of a damaged file, found without trusting its directory, and a new file of it (FORMAT.md section 12).
 
 use crate::block::{BlockId, EncodedBlock, EncodedPart};
-use crate::bytes::{Check, Fields};
+use crate::bytes::{Check, Fields, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
 use crate::footer::FOOTER;
 use crate::header::FileId;
@@ -68,6 +68,9 @@ const TAGS: [&[u8; 4]; 6] = [b"STRT", b"WNDW", b"BLCK", b"LEAF", b"WEND", b"META
 
 /// How many times the damaged file's bytes the blocks of a new one take at least: records may lie about what was lost.
 const MOST_LOST: u64 = 64;
+
+/// Bytes of a window's record at least: bounds the windows that one of a large number can make lost.
+const LEAST_WINDOW: usize = 128;
 
 /// Bytes that are searched at a time.
 const STRETCH: u64 = 1 << 20;
@@ -312,6 +315,8 @@ fn numbered(storage: &impl Storage, file: FileId, at: u64, owner: fn(u32) -> Own
 
 /// Fills the windows before `record` that nothing describes: lost ones, as equally long as may be.
 fn bridge(all: &mut Metadata, record: &WindowRecord, undescribed: &mut Vec<u32>) -> Check {
+    let possible = record.number as usize <= MAX_METADATA / LEAST_WINDOW;
+    ensure(possible, || format!("window {} is beyond what metadata can hold", record.number))?;
     let time = record.times.first().copied(); // of frames that nothing tells, that of the next one told
     for number in all.windows.len() as u32..record.number {
         let left = record.window.first_frame.saturating_sub(all.frames);
