@@ -84,11 +84,13 @@ fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
     let like = Reader::open(like).unwrap().metadata().clone();
     let window =
         Window { frames: 1, coefficients: 1, levels: vec![1], basis: Basis::Samples, ..like.windows[0].clone() };
-    let window = Window { pyramid: None, functions: Vec::new(), missing: 0, coded: 0, outliers: 0, ..window };
+    let known = WindowEnd::of(0, &Window { missing: 0, coded: 0, outliers: 0, ..window.clone() });
+    let window = Window { pyramid: None, functions: Vec::new(), ..window }.with(&WindowEnd::of_nothing(0));
     let metadata = Metadata { dims: [blocks, 1, 1], block_edge: 1, channels, ..like };
     let mut writer = Writer::new(Vec::new(), FileId([7; 16]), &metadata).unwrap();
     let mut compressor = Compressor::new(3).unwrap();
     let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
+    writer.begin_window(WindowRecord { number: 0, window, times: Vec::new() }).unwrap();
     for (channel, block) in (0..channels).flat_map(|channel| (0..blocks as u32).map(move |block| (channel, block))) {
         let id = BlockId { window: 0, block, channel };
         let mut parts = vec![compressor.part(PartKind::Exact, stats, &vec![50; metadata.sample.size()]).unwrap()];
@@ -97,7 +99,7 @@ fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
         if block % 8 == 3 { writer.append_lost(id) } else { writer.append(&EncodedBlock { id, stats, parts }) }
             .unwrap();
     }
-    writer.end_window(WindowRecord { number: 0, window, times: Vec::new() }).unwrap();
+    writer.end_window(&known).unwrap();
     writer.finish().unwrap().0
 }
 

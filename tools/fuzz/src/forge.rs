@@ -10,6 +10,8 @@ const HEADER: usize = 128;
 const FRAME: usize = 24;
 const ENTRY: usize = 64;
 const PART: usize = 56;
+/// What the blocks of a window add up to.
+const SUMS: usize = 64;
 
 /// What of a file is changed. All but the first is what the file says, before sums and checksums are made of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +28,9 @@ enum Place {
     /// What a part holds.
     Payload,
     Leaf,
-    /// A window's record, in its section and in the metadata.
+    /// A window's record, in its section and in the metadata; and what its end says, in both.
     Window,
+    End,
     Metadata,
     /// A leaf's entry in the root.
     Root,
@@ -37,7 +40,7 @@ enum Place {
     Stored,
 }
 
-const PLACES: [Place; 14] = [
+const PLACES: [Place; 15] = [
     Place::Parts,
     Place::Header,
     Place::Grid,
@@ -47,6 +50,7 @@ const PLACES: [Place; 14] = [
     Place::Payload,
     Place::Leaf,
     Place::Window,
+    Place::End,
     Place::Metadata,
     Place::Root,
     Place::Footer,
@@ -114,6 +118,7 @@ enum Piece {
     Block { entry: Vec<u8>, parts: Vec<Vec<u8>> },
     Leaf,
     Window(Vec<u8>),
+    End(Vec<u8>),
     Metadata(Vec<u8>),
 }
 
@@ -143,6 +148,7 @@ impl Seed {
                 }
                 b"LEAF" => pieces.push(Piece::Leaf),
                 b"WNDW" => pieces.push(Piece::Window(content)),
+                b"WEND" => pieces.push(Piece::End(content)),
                 b"META" => pieces.push(Piece::Metadata(content)),
                 _ => break,
             }
@@ -182,6 +188,9 @@ struct Forge<'a> {
     /// Codes and outliers of the window.
     coded: u64,
     outliers: u64,
+    /// The window's number, and how it begins: as it was, and as it is now.
+    number: [u8; 4],
+    begun: [Vec<u8>; 2],
     /// Each window as it was, and as it is now.
     windows: Vec<(Vec<u8>, Vec<u8>)>,
     /// Offset, lengths and checksum, as in a footer.
@@ -210,6 +219,7 @@ impl<'a> Forge<'a> {
             Piece::Block { entry, parts } => self.block(entry, parts),
             Piece::Leaf => self.leaf(),
             Piece::Window(record) => self.window(record),
+            Piece::End(record) => self.window_end(record),
             Piece::Metadata(record) => self.metadata(record),
         }
     }
@@ -311,16 +321,27 @@ impl<'a> Forge<'a> {
     }
 
     fn window(&mut self, mut record: Vec<u8>) {
-        let end = record.len() - 8; // of the window, before the times, of which there are none
-        let before = record[4..end].to_vec();
-        put(&mut record, end - 16, &self.coded.to_le_bytes());
-        put(&mut record, end - 8, &self.outliers.to_le_bytes());
-        (self.coded, self.outliers) = (0, 0);
+        let begins = |record: &[u8]| record[4..record.len() - SUMS - 8].to_vec(); // there are no times
+        let before = begins(&record);
         self.edit(Place::Window, &mut record);
-        record.resize(record.len().max(12), 0);
-        self.windows.push((before, record[4..record.len() - 8].to_vec()));
-        let id = [&record[..4], &[0; 6]].concat();
+        record.resize(record.len().max(4 + SUMS + 8), 0);
+        self.begun = [before, begins(&record)];
+        self.number.copy_from_slice(&record[..4]);
+        let id = [&self.number[..], &[0; 6]].concat();
         self.section(b"WNDW", &id, [21, 0], &record, record.len());
+    }
+
+    fn window_end(&mut self, mut record: Vec<u8>) {
+        let before = record[4..].to_vec();
+        put(&mut record, 4 + SUMS - 16, &self.coded.to_le_bytes());
+        put(&mut record, 4 + SUMS - 8, &self.outliers.to_le_bytes());
+        (self.coded, self.outliers) = (0, 0);
+        self.edit(Place::End, &mut record);
+        record.resize(record.len().max(4), 0);
+        let [begun, begins] = std::mem::take(&mut self.begun);
+        self.windows.push(([begun, before].concat(), [&begins[..], &record[4..]].concat()));
+        let id = [&self.number[..], &[0; 6]].concat();
+        self.section(b"WEND", &id, [22, 0], &record, record.len());
     }
 
     fn metadata(&mut self, mut record: Vec<u8>) {
