@@ -1,0 +1,150 @@
+//! Files that earlier versions wrote: read to the same bits for ever.
+
+use crate::common::memory::Memory;
+use crate::common::series::{Kind, Mask, volume};
+use crate::common::{BASES, MEMORY, extracted, settings, stored};
+use std::fs;
+use std::path::{Path, PathBuf};
+use wavesplat::bound::Bound;
+use wavesplat::codec::scheme::Stencil;
+use wavesplat::convert::{Coding, ConvertConfig, Space};
+use wavesplat::file::CoefficientFile;
+use wavesplat::mapped::{Access, FileBytes};
+use wavesplat::progress::Silent;
+use wavesplat::recover::recover;
+use wavesplat::sample::SampleType;
+use wavesplat::verify::verify;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+use wavesplat_format::Metadata;
+use xxhash_rust::xxh3::xxh3_64;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
+}
+
+/// Their names and the digests of their samples.
+fn digests() -> Vec<(String, u64)> {
+    let text = fs::read_to_string(folder().join("digests.txt")).unwrap();
+    let line = |line: &str| {
+        let (name, digest) = line.split_once(' ').unwrap();
+        (name.to_string(), u64::from_str_radix(digest, 16).unwrap())
+    };
+    text.lines().map(line).collect()
+}
+
+fn open(path: &Path) -> CoefficientFile {
+    CoefficientFile::open(path, Access::Read).unwrap()
+}
+
+#[test]
+fn golden_files_are_read_to_the_same_bits() {
+    let digests = digests();
+    let mut names: Vec<_> = fs::read_dir(folder()).unwrap().map(|e| e.unwrap().path()).collect();
+    names.retain(|path| path.extension().is_some_and(|e| e == "wspl"));
+    assert_eq!(names.len(), digests.len(), "every file has a digest");
+    for (name, digest) in digests {
+        let path = folder().join(format!("{name}.wspl"));
+        let lost = name == "lost";
+        assert_eq!(verify(&open(&path), None, MEMORY, &Silent).unwrap().damaged, u64::from(lost), "{name}");
+        let file = if lost { open(&path).skip_damaged().unwrap() } else { open(&path) };
+        assert_eq!(xxh3_64(&extracted(&file)), digest, "{name}");
+        let record = file.metadata().encode().unwrap();
+        assert_eq!(&Metadata::decode(&record).unwrap(), file.metadata(), "{name}");
+    }
+}
+
+/// The features: a name, a type of samples and how they are coded.
+fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
+    use SampleType::*;
+    let mut found = Vec::new();
+    for (ty, basis) in [U8, I8, U16, I16, U32, I32, F16, F32, F64].into_iter().zip(BASES.into_iter().cycle()) {
+        let name = format!("{}-{}", basis.name(), ty);
+        found.push((name, ty, Kind::Wave, Mask::None, settings(basis, window(basis), 0.01)));
+    }
+    let plain = |basis| settings(basis, window(basis), 0.01);
+    let pyramid = |basis, stencil, tolerance| {
+        let coding = Coding { basis: Some(basis), space: Space::Pyramid(stencil) };
+        ConvertConfig { coding, tolerance, ..plain(basis) }
+    };
+    let mut add = |name: &str, kind, mask, config| found.push((name.to_string(), F32, kind, mask, config));
+    add("linear-single", Kind::Wave, Mask::None, pyramid(Basis::Samples, Stencil::Linear, 0.01));
+    add("cubic-double", Kind::Wave, Mask::None, pyramid(Basis::Samples, Stencil::Cubic, 1e-7));
+    add("haar-cubic", Kind::Ramp, Mask::None, pyramid(Basis::Haar, Stencil::Cubic, 0.01));
+    add("multi-linear", Kind::Ramp, Mask::None, pyramid(Basis::Multi, Stencil::Linear, 0.01));
+    add("missing", Kind::Wave, Mask::Special, plain(Basis::Samples));
+    add("exact", Kind::Noise, Mask::None, ConvertConfig { tolerance: 0.0, ..plain(Basis::Haar) });
+    add("rms", Kind::Wave, Mask::None, ConvertConfig { bound: Bound::Rms, ..plain(Basis::Haar) });
+    add(
+        "relative",
+        Kind::Wave,
+        Mask::None,
+        ConvertConfig { bound: Bound::Relative { floor: 0.25 }, ..plain(Basis::Multi) },
+    );
+    let sampled = Bound::Sampled { samples: 30, seed: 1 };
+    add("sampled", Kind::Wave, Mask::None, ConvertConfig { bound: sampled, ..plain(Basis::Haar) });
+    found
+}
+
+fn window(basis: Basis) -> usize {
+    if basis == Basis::Multi { 9 } else { 8 }
+}
+
+/// Writes what is not there yet, and nothing else.
+#[test]
+#[ignore = "writes golden files of new features"]
+fn golden_files_are_made() {
+    let grid = Grid { dims: [11, 7, 6], spacing: [1.0, 0.5, 2.0], origin: [0.0, -1.0, 3.0] };
+    for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
+        let data = volume(kind, ty, mask, grid.whole().voxels(), 20, seed as u64);
+        let config = ConvertConfig { block: Some(6), ..config };
+        keep(&name, &stored(&mut Memory::new(grid, ty, data), &config).bytes());
+    }
+    let mut damaged = fs::read(folder().join("haar-u8.wspl")).unwrap();
+    let place = damaged.windows(4).position(|bytes| bytes == b"BLCK").unwrap();
+    damaged[place + 30] ^= 1;
+    let leaf = damaged.windows(4).position(|bytes| bytes == b"LEAF").unwrap();
+    damaged[leaf + 30] ^= 1;
+    let work = tempfile::tempdir().unwrap();
+    let path = work.path().join("damaged.wspl");
+    fs::write(&path, damaged).unwrap();
+    let mut saved = Vec::new();
+    recover(&FileBytes::open(&path, Access::Read).unwrap(), &path, &mut saved, &Silent).unwrap();
+    keep("lost", &saved);
+}
+
+fn keep(name: &str, bytes: &[u8]) {
+    let path = folder().join(format!("{name}.wspl"));
+    if path.exists() {
+        return;
+    }
+    fs::write(&path, bytes).unwrap();
+    let digest = xxh3_64(&extracted(&open(&path).skip_damaged().unwrap()));
+    let list = folder().join("digests.txt");
+    let before = fs::read_to_string(&list).unwrap_or_default();
+    fs::write(list, format!("{before}{name} {digest:016x}\n")).unwrap();
+}
+
+#[test]
+fn what_a_later_version_needs_is_refused_by_name() {
+    let mut file = fs::read(folder().join("haar-u8.wspl")).unwrap();
+    let work = tempfile::tempdir().unwrap();
+    let refused = |file: &mut [u8]| {
+        let checksum = xxh3_64(&file[..120]).to_le_bytes();
+        file[120..128].copy_from_slice(&checksum);
+        let path = work.path().join("later.wspl");
+        fs::write(&path, file).unwrap();
+        CoefficientFile::open(&path, Access::Read).err().map(|e| (e.exit_code(), e.to_string()))
+    };
+    file[10] = 7; // the minor version
+    file[24] = 0xFF; // optional features
+    assert_eq!(refused(&mut file), None);
+    file[16] = 0b100; // a required one
+    file[48..48 + 20].copy_from_slice(b"bases by wavesplat 3");
+    let (code, message) = refused(&mut file).unwrap();
+    assert!(code == 3 && message.contains("required feature bit 2 (bases by wavesplat 3)"), "{message}");
+    file[16] = 0;
+    file[8] = 2;
+    let (code, message) = refused(&mut file).unwrap();
+    assert!(code == 3 && message.contains("version 2.7 (bases by wavesplat 3)"), "{message}");
+}

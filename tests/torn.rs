@@ -1,0 +1,63 @@
+//! What a power failure leaves of an unfinished file: pages that were not yet on the disk are old, zero or torn. Whatever is
+//! left, only what is whole is gone on with.
+
+use crate::common::memory::Memory;
+use crate::common::random::Random;
+use crate::common::series::{Kind, Mask, volume};
+use crate::common::{report, settings, stored, times};
+use wavesplat::convert::ConvertConfig;
+use wavesplat::sample::SampleType;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+use wavesplat_format::Unfinished;
+
+const DISKS: usize = 20_000;
+
+/// What a disk writes at once.
+const PAGE: usize = 512;
+
+/// The file after a failure, when all after `synced` was still on its way.
+fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
+    let mut left = file[..synced + random.below(file.len() - synced + 1)].to_vec();
+    let torn = random.below(4);
+    for page in (synced / PAGE..left.len().div_ceil(PAGE)).filter(|_| torn > 0) {
+        let (start, end) = ((page * PAGE).max(synced), ((page + 1) * PAGE).min(left.len()));
+        match random.below(8) {
+            0 => left[start..end].fill(0),
+            1 => left[start..end].fill_with(|| random.bits() as u8), // what was there before
+            2 => left[start..start + random.below(end - start)].fill(0),
+            3 if page > synced / PAGE => left.copy_within(start - PAGE..end - PAGE, start),
+            _ => {}
+        }
+    }
+    left
+}
+
+#[test]
+fn after_a_power_failure_whole_windows_alone_are_gone_on_with() {
+    let dims = [9, 7, 5];
+    let data = volume(Kind::Wave, SampleType::F32, Mask::Special, dims.iter().product(), 40, 3);
+    let config = ConvertConfig { block: Some(5), ..settings(Basis::Samples, 8, 0.05) };
+    let file = stored(&mut Memory::new(Grid::unit(dims), SampleType::F32, data), &config).bytes();
+    let whole = Unfinished::read(&file).unwrap();
+    let (mut random, mut kept) = (Random(11), [0; 6]);
+    let start = Unfinished::read(&file[..700].to_vec()).unwrap().bytes() as usize;
+    for _ in 0..DISKS * times() {
+        let synced = start + random.below(file.len() - start);
+        let before = Unfinished::read(&file[..synced].to_vec()).unwrap();
+        let found = Unfinished::read(&failed(&file, synced, &mut random)).unwrap();
+        let (bytes, windows) = (found.bytes() as usize, found.metadata().windows.len());
+        assert!(windows >= before.metadata().windows.len(), "what was on the disk is not lost");
+        assert_eq!(found.metadata().windows, whole.metadata().windows[..windows]);
+        assert!(failed_prefix_is(&file, bytes, &found), "what is kept is what was written");
+        kept[windows] += 1;
+    }
+    report(&format!("torn disks by windows kept: {kept:?}"));
+    assert!(kept[..5].iter().all(|n| *n > DISKS / 100), "{kept:?}");
+}
+
+/// Whether going on after so many bytes of the file is going on after these windows.
+fn failed_prefix_is(file: &[u8], bytes: usize, found: &Unfinished) -> bool {
+    let own = Unfinished::read(&file[..bytes].to_vec()).unwrap();
+    own.bytes() == found.bytes() && own.metadata() == found.metadata()
+}
