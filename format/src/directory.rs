@@ -82,6 +82,13 @@ impl BlockEntry {
         self.parts.iter().for_each(|part| part.encode(out));
     }
 
+    /// Its bytes, which also tell 0 from -0.
+    pub(crate) fn encoded(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        self.encode(&mut out);
+        out
+    }
+
     pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
         let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
         let count = usize::from(fields.u16()?);
@@ -112,7 +119,8 @@ impl BlockEntry {
         let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers);
         let both = self.is_exact() && self.parts.iter().any(lossy);
         ensure(!both, || "exact samples beside coefficients or outliers".into())?;
-        ensure(!self.lost || self.parts.is_empty(), || "lost, but with parts".into())?;
+        let lost = !self.lost || self.encoded() == Self::of_lost(self.id).encoded();
+        ensure(lost, || "lost, but with parts or statistics".into())?;
         self.parts.iter().try_for_each(PartEntry::check)
     }
 
@@ -166,6 +174,8 @@ impl PartEntry {
         let PartStats { count, energy, largest } = self.stats;
         let sane = count > 0 && is_amount(energy) && finite_amount(largest);
         ensure(sane, || format!("{}: count, energy or largest coefficient out of range", self.kind))?;
+        let amounts = matches!(self.kind, PartKind::Level(_)) || [energy, largest].map(f64::to_bits) == [0; 2];
+        ensure(amounts, || format!("{}: an energy or largest coefficient without any", self.kind))?;
         let sized = self.stored_len > 0 && self.raw_len > 0 && u64::from(self.raw_len) <= MAX_PART_RAW;
         ensure(sized, || format!("{}: a length out of range", self.kind))
     }

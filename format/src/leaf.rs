@@ -83,9 +83,9 @@ impl LeafEntry {
     /// Adds a block's numbers. Sums run in the order of the blocks, so writer and reader get the same bits.
     pub(crate) fn add(&mut self, block: &BlockEntry) {
         self.count = self.count.saturating_add(1);
-        self.min = self.min.min(block.stats.min);
-        self.max = self.max.max(block.stats.max);
-        self.reached = self.reached.max(block.stats.reached);
+        self.min = least(self.min, block.stats.min);
+        self.max = -least(-self.max, -block.stats.max);
+        self.reached = -least(-self.reached, -block.stats.reached);
         self.squared_error += block.stats.squared_error;
         self.dropped += block.stats.dropped;
         self.exact += u32::from(block.is_exact());
@@ -146,6 +146,13 @@ impl LeafEntry {
         [self.coded, self.outliers, self.missing, self.lost].into_iter().for_each(|value| out.put_u64(value));
     }
 
+    /// Its bytes, which also tell 0 from -0.
+    pub(crate) fn encoded(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        self.encode(&mut out);
+        out
+    }
+
     pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
         Ok(Self {
             window: fields.u32()?,
@@ -184,6 +191,11 @@ impl LeafEntry {
         ensure(self.lost <= self.count.into(), || place("more lost blocks than there are"))?;
         Ok(self.extent().end())
     }
+}
+
+/// The smaller one, of 0 and -0 the latter: `min` may give either.
+fn least(a: f64, b: f64) -> f64 {
+    if b.total_cmp(&a).is_lt() { b } else { a }
 }
 
 /// The blocks of every leaf of a window, in order: the first and how many.

@@ -79,7 +79,7 @@ impl<S: Storage> Reader<S> {
         }
         ensure(at == leaf.offset, || format!("blocks end at byte {at}"))?;
         sums.set_extent(&leaf.extent());
-        ensure(sums == *leaf, || "its sums differ from the directory's root".into())?;
+        ensure(sums.encoded() == leaf.encoded(), || "its sums differ from the directory's root".into())?;
         Ok(entries)
     }
 
@@ -132,10 +132,7 @@ impl<S: Storage> Reader<S> {
             return Ok(());
         };
         let raw = self.part(block, part)?;
-        let found = match &geometry.window.pyramid {
-            Some(_) => unpack_cells(&raw, &geometry.boxes(level), codes),
-            None => unpack_codes(&raw, codes),
-        };
+        let found = unpack_level(&geometry, level, &raw, codes);
         unpacked(block, part, found, |&count| count).map(|_| ())
     }
 
@@ -175,28 +172,48 @@ impl<S: Storage> Reader<S> {
     /// Reads and unpacks every part of a block, for its errors alone.
     pub fn check_parts(&self, block: &BlockEntry) -> Result<()> {
         self.check_present(block)?;
-        let mut codes = Vec::new();
-        for part in &block.parts {
-            match part.kind {
-                PartKind::Level(level) => {
-                    codes.resize(self.geometry(block.id)?.codes(level).unwrap_or(0), 0);
-                    self.codes(block, level, &mut codes)?;
-                }
-                PartKind::Outliers => self.outliers(block).map(drop)?,
-                PartKind::Missing => self.missing(block).map(drop)?,
-                PartKind::Exact => self.exact(block).map(drop)?,
-            }
-        }
-        Ok(())
+        let geometry = self.geometry(block.id)?;
+        block.parts.iter().try_for_each(|part| {
+            let checked = check_payload(&geometry, part, &self.part(block, part)?);
+            checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+        })
     }
+}
+
+/// Unpacks the payload of a part; how many things it holds.
+fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> Check<usize> {
+    let (size, samples) = (geometry.sample_size, geometry.samples());
+    match kind {
+        PartKind::Level(level) => {
+            let mut codes = vec![0; geometry.codes(level).unwrap_or(0)];
+            unpack_level(geometry, level, raw, &mut codes)
+        }
+        PartKind::Outliers => unpack_outliers(raw, size, samples).map(|outliers| outliers.positions.len()),
+        PartKind::Missing => unpack_missing(raw, size, samples).map(|(_, bytes)| bytes.len() / size),
+        PartKind::Exact => unpack_exact(raw, size, samples).map(|bytes| bytes.len() / size),
+    }
+}
+
+fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> Check<usize> {
+    match &geometry.window.pyramid {
+        Some(_) => unpack_cells(raw, &geometry.boxes(level), codes),
+        None => unpack_codes(raw, codes),
+    }
+}
+
+/// Whether the payload of a part can be unpacked and holds as many things as the entry says.
+pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> Check {
+    unpack(geometry, part.kind, raw).and_then(|held| check_count(held, part))
+}
+
+fn check_count(held: usize, part: &PartEntry) -> Check {
+    let (held, said) = (held as u64, part.stats.count);
+    ensure(held == said, || format!("holds {held}, its entry says {said}"))
 }
 
 /// What a payload held, if it could be unpacked and holds as many things as its entry says.
 fn unpacked<T>(block: &BlockEntry, part: &PartEntry, payload: Check<T>, count: impl Fn(&T) -> usize) -> Result<T> {
-    let checked = payload.and_then(|payload| {
-        let (held, said) = (count(&payload) as u64, part.stats.count);
-        ensure(held == said, || format!("holds {held}, its entry says {said}")).map(|()| payload)
-    });
+    let checked = payload.and_then(|payload| check_count(count(&payload), part).map(|()| payload));
     checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
 }
 

@@ -8,9 +8,9 @@ use crate::header::FileId;
 use crate::leaf::{LeafEntry, MIN_BLOCK, leaves_of};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
 use crate::metadata::Metadata;
-use crate::reader::read_header;
+use crate::reader::{check_payload, read_header};
 use crate::section::{FRAME, Owner, decompress, read, section_at};
-use crate::window::{Basis, Window, WindowEnd, WindowRecord};
+use crate::window::{Basis, WINDOW_END, Window, WindowEnd, WindowRecord};
 use crate::writer::{Summary, Writer};
 use crate::{Error, Result, Storage};
 use memchr::memmem::Finder;
@@ -71,6 +71,9 @@ const MOST_LOST: u64 = 64;
 
 /// Bytes of a window's record at least: bounds the windows that one of a large number can make lost.
 const LEAST_WINDOW: usize = 128;
+/// How many times the file's bytes its sections take at most, by their own word: they may lie about it and overlap, and all
+/// are read.
+const MOST_CLAIMED: u64 = 8;
 
 /// Bytes that are searched at a time.
 const STRETCH: u64 = 1 << 20;
@@ -88,6 +91,7 @@ impl Salvage {
         let mut whole = false;
         let mut found = Found::default();
         let finders = TAGS.map(Finder::new);
+        let mut left = storage.len().max(STRETCH).saturating_mul(MOST_CLAIMED);
         for offset in (0..storage.len()).step_by(STRETCH as usize) {
             let len = (STRETCH + 3).min(storage.len() - offset); // a tag may lie across
             let mut bytes = vec![0; len as usize];
@@ -99,6 +103,8 @@ impl Salvage {
             places.sort_unstable();
             for (at, tag) in places {
                 let at = offset + at as u64;
+                let claimed = claimed(storage, tag, at);
+                left = left.checked_sub(claimed).ok_or_else(|| nothing("its sections overlap"))?;
                 if let Some(id) =
                     ids.iter().copied().find(|id| found.take(storage, *id, tag, at).is_ok_and(|took| took))
                 {
@@ -188,7 +194,8 @@ impl Salvage {
             let PartEntry { kind, stats, raw_len, .. } = *part;
             geometry.check(part).map_err(Error::Invalid)?;
             let stored = part.read(storage, self.id, entry.id)?;
-            decompress(&stored, raw_len).map_err(Error::Invalid)?;
+            let raw = decompress(&stored, raw_len).map_err(Error::Invalid)?;
+            check_payload(&geometry, part, &raw).map_err(Error::Invalid)?;
             Ok(EncodedPart { kind, stats, raw_len, stored })
         };
         entry.check().map_err(Error::Invalid)?;
@@ -212,7 +219,7 @@ fn candidates(storage: &impl Storage) -> Result<Vec<FileId>> {
 /// A block's entry by its header at `at`, its parts where they follow there, whatever their offsets were.
 fn entry_at(storage: &impl Storage, file: FileId, id: BlockId, at: u64) -> Result<BlockEntry> {
     let owner = Owner::Block(id);
-    let (_, bytes) = section_at(storage, file, owner, at, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let (_, bytes) = section_at(storage, file, owner, at, most(b"BLCK"))?;
     let mut fields = Fields::new(&bytes);
     let entry = BlockEntry::decode(&mut fields).and_then(|entry| fields.end().map(|()| entry));
     let mut entry = entry.map_err(|what| owner.corrupt(at, what))?;
@@ -238,11 +245,13 @@ impl Found {
             }
             b"LEAF" => return self.take_leaf(storage, id, at),
             b"WNDW" => {
-                let record = WindowRecord::parse(&numbered(storage, id, at, Owner::Window)?).map_err(Error::Invalid)?;
+                let record =
+                    WindowRecord::parse(&numbered(storage, id, tag, at, Owner::Window)?).map_err(Error::Invalid)?;
                 self.windows.entry(record.number).or_insert(record);
             }
             _ => {
-                let end = WindowEnd::parse(&numbered(storage, id, at, Owner::WindowEnd)?).map_err(Error::Invalid)?;
+                let end =
+                    WindowEnd::parse(&numbered(storage, id, tag, at, Owner::WindowEnd)?).map_err(Error::Invalid)?;
                 self.ends.entry(end.number).or_insert(end);
             }
         }
@@ -251,7 +260,7 @@ impl Found {
 
     /// Takes in a leaf, of which only its content says whose it is.
     fn take_leaf(&mut self, storage: &impl Storage, id: FileId, at: u64) -> Result<bool> {
-        let most = BLOCKS_PER_LEAF as usize * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS);
+        let most = most(b"LEAF");
         let frame = read(storage, Owner::Root, at, FRAME as u64)?;
         let mut fields = Fields::new(&frame[4..]);
         let (Ok(stored_len), Ok(raw_len)) = (fields.u32(), fields.u32()) else { return Ok(false) };
@@ -267,7 +276,6 @@ impl Found {
     }
 
     fn put_together(self, id: Option<FileId>, len: u64) -> Result<Salvage> {
-        let nothing = |what: &str| Error::Invalid(format!("nothing can be saved: {what}"));
         let Self { start, metadata, mut windows, mut ends, blocks, leaves } = self;
         for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
             windows.entry(number).or_insert_with(|| m.record(number));
@@ -297,6 +305,30 @@ impl Found {
     }
 }
 
+fn nothing(what: &str) -> Error {
+    Error::Invalid(format!("nothing can be saved: {what}"))
+}
+
+/// The most bytes that [`Found::take`] reads or unpacks of what begins at `at` with a tag.
+fn claimed(storage: &impl Storage, tag: &[u8; 4], at: u64) -> u64 {
+    let Ok(frame) = read(storage, Owner::Root, at, FRAME as u64) else { return 0 };
+    let (mut fields, most) = (Fields::new(&frame[4..]), most(tag) as u64);
+    let (Ok(stored_len), Ok(raw_len)) = (fields.u32(), fields.u32()) else { return 0 };
+    let raw_len = if tag == b"LEAF" { u64::from(raw_len) } else { 0 };
+    let end = at.saturating_add(stored_len.into());
+    if u64::from(stored_len).max(raw_len) > most || end > storage.len() { 0 } else { raw_len + u64::from(stored_len) }
+}
+
+/// The most stored bytes of a section.
+fn most(tag: &[u8; 4]) -> usize {
+    match tag {
+        b"BLCK" => BLOCK_ENTRY + PART_ENTRY * MAX_PARTS,
+        b"LEAF" => BLOCKS_PER_LEAF as usize * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS),
+        b"WEND" => WINDOW_END,
+        _ => MAX_METADATA,
+    }
+}
+
 /// The block whose header is at `at`, by its own word.
 fn id_at(storage: &impl Storage, at: u64) -> Result<BlockId> {
     let mut bytes = [0; 10];
@@ -307,10 +339,10 @@ fn id_at(storage: &impl Storage, at: u64) -> Result<BlockId> {
 }
 
 /// What is stored in the section at `at`, which says of itself which window it is of.
-fn numbered(storage: &impl Storage, file: FileId, at: u64, owner: fn(u32) -> Owner) -> Result<Vec<u8>> {
+fn numbered(storage: &impl Storage, file: FileId, tag: &[u8; 4], at: u64, owner: fn(u32) -> Owner) -> Result<Vec<u8>> {
     let mut number = [0; 4];
     storage.read_at(at.saturating_add(FRAME as u64), &mut number)?;
-    section_at(storage, file, owner(u32::from_le_bytes(number)), at, MAX_METADATA).map(|(_, record)| record)
+    section_at(storage, file, owner(u32::from_le_bytes(number)), at, most(tag)).map(|(_, record)| record)
 }
 
 /// Fills the windows before `record` that nothing describes: lost ones, as equally long as may be.

@@ -116,7 +116,11 @@ impl Found {
         let same = ensure(most, || "too long".into())
             .and_then(|()| decompress(&stored, extent.raw_len))
             .and_then(|raw| leaf.parse(&raw))
-            .and_then(|told| ensure(told == entries, || "differs from its blocks".into()));
+            .and_then(|told| {
+                ensure(told.iter().map(BlockEntry::encoded).eq(entries.iter().map(BlockEntry::encoded)), || {
+                    "differs from its blocks".into()
+                })
+            });
         same.map_err(|what| owner.corrupt(at, what))?;
         leaf.set_extent(&extent);
         self.leaves.push(leaf);

@@ -121,7 +121,8 @@ impl WindowRecord {
     /// The record that is exactly `bytes`; the rest of the metadata says whether it can be.
     pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
         let record: Self = whole(bytes, "window record")?;
-        ensure(record.window == record.window.begun(), || "a window that begins with blocks".into())?;
+        let begun = Self { window: record.window.begun(), ..record.clone() };
+        ensure(begun.encode()? == bytes, || "a window that begins with blocks".into())?; // to the bit
         Ok(record)
     }
 }

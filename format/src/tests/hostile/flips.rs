@@ -63,7 +63,7 @@ fn flipped_bits_with_forged_checksums_are_safe() {
                 let start = Instant::now();
                 let change = &mut |p, n, bytes: &mut Vec<u8>| {
                     if (p, n) == (piece, number) {
-                        flip(bytes, bit)
+                        flip(bytes, bit);
                     }
                 };
                 let file = pieces.forge(change);

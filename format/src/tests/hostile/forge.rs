@@ -73,7 +73,7 @@ fn f64_at(bytes: &[u8], at: usize) -> f64 {
     f64::from_bits(u64_at(bytes, at))
 }
 
-fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
+pub(crate) fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
     if let Some(place) = bytes.get_mut(at..at + value.len()) {
         place.copy_from_slice(value);
     }
@@ -85,7 +85,7 @@ fn packed(stored: &[u8], raw_len: u32) -> Packed {
 }
 
 /// The checksum of what belongs to the block of an entry: its first ten bytes.
-fn checksum(file: &[u8], block: &[u8], kind: [u8; 2], stored: &[u8]) -> u64 {
+pub(crate) fn checksum(file: &[u8], block: &[u8], kind: [u8; 2], stored: &[u8]) -> u64 {
     let seed = [file, &block[..10], &kind].concat();
     xxh3_64_with_seed(stored, xxh3_64(&seed))
 }

@@ -1,10 +1,11 @@
 //! Whatever the bytes, there is an error or the right answer: no panic, and no read beyond the file.
 
+mod bits;
 mod cuts;
 mod fat;
-mod fields;
 mod flips;
 mod forge;
+mod splices;
 
 use crate::footer::{FOOTER, Footer};
 use crate::header::HEADER;
