@@ -2,9 +2,12 @@
 
 mod bits;
 mod cuts;
+mod errors;
 mod fat;
+mod fields;
 mod flips;
 mod forge;
+mod overlaps;
 mod splices;
 
 use crate::footer::{FOOTER, Footer};
