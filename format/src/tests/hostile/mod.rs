@@ -7,6 +7,7 @@ mod fat;
 mod fields;
 mod flips;
 mod forge;
+mod mutated;
 mod overlaps;
 mod splices;
 
