@@ -71,6 +71,7 @@ const MOST_LOST: u64 = 64;
 
 /// Bytes of a window's record at least: bounds the windows that one of a large number can make lost.
 const LEAST_WINDOW: usize = 128;
+
 /// How many times the file's bytes its sections take at most, by their own word: they may lie about it and overlap, and all
 /// are read.
 const MOST_CLAIMED: u64 = 8;
