@@ -27,7 +27,8 @@
 //!                                           colour.rs, sink.rs; output.rs
 //! ```
 //!
-//! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source. The programs in `bin/`
+//! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source, `recover.rs` saves what is whole
+//! of a damaged one, and `resume.rs` finds what a conversion can go on with. The programs in `bin/`
 //! turn arguments into configurations and call one function; what they share is `cli/`.
 //!
 //! # Words
@@ -42,7 +43,7 @@
 //!
 //! # Who may call whom
 //!
-//! `bin, cli, tools -> convert | render | extract | verify | resume | report -> source, scan, codec, file, camera, footprint
+//! `bin, cli, tools -> convert | render | extract | verify | recover | resume | report -> source, scan, codec, file, camera, footprint
 //! -> wavelet, bound, sample, volume, mapped, npy, output, error -> format`. A test reads the sources and holds this.
 //!
 //! 1. `convert` and `render` never name each other; the file is their only meeting point.

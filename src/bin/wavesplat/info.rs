@@ -50,6 +50,7 @@ struct Info {
     coefficients: u64,
     outliers: u64,
     missing: u64,
+    lost_blocks: u64,
     windows: Vec<WindowReport>,
     settings: Vec<(String, String)>,
     program: String,
@@ -90,6 +91,7 @@ impl Info {
             coefficients: windows.iter().map(|w| w.coefficients).sum(),
             outliers: windows.iter().map(|w| w.outliers).sum(),
             missing: windows.iter().map(|w| w.missing).sum(),
+            lost_blocks: (0..windows.len() as u32).flat_map(|w| file.leaves(w)).map(|leaf| leaf.lost).sum(),
             windows,
             settings: m.settings.clone(),
             program: m.program.clone(),
@@ -126,6 +128,11 @@ impl Info {
             self.id,
             self.program
         );
+        if self.lost_blocks > 0 {
+            let lost = self.lost_blocks;
+            let _ =
+                writeln!(text, "LOST       {lost} blocks, when the file was recovered; wavesplat verify lists them");
+        }
         let shown = if verbose { self.windows.len() } else { self.windows.len().min(MOST_WINDOWS) };
         for w in &self.windows[..shown] {
             let _ = writeln!(text, "window     {}", w.line(bound, self.promise.tolerance));

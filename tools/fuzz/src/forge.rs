@@ -3,7 +3,7 @@
 
 use super::input::Input;
 use std::cell::RefCell;
-use wavesplat_format::{BlockId, Compressor, PartKind, PartStats, Reader};
+use wavesplat_format::{Compressor, PartKind, PartStats, Reader};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 const HEADER: usize = 128;
@@ -133,6 +133,8 @@ impl Seed {
     /// Takes a file apart, which must be sound and without times.
     pub fn new(file: &[u8]) -> Self {
         let reader = Reader::open(file).expect("a sound seed");
+        let leaves = (0..reader.metadata().windows.len() as u32).flat_map(|window| reader.leaves(window));
+        let mut blocks = leaves.flat_map(|leaf| reader.leaf(leaf).expect("a sound seed"));
         let (mut pieces, mut at) = (Vec::new(), HEADER);
         loop {
             let stored = u32_at(file, at + 4) as usize;
@@ -141,7 +143,7 @@ impl Seed {
             match &file[at..at + 4] {
                 b"STRT" => pieces.push(Piece::Start(content)),
                 b"BLCK" => {
-                    let block = reader.entry(id_of(&content)).expect("a sound seed");
+                    let block = blocks.next().expect("as many as there are headers");
                     let parts = block.parts.iter().map(|part| reader.part(&block, part).expect("a sound seed"));
                     pieces.push(Piece::Block { entry: content, parts: parts.collect() });
                     end += block.stored_len() as usize;
@@ -406,9 +408,6 @@ fn compress(raw: &[u8]) -> Vec<u8> {
     let part = COMPRESSOR.with_borrow_mut(|compressor| compressor.part(PartKind::Exact, stats, raw));
     part.expect("few bytes").stored
 }
-
-fn id_of(entry: &[u8]) -> BlockId {
-    BlockId { window: u32_at(entry, 0), block: u32_at(entry, 4), channel: u16::from_le_bytes([entry[8], entry[9]]) }
 }
 
 fn u32_at(bytes: &[u8], at: usize) -> u32 {
