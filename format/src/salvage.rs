@@ -72,6 +72,9 @@ const MOST_LOST: u64 = 64;
 /// Bytes of a window's record at least: bounds the windows that one of a large number can make lost.
 const LEAST_WINDOW: usize = 128;
 
+/// The fewest bytes of a window in a file but for its blocks: its beginning, a leaf and its end.
+const MIN_WINDOW: u64 = 192 + 64 + 128;
+
 /// How many times the file's bytes its sections take at most, by their own word: they may lie about it and overlap, and all
 /// are read.
 const MOST_CLAIMED: u64 = 8;
@@ -290,7 +293,7 @@ impl Found {
         let mut undescribed = Vec::new();
         let count = windows.last_key_value().map_or(0, |(number, _)| u64::from(*number) + 1);
         let per_window = u64::from(all.blocks_per_channel()) * u64::from(all.channels);
-        let told = count.saturating_mul(per_window).saturating_mul(MIN_BLOCK);
+        let told = count.saturating_mul(per_window.saturating_mul(MIN_BLOCK).saturating_add(MIN_WINDOW));
         if told > len.saturating_mul(MOST_LOST) {
             return Err(nothing("it is too short for as many blocks as its records tell of"));
         }

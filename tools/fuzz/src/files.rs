@@ -1,9 +1,9 @@
 //! Whole files: as they are, with forged checksums, cut, damaged.
 
-use std::collections::HashMap;
 use super::forge::edits;
 use super::input::Input;
 use super::seeds::seed;
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 use wavesplat::extract::{ExtractConfig, extract};

@@ -408,7 +408,6 @@ fn compress(raw: &[u8]) -> Vec<u8> {
     let part = COMPRESSOR.with_borrow_mut(|compressor| compressor.part(PartKind::Exact, stats, raw));
     part.expect("few bytes").stored
 }
-}
 
 fn u32_at(bytes: &[u8], at: usize) -> u32 {
     bytes[at..at + 4].try_into().map(u32::from_le_bytes).expect("four bytes")

@@ -174,22 +174,24 @@ impl Forger<'_, '_> {
 
     fn section(&mut self, section: &Section, blocks: &mut Blocks, footer: &mut [u8]) {
         match section {
-            Section::Start(record) => drop(self.record(Piece::Start, record, 20, 0)),
+            Section::Start(record) => drop(self.record(Piece::Start, record, 20)),
             Section::Block(block) => self.block(block, blocks),
             Section::Leaf(leaf) => self.leaf(leaf, blocks),
-            Section::Window(record) => drop(self.record(Piece::Window, record, 21, u32_at(record, 0))),
-            Section::End(record) => drop(self.record(Piece::End, record, 22, u32_at(record, 0))),
-            Section::Metadata(record) => put(footer, 24, &self.record(Piece::Metadata, record, 18, 0)),
+            Section::Window(record) => drop(self.record(Piece::Window, record, 21)),
+            Section::End(record) => drop(self.record(Piece::End, record, 22)),
+            Section::Metadata(record) => put(footer, 24, &self.record(Piece::Metadata, record, 18)),
             Section::Root(root) => put(footer, 48, &self.root(root)),
         }
     }
 
-    /// A record's section; its place, lengths and checksum as in the footer.
-    fn record(&mut self, piece: Piece, record: &[u8], kind: u8, window: u32) -> [u8; 24] {
+    /// A record's section, of the window that it says if it is one's; its place, lengths and checksum as in the footer.
+    fn record(&mut self, piece: Piece, record: &[u8], kind: u8) -> [u8; 24] {
         let mut record = record.to_vec();
         self.change(piece, &mut record);
         let mut owner = [0; 10];
-        put(&mut owner, 0, &window.to_le_bytes());
+        if kind > 20 {
+            put(&mut owner, 0, &u32_at(&record, 0).to_le_bytes());
+        }
         let tag = [b"META", b"ROOT", b"STRT", b"WNDW", b"WEND"][usize::from(kind - 18)];
         self.put_section(tag, &owner, kind, &record, record.len())
     }

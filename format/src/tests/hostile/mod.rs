@@ -196,6 +196,16 @@ fn windows_that_are_said_to_have_been_lost_take_no_memory() {
         _ => {}
     });
     let _ = Salvage::search(&bomb, &mut |_| {});
+    let many = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
+        (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
+        (forge::Piece::Window, 3) => {
+            bytes[..4].copy_from_slice(&2000u32.to_le_bytes());
+            bytes[4..12].copy_from_slice(&2007u64.to_le_bytes());
+        }
+        (forge::Piece::End, 3) => bytes[..4].copy_from_slice(&2000u32.to_le_bytes()),
+        _ => {}
+    });
+    assert!(matches!(Salvage::search(&many, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
     let large = forge::Pieces::new(&file).forge(&mut |piece, _, bytes| {
         if matches!(piece, forge::Piece::Metadata | forge::Piece::Start) {
             bytes[..24].copy_from_slice(&[1u64 << 31, 1, 1].map(u64::to_le_bytes).concat());
