@@ -58,7 +58,7 @@ fn python_decodes_the_same_bytes_and_refuses_damage() {
     let (work, mut random) = (tempfile::tempdir().unwrap(), Random(6));
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
     let (mut files, mut damaged) = (Vec::new(), Vec::new());
-    let mut put = |name: String, bytes: &[u8]| {
+    let put = |name: String, bytes: &[u8]| {
         let path = work.path().join(name);
         fs::write(&path, bytes).unwrap();
         path

@@ -15,7 +15,7 @@ use std::path::Path;
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
-const MAX_NESTING: usize = 16; // brackets within brackets
+const MAX_NESTING: usize = 8;
 
 /// What the header of an array says.
 #[derive(Debug)]

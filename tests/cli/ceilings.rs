@@ -70,9 +70,7 @@ fn a_gibibyte_goes_through_192_mib_and_back() {
     let (work, started) = (Work::new(), Instant::now());
     let limit = "ulimit -d 196608; exec";
     let options = "--memory 64MiB --threads 2";
-    let convert = format!(
-        "$WAVESPLAT convert - -o big.wspl --dims 128x128x64 --dtype f32 --window 4 --tolerance 0 --basis haar --level 1"
-    );
+    let convert = "$WAVESPLAT convert - -o big.wspl --dims 128x128x64 --dtype f32 --window 4 --tolerance 0 --basis haar --level 1";
     let mut child = work.command("sh").args(["-c", &format!("{limit} {convert} {options}")]).spawn().unwrap();
     let (mut input, mut source, mut chunk) = (child.stdin.take().unwrap(), Gibibyte { at: 0 }, vec![0; 1 << 20]);
     while source.at < FRAME * FRAMES {

@@ -41,7 +41,7 @@ impl Change {
             Self::Emptied => file().set_len(0).unwrap(),
             Self::Longer => file().write_all_at(b"more", len).unwrap(),
             // One page, which a reader sees as it was or as it is.
-            Self::Overwritten => file().write_all_at(&[0x3f; 16], len / 2 & !0xfff).unwrap(),
+            Self::Overwritten => file().write_all_at(&[0x3f; 16], (len / 2) & !0xfff).unwrap(),
             Self::Replaced => fs::rename(work.path(format!("other_{name}")), &path).unwrap(),
             Self::Removed => fs::remove_file(&path).unwrap(),
         }
@@ -93,10 +93,10 @@ impl Reading {
         let started = Instant::now();
         let run = self.work.shell(&self.line);
         self.duration = started.elapsed();
-        self.outcome(run)
+        self.outcome(&run)
     }
 
-    fn outcome(&self, run: Run) -> Outcome {
+    fn outcome(&self, run: &Run) -> Outcome {
         let left = self.output.and_then(|name| fs::read(self.work.path(name)).ok());
         Outcome {
             code: run.code,
@@ -119,7 +119,7 @@ impl Reading {
         let child = self.work.command("sh").args(["-c", &self.line]).spawn().unwrap();
         std::thread::sleep(self.duration.mul_f64(share));
         change.apply(&self.work, self.victim);
-        self.outcome(Run::of(&self.line, child.wait_with_output().unwrap()))
+        self.outcome(&Run::of(&self.line, child.wait_with_output().unwrap()))
     }
 }
 
