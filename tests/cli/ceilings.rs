@@ -80,7 +80,7 @@ fn a_gibibyte_goes_through_192_mib_and_back() {
         }
     }
     drop(input);
-    Run::of(&convert, child.wait_with_output().unwrap()).ok();
+    Run::of(convert, child.wait_with_output().unwrap()).ok();
     let converted = started.elapsed();
     let bytes = std::fs::metadata(work.path("big.wspl")).unwrap().len();
     assert!(bytes > 256 << 20, "only {bytes} bytes: they would fit");
