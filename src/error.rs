@@ -78,6 +78,21 @@ impl Error {
         Self::Usage(what.into())
     }
 
+    /// What a user may do about a damaged file.
+    pub fn advice(&self) -> Option<&'static str> {
+        let Self::CoefficientFile { path, source } = self else { return None };
+        let unfinished = path.extension().is_some_and(|ending| ending == "part");
+        match source {
+            wavesplat_format::Error::Corrupt { .. } if unfinished => Some(
+                "an unfinished conversion: --resume of what made it goes on, wavesplat recover saves what it holds",
+            ),
+            wavesplat_format::Error::Corrupt { .. } | wavesplat_format::Error::Lost(_) => Some(
+                "wavesplat recover saves what is whole; --skip-damaged gives the rest where only blocks are damaged",
+            ),
+            _ => None,
+        }
+    }
+
     /// The programs' exit code: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or input changed.
     pub fn exit_code(&self) -> u8 {
         if let Some(system) = self.system() {

@@ -8,9 +8,10 @@ use crate::sample::SampleType;
 use crate::scan::join_ranges;
 use crate::volume::{BlockGrid, Grid, Region};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Unfinished};
 
 /// An open file; several threads may read it.
@@ -27,21 +28,19 @@ pub struct CoefficientFile {
 }
 
 /// What is wrong with a file, block by block.
-#[derive(Debug, Clone, Default)]
-pub struct Damage {
+#[derive(Debug, Default)]
+struct Damage {
     blocks: BTreeMap<BlockId, String>,
+    /// Those that were asked for.
+    met: Mutex<BTreeSet<BlockId>>,
 }
 
 impl Damage {
-    /// Whether no block is damaged.
-    pub fn is_empty(&self) -> bool {
-        self.blocks.is_empty()
-    }
-
-    /// How many blocks are, and what is wrong with the first.
-    pub fn words(&self) -> String {
-        let first = self.blocks.values().next().map_or("", String::as_str);
-        format!("{} damaged blocks were left out; the first: {first}", self.blocks.len())
+    /// How many blocks that were asked for are, and what is wrong with the first; none if all of them are whole.
+    fn words(&self) -> Option<String> {
+        let met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
+        let first = self.blocks.get(met.first()?)?;
+        Some(format!("{} damaged blocks were left out; the first: {first}", met.len()))
     }
 
     fn of_window(&self, window: u32) -> bool {
@@ -143,7 +142,7 @@ impl CoefficientFile {
         let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
         let leaves: Vec<_> = leaves.copied().collect();
         let found = leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?;
-        self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect() });
+        self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() });
         Ok(self)
     }
 
@@ -167,13 +166,13 @@ impl CoefficientFile {
     }
 
     /// What [`Self::skip_damaged`] found.
-    pub fn skipped(&self) -> Option<&Damage> {
-        self.skipped.as_ref().filter(|damage| !damage.is_empty())
+    fn skipped(&self) -> Option<&Damage> {
+        self.skipped.as_ref().filter(|damage| !damage.blocks.is_empty())
     }
 
     /// An error that tells what was left out, if anything was: for the end of what was done with the rest.
     pub fn refuse_skipped(&self) -> Result<()> {
-        self.skipped().map_or(Ok(()), |damage| Err(Error::input(&self.path, damage.words())))
+        self.skipped().and_then(Damage::words).map_or(Ok(()), |what| Err(Error::input(&self.path, what)))
     }
 
     /// Whether any sample of a window may be missing.
@@ -209,7 +208,8 @@ impl CoefficientFile {
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         let size = self.blocks.region(entry.id.block as usize).dims();
-        if entry.lost && self.skipped.is_some() {
+        if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
+            skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::of_missing(codec, size));
         }
         Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))

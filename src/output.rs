@@ -2,9 +2,9 @@
 
 use crate::error::{Error, Result};
 use std::ffi::OsString;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, Permissions, TryLockError};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -41,6 +41,9 @@ struct Part {
 /// What may be lost of a resumable file where power fails: the work of so long.
 const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 
+/// How long a lock is waited for: a process that was killed may hold it a little longer.
+const DYING: Duration = Duration::from_secs(1);
+
 impl Drop for Part {
     fn drop(&mut self) {
         if !self.keep {
@@ -59,6 +62,8 @@ impl Output {
     }
 
     fn create_after(path: &Path, force: bool, begin: impl FnOnce(&File) -> io::Result<()>) -> Result<Self> {
+        let real = path.is_symlink().then(|| path.canonicalize().ok()).flatten(); // a link stays one
+        let path = real.as_deref().unwrap_or(path);
         let target = if path == Path::new(STANDARD) {
             if io::stdout().is_terminal() {
                 return Err(Error::usage("-o -: binary data is not written to a terminal; redirect or pipe it"));
@@ -156,11 +161,16 @@ impl Part {
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
         let part = part_of(path);
         let failed = |e| Error::io(path, "creating", e);
+        let asked = Instant::now();
         loop {
             let file =
                 File::options().read(true).write(true).create(true).truncate(false).open(&part).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
+                Err(TryLockError::WouldBlock) if asked.elapsed() < DYING => {
+                    std::thread::sleep(DYING / 20);
+                    continue;
+                }
                 Err(TryLockError::WouldBlock) => {
                     let who = holder(&file).unwrap_or("another program".into());
                     return Err(Error::usage(format!("{}: {who} is writing it", path.display())));
@@ -181,6 +191,10 @@ impl Part {
                     return Err(exists(path));
                 }
                 (true, false) => {
+                    if let Ok(replaced) = fs::metadata(path) {
+                        let mode = replaced.permissions().mode() | 0o200; // it is yet to be written
+                        file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
+                    }
                     let (resumable, keep, synced) = (false, false, Instant::now());
                     return Ok((file, Self { path: part, replace, resumable, keep, synced }));
                 }

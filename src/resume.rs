@@ -12,7 +12,7 @@ use crate::source::{Archive, FrameSource};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
-use wavesplat_format::{Error as FormatError, Unfinished};
+use wavesplat_format::{Error as FormatError, Unfinished, Window};
 
 /// What becomes of the whole windows that an earlier run left unfinished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,7 +59,7 @@ pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Opt
             _ => Ok((out, None)),
         };
     };
-    let held = earlier.of(whole_windows(part)?, part)?;
+    let held = if earlier == Earlier::Discard { None } else { earlier.of(whole_windows(part)?, part)? };
     out.begin_at(held.as_ref().map_or(0, Unfinished::bytes))?;
     Ok((out, held))
 }
@@ -69,11 +69,13 @@ pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Opt
 pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, Unfinished)> {
     let (path, own) = (of.path(), of.whole_windows()?);
     let mut out = Output::resumable(path, true)?;
+    of.check_unchanged()?; // before it was locked it may have been replaced
     let Some(part) = out.part() else { return Err(Error::input(path, "not a regular file")) };
-    let (part, held) = (part.to_path_buf(), whole_windows(part)?);
-    let of_own = held.as_ref().is_some_and(|held| begins_with(&own, held)); // killed while it was copied
+    let part = part.to_path_buf();
+    let held = if earlier == Earlier::Discard { None } else { whole_windows(&part)? };
+    let of_own = held.as_ref().is_some_and(|held| goes_on(&own, held)); // killed while it was copied
     match earlier.of(held.filter(|_| !of_own), &part)? {
-        Some(held) if begins_with(&held, &own) => {
+        Some(held) if goes_on(&held, &own) => {
             out.begin_at(held.bytes())?;
             Ok((out, held))
         }
@@ -91,7 +93,7 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
 }
 
 /// Whether the first windows of one are those of the other.
-fn begins_with(all: &Unfinished, first: &Unfinished) -> bool {
+fn goes_on(all: &Unfinished, first: &Unfinished) -> bool {
     all.id() == first.id() && all.metadata().windows.starts_with(&first.metadata().windows)
 }
 
@@ -100,11 +102,15 @@ fn whole_windows(part: &Path) -> Result<Option<Unfinished>> {
     match Unfinished::read(&FileBytes::open(part, Access::Read)?) {
         Ok(held) => Ok(Some(held).filter(|held| held.metadata().frames > 0)),
         Err(FormatError::Io(e)) => Err(Error::io(part, "reading", e)),
+        Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => Err(Error::usage(format!(
+            "{}: is in the way, and not an unfinished conversion; --force replaces it",
+            part.display()
+        ))),
         Err(_) => Ok(None),
     }
 }
 
-/// The program's own last look at what it wrote, before the file gets its name: every checksum, from the disk.
+/// The program's own last look at what it wrote, before the file gets its name: every checksum.
 pub fn check(part: &Path) -> Result<()> {
     CoefficientFile::open(part, Access::Read)?.check_stored()
 }
@@ -115,26 +121,31 @@ pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Optio
     Ok(file.metadata().start() == *like && frames.is_none_or(|frames| frames == file.frames()))
 }
 
-/// Whether a file ends with windows of just the frames of `source`, by their digests.
-///
-/// # Errors
-/// Also of a source whose number of frames is not known.
+/// Whether a file ends with windows of just the frames of `source`, by their digests; not of one that is read only once.
 pub fn ends_with(file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
-    let Archive { grid, sample, frames, .. } = source.archive().clone();
-    let Some(frames) = frames else {
-        let what = "--resume: nothing tells whether a stream was appended already; to append it, leave --resume out";
-        return Err(Error::usage(what));
-    };
-    let (windows, missing_value) = (&file.metadata().windows, file.metadata().missing_value);
+    let Some(frames) = source.archive().frames else { return Ok(false) };
+    let windows = &file.metadata().windows;
     let first = windows.iter().position(|w| w.first_frame as usize + frames == file.frames());
-    if (first.is_none(), grid.dims, sample) != (false, file.grid.dims, file.sample()) {
+    first.map_or(Ok(false), |first| is_of(&windows[first..], file, source))
+}
+
+/// Whether the first frames of `source` are just those of a file's first window, by its digest.
+pub fn begins_with(file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
+    is_of(&file.metadata().windows[..1], file, source)
+}
+
+/// Whether the first frames of `source` are those of some windows.
+fn is_of(windows: &[Window], file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
+    let Archive { grid, sample, frames, .. } = source.archive().clone();
+    let needed: usize = windows.iter().map(|window| window.frames as usize).sum();
+    if (grid.dims, sample) != (file.grid.dims, file.sample()) || frames.is_some_and(|frames| frames < needed) {
         return Ok(false);
     }
     let mut at = 0;
-    for known in &windows[first.unwrap_or(0)..] {
+    for known in windows {
         let window = source.window(at, known.frames as usize)?;
         at += known.frames as usize;
-        if scan(window.as_ref(), &grid, sample, missing_value)?.digest != known.digest {
+        if scan(window.as_ref(), &grid, sample, file.metadata().missing_value)?.digest != known.digest {
             return Ok(false);
         }
     }

@@ -23,6 +23,8 @@ pub struct VerifyReport {
     pub bytes: u64,
     /// Places where it is damaged, and blocks that were lost before it was recovered.
     pub damaged: u64,
+    /// Blocks that could not be checked, since what lists them is damaged.
+    pub unchecked: u64,
     /// What is wrong with the first of them, at most [`MOST_NAMED`].
     pub damage: Vec<String>,
     /// What the comparison of all blocks that are whole with the source found.
@@ -155,7 +157,9 @@ pub fn verify(
         }
         for leaf in file.leaves(window) {
             let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
-            let entries = report.whole(file.leaf(leaf))?.unwrap_or_default();
+            let entries = report.whole(file.leaf(leaf))?;
+            report.unchecked += if entries.is_none() { u64::from(leaf.count) } else { 0 };
+            let entries = entries.unwrap_or_default();
             file.check_leaf(leaf, &entries, &mut |wrong| report.damage(&wrong))?;
             for entries in entries.chunks(at_once) {
                 for found in entries.par_iter().map(check).collect::<Vec<_>>() {
@@ -183,7 +187,8 @@ fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
         let [fx, fy, fz] = b.grid.dims;
         let frames = a.frames.map_or("unknown".into(), |f| f.to_string());
         return Err(Error::usage(format!(
-            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {}",
+            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {}; --frames a:b \
+             chooses those that it holds",
             a.sample,
             b.frames(),
             b.sample()

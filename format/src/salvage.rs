@@ -8,7 +8,7 @@ use crate::header::FileId;
 use crate::leaf::{LeafEntry, MIN_BLOCK, leaves_of};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
 use crate::metadata::Metadata;
-use crate::reader::{check_payload, read_header};
+use crate::reader::{check_payload, read_footer, read_header};
 use crate::section::{FRAME, Owner, decompress, read, section_at};
 use crate::window::{Basis, WINDOW_END, Window, WindowEnd, WindowRecord};
 use crate::writer::{Summary, Writer};
@@ -32,7 +32,7 @@ pub struct Salvage {
     leaves: BTreeMap<BlockId, u64>,
     /// Blocks after the last window that is described.
     left_behind: u64,
-    /// Whether the metadata were found, which say how many windows there are.
+    /// Whether metadata or a footer were found, which say how many windows there are.
     all_known: bool,
 }
 
@@ -117,7 +117,11 @@ impl Salvage {
             }
             searched(len.min(STRETCH));
         }
-        found.put_together(ids.first().copied().filter(|_| whole), storage.len())
+        let id = ids.first().copied().filter(|_| whole);
+        let told = id.and_then(|id| read_footer(storage, id).ok()).map(|footer| footer.blocks);
+        let mut salvage = found.put_together(id, storage.len())?;
+        salvage.all_known |= told == Some(salvage.metadata.blocks());
+        Ok(salvage)
     }
 
     /// The metadata of the file that [`Self::write`] makes, but for counts.

@@ -6,7 +6,7 @@ use crate::directory::{BlockEntry, PartEntry};
 use crate::footer::{FOOTER, Footer};
 use crate::header::{FileId, Header};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
-use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_ROOT_RAW, align};
+use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::section::{Extent, Owner, compress_directory, frame};
 use crate::unfinished::Unfinished;
@@ -38,6 +38,8 @@ pub struct Writer<W: Write> {
     sound: bool,
     /// Of the windows that were ended.
     metadata: Metadata,
+    /// Bytes that the record of these and the one that was begun takes at most, once it was counted.
+    record: Option<usize>,
     /// Where the last of them ends.
     ended: u64,
     /// The window that is being written, and its last block.
@@ -70,7 +72,21 @@ impl<W: Write> Writer<W> {
     fn at(out: W, begun: Unfinished) -> Self {
         let Unfinished { id, metadata, end, leaves, stored } = begun;
         let (sound, window, last, leaf, entries) = (true, None, None, None, Vec::new());
-        Self { out, id, at: end, sound, metadata, ended: end, window, last, stored, leaf, entries, leaves }
+        Self {
+            out,
+            id,
+            at: end,
+            sound,
+            metadata,
+            record: None,
+            ended: end,
+            window,
+            last,
+            stored,
+            leaf,
+            entries,
+            leaves,
+        }
     }
 
     /// Where the bytes go.
@@ -92,8 +108,21 @@ impl<W: Write> Writer<W> {
             ensure(next, || format!("window {} out of order", record.number))
         });
         next.map_err(Error::Invalid)?;
+        self.count_record(bytes.len())?;
         self.section(Owner::Window(record.number), &bytes, bytes.len())?;
         (self.window, self.sound) = (Some(record), true);
+        Ok(())
+    }
+
+    /// [`Error::TooLarge`] if the metadata could not hold a further window: now, and not when all is done.
+    fn count_record(&mut self, more: usize) -> Result<()> {
+        let so_far = self.record.map_or_else(|| self.metadata.encode().map(|record| record.len()), Ok)?;
+        let (size, limit) = ((so_far + more) as u64, MAX_METADATA as u64);
+        if size > limit {
+            let what = "bytes of metadata, with so many windows or times; longer windows take less".into();
+            return Err(Error::TooLarge { what, size, limit });
+        }
+        self.record = Some(so_far + more);
         Ok(())
     }
 

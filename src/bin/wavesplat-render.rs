@@ -131,8 +131,9 @@ struct Cli {
     /// A value that means "missing" in frames, besides NaN and infinities
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     missing_value: Option<f64>,
-    /// Show damaged and lost blocks of a coefficient file as missing samples, and the rest; exit code 3
-    #[arg(long)]
+    /// Show damaged and lost blocks of a coefficient file as missing samples, and the rest; exit code 3. Nothing is certified
+    /// then
+    #[arg(long, conflicts_with_all = ["error_image", "tolerance"])]
     skip_damaged: bool,
     #[command(flatten)]
     input: InputArgs,
@@ -204,7 +205,11 @@ impl Cli {
             self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
         }
         if let Some(file) = &file {
-            self.common.detail(format_args!("{} of the file's {} bytes were read", file.bytes_read(), file.bytes()));
+            self.common.detail(format_args!(
+                "{} bytes were read of the file, which has {}",
+                file.bytes_read(),
+                file.bytes()
+            ));
         }
         let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
         let reported = Reported { report: &report, coloured, file_bytes_read, file_bytes };

@@ -3,6 +3,7 @@
 use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
 use crate::error::{Error, Result};
 use crate::mapped::Access;
+use crate::output::part_of;
 use crate::sample::SampleType;
 use crate::source::{self, FrameSource, OpenOptions, Selection};
 use clap::{Args, ValueEnum};
@@ -122,8 +123,8 @@ pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
         may_be_frame && several && inputs.is_some() && inputs == folder(output)
     };
     let replaces = |input: &PathBuf| {
-        let same = real(input).is_some_and(|input| Some(input) == real(output));
-        same && output.is_file() || (numbered || output.is_file()) && beside(input)
+        let is = |name: &Path| name.is_file() && real(input) == real(name);
+        is(output) || is(&part_of(output)) || (numbered || output.is_file()) && beside(input)
     };
     match inputs.iter().find(|input| replaces(input)) {
         Some(input) => {

@@ -119,6 +119,7 @@ pub fn main<A: clap::Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
         Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
         Err(e) => {
             note(format_args!("error: {e}"));
+            e.advice().into_iter().for_each(note);
             ExitCode::from(e.exit_code())
         }
     }

@@ -58,6 +58,9 @@ pub(super) fn read(
             busy += started.elapsed();
             continue;
         }
+        if index > done.before && done.windows.get(index - 1).is_some_and(|w| (w.frames as usize) < config.window) {
+            return Err(reader.has_grown(done));
+        }
         let job = Arc::new(reader.prepare(window.as_ref(), index)?);
         busy += started.elapsed();
         if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < config.window {
@@ -95,6 +98,16 @@ impl WindowReader<'_> {
             return Ok(None);
         }
         Ok(Some(source.window(first, count)?).filter(|window| window.frames() > 0))
+    }
+
+    /// The error of a source that goes on after what was its end, in a window that is short.
+    fn has_grown(&self, done: &Done) -> Error {
+        let (name, frames) = (done.name.display(), self.frames);
+        let what = format!(
+            "the input ended after {frames} frames and has grown: --frames 0:{frames} makes {name} of these, to \
+                            which append adds the others; --force begins anew"
+        );
+        Error::Changed { path: done.name.clone(), what }
     }
 
     /// The error of a source that has fewer frames than it had.

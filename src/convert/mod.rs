@@ -298,7 +298,7 @@ impl Done {
     fn of(begun: Option<&Begun>, plan: &Plan, name: &Path) -> Result<Self> {
         let Some(Begun { unfinished, before }) = begun else { return Ok(Self::default()) };
         let held = unfinished.metadata();
-        if let Some(what) = settings::difference(&held.start(), &plan.start) {
+        if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
             return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
         }
         Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before, name: name.into() })

@@ -49,8 +49,8 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
     })
 }
 
-/// The first thing in which two conversions differ, in words.
-pub(super) fn difference(before: &Metadata, now: &Metadata) -> Option<String> {
+/// The first thing in which two conversions differ, in words; the program's version may, unless it must be the same.
+pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) -> Option<String> {
     let of = |m: &Metadata| {
         let given = [
             ("size", format!("{:?}", m.dims)),
@@ -64,6 +64,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata) -> Option<String> {
             ("--missing-value", format!("{:?}", m.missing_value)),
             ("version of the program", m.program.clone()),
         ];
+        let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
         let ours = OURS.into_iter().chain(["frames", "region"]);
         let settings = ours.map(|name| (name, setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()

@@ -52,9 +52,15 @@ fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
     work.wavesplat("extract a.wspl -o a.raw --frames 0:16").ok();
     assert!(work.read("saved.raw") == work.read("a.raw"));
     work.write("within.wspl", &file[..of_place(&file, b"BLCK", 24 + 20)]);
-    let report =
-        work.wavesplat("recover within.wspl -o within-saved.wspl --json").finds(3, &["4 of 48 blocks are lost"]);
-    assert_eq!(report.args, "recover within.wspl -o within-saved.wspl --json");
+    let run = work.wavesplat("recover within.wspl -o within-saved.wspl --json");
+    let report = run.json();
+    run.finds(3, &["4 of 48 blocks are lost"]);
+    let lost = serde_json::json!({ "window": 1, "frames": [8, 16], "first": 20, "last": 23 });
+    assert_eq!((&report["blocks_lost"], &report["all_known"], &report["lost"][0]), (&4.into(), &false.into(), &lost));
+    work.write("b.wspl.part", &file[..of_place(&file, b"WEND", 2)]);
+    work.wavesplat("recover b.wspl.part -o b.wspl").fails(2, &["b.wspl", "would replace what is read"]);
+    work.wavesplat("recover b.wspl.part -o so-far.wspl -q").fails(3, &["b.wspl.part", "its end is gone"]);
+    work.wavesplat("verify so-far.wspl").ok();
 }
 
 #[test]
@@ -91,6 +97,7 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
     for name in ["saved.wspl", "bad.wspl"] {
         let rendering = format!("{name} --frames 10 --size 40x40 -o out.npy --force --splat-error 0");
         work.render(&rendering).fails(3, &[name, "window 1 block 7"]);
+        work.render(&format!("{rendering} --skip-damaged --error-image e.npy")).fails(2, &["--error-image"]);
         work.render(&format!("{rendering} --skip-damaged")).fails(3, &["1 damaged blocks were left out"]);
         let skipped = floats(&read_npy(&work.read("out.npy")).1);
         work.wavesplat("extract bad.wspl -o frames.npy --force --skip-damaged").fails(3, &["left out"]);

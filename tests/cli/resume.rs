@@ -59,6 +59,52 @@ fn a_short_last_window_stays_and_the_next_frames_begin_one() {
     work.wavesplat("verify few.wspl --against all.npy").ok();
 }
 
+#[cfg(unix)]
+#[test]
+fn an_append_keeps_links_and_permissions() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let (work, _) = work();
+    work.wavesplat("convert first.npy -o a.wspl --window 8").ok();
+    std::fs::set_permissions(work.path("a.wspl"), std::fs::Permissions::from_mode(0o600)).unwrap();
+    symlink(work.path("a.wspl"), work.path("link.wspl")).unwrap();
+    work.wavesplat("append link.wspl rest.npy").ok();
+    assert!(work.path("link.wspl").is_symlink());
+    assert_eq!(work.path("a.wspl").metadata().unwrap().permissions().mode() & 0o777, 0o600);
+    work.wavesplat("verify a.wspl --against all.npy").ok();
+    work.wavesplat("convert all.npy -o link.wspl --window 8 --force").ok();
+    assert!(work.path("link.wspl").is_symlink());
+    assert_eq!(work.path("a.wspl").metadata().unwrap().permissions().mode() & 0o777, 0o600);
+}
+
+#[test]
+fn frames_that_a_file_has_already_are_not_appended_unasked() {
+    let (work, _) = work();
+    work.wavesplat("convert first.npy -o a.wspl --window 8").ok();
+    work.wavesplat("append a.wspl all.npy").fails(2, &["a.wspl", "begins with these frames", "--frames 16:"]);
+    work.wavesplat("append a.wspl rest.npy").ok();
+    let file = work.read("a.wspl");
+    work.wavesplat("append a.wspl rest.npy").fails(2, &["a.wspl", "ends with these frames", "--force"]);
+    work.wavesplat("append a.wspl rest.npy --resume").ok();
+    assert!(work.read("a.wspl") == file);
+    let report = work.wavesplat("append a.wspl rest.npy --force --json").ok().json();
+    assert_eq!(report["frames"].as_u64(), Some(64));
+}
+
+#[test]
+fn a_run_that_met_the_end_of_an_archive_does_not_go_on_where_that_has_grown() {
+    let (work, archive) = work();
+    work.write("few.npy", some_frames(&archive, 0..13));
+    work.wavesplat("convert few.npy -o few.wspl --window 8").ok();
+    let file = work.read("few.wspl");
+    let end = file.windows(4).position(|bytes| bytes == b"META").unwrap();
+    work.write("a.wspl.part", &file[..end]); // killed before it was finished
+    work.wavesplat("convert all.npy -o a.wspl --window 8 --resume").fails(4, &["a.wspl", "has grown", "--frames 0:13"]);
+    work.wavesplat("convert few.npy -o a.wspl --window 8 --resume").ok();
+    assert!(work.read("a.wspl") == file);
+    work.write("b.wspl.part", "notes");
+    work.wavesplat("convert few.npy -o b.wspl").fails(2, &["b.wspl.part", "not an unfinished conversion", "--force"]);
+}
+
 #[test]
 fn frames_of_a_growing_archive_are_appended_by_number() {
     let (work, archive) = work();

@@ -8,7 +8,8 @@ use wavesplat::convert::{Begun, ConvertConfig, of_file, setting};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::output::{STANDARD, part_of};
-use wavesplat::resume::{Earlier, ends_with, open_successor};
+use wavesplat::resume::{Earlier, begins_with, ends_with, open_successor};
+use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file
 #[derive(Debug, Args)]
@@ -33,7 +34,7 @@ pub(crate) struct AppendArgs {
     #[arg(long)]
     resume: bool,
     /// Begin anew, whatever an earlier run left unfinished
-    #[arg(long)]
+    #[arg(long, conflicts_with = "resume")]
     force: bool,
     #[command(flatten)]
     input: InputArgs,
@@ -43,7 +44,8 @@ pub(crate) struct AppendArgs {
 
 pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     args.common.start()?;
-    let file = CoefficientFile::open(&args.file, args.input.access())?;
+    let path = args.file.canonicalize().map_err(|e| Error::io(&args.file, "opening", e))?; // not the link to it
+    let file = CoefficientFile::open(&path, args.input.access())?;
     let config = args.config(&file)?;
     let parsed = |what: String| Error::input(&args.file, format!("its settings are not understood: {what}"));
     let region = setting(file.metadata(), "region").map(str::parse).transpose().map_err(parsed)?;
@@ -54,22 +56,44 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     if !timed {
         return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));
     }
-    spare_inputs(&args.inputs, &args.file)?;
-    if args.resume && !part_of(&args.file).exists() && ends_with(&file, source.as_mut())? {
+    spare_inputs(&args.inputs, &path)?;
+    if !args.force && !part_of(&path).exists() && args.has_them(&file, source.as_mut())? {
         args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
         return Ok(());
     }
     let (out, unfinished) = open_successor(&file, Earlier::by(args.force, args.resume))?;
     let begun = Begun { unfinished, before: file.metadata().windows.len() };
-    finish(source.as_mut(), &config, Some(begun), &args.file, out, &args.common, &|| file.check_unchanged())
+    finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 
 impl AppendArgs {
+    /// Whether the file ends with these frames, as `--resume` allows; an error if it has them and nothing was said.
+    fn has_them(&self, file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
+        if self.is_streamed() {
+            let what =
+                "--resume: nothing tells whether a stream was appended already; to append it, leave --resume out";
+            return if self.resume { Err(Error::usage(what)) } else { Ok(false) }; // it is read once
+        }
+        let refused = |what: String| Err(Error::usage(format!("{}: {what}", self.file.display())));
+        match ends_with(file, source)? {
+            true if self.resume => Ok(true),
+            true => refused("ends with these frames already; --force adds them once more".into()),
+            false if begins_with(file, source)? => {
+                let frames = file.frames();
+                refused(format!("begins with these frames; --frames {frames}: takes those after its own, --force all"))
+            }
+            false => Ok(false),
+        }
+    }
+
+    fn is_streamed(&self) -> bool {
+        self.inputs == [Path::new(STANDARD)]
+    }
+
     fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
-        let streamed = self.inputs == [Path::new(STANDARD)];
         let config = of_file(file.metadata(), self.common.memory.0);
         let config =
             config.ok_or_else(|| Error::input(&self.file, "does not say how it was made: nothing to append by"))?;
-        Ok(ConvertConfig { reserved: if streamed { self.common.stream_memory() } else { 0 }, ..config })
+        Ok(ConvertConfig { reserved: if self.is_streamed() { self.common.stream_memory() } else { 0 }, ..config })
     }
 }

@@ -37,7 +37,7 @@ pub(crate) struct ConvertArgs {
     /// Coefficient file to write, or - for standard output
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Replace an existing file, and what an earlier run left unfinished
+    /// Replace an existing file, and what an earlier run left unfinished unless --resume goes on with that
     #[arg(long)]
     force: bool,
     /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
@@ -168,7 +168,9 @@ pub(crate) fn finish(
 ) -> Result<()> {
     let report = go_on(source, config, begun, name, &mut out, &common.progress("blocks"));
     let report = report.inspect_err(|error| {
-        if let Some(part) = out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_))) {
+        if let Some(part) =
+            out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_) | Error::Changed { .. }))
+        {
             common.note(format_args!("{}: what is finished is kept; --resume goes on with it", part.display()));
         }
     })?;

@@ -77,7 +77,10 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     }
     let report = extract(&file, &config, &args.output, &mut out, &args.common.progress("frames"))?;
     out.commit()?;
-    args.common.detail(format_args!("{} of the file's {} bytes were read", report.file_bytes_read, report.file_bytes));
+    args.common.detail(format_args!(
+        "{} bytes were read of the file, which has {}",
+        report.file_bytes_read, report.file_bytes
+    ));
     args.common.report(&report, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
 }
