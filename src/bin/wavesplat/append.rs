@@ -44,7 +44,9 @@ pub(crate) struct AppendArgs {
 
 pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     args.common.start()?;
-    let path = args.file.canonicalize().map_err(|e| Error::io(&args.file, "opening", e))?; // not the link to it
+    let linked = args.file.is_symlink().then(|| args.file.canonicalize()).transpose();
+    let linked = linked.map_err(|e| Error::io(&args.file, "opening", e))?;
+    let path = linked.unwrap_or(args.file.clone()); // what is replaced is not the link
     let file = CoefficientFile::open(&path, args.input.access())?;
     let config = args.config(&file)?;
     let parsed = |what: String| Error::input(&args.file, format!("its settings are not understood: {what}"));
