@@ -148,17 +148,16 @@ impl CoefficientFile {
 
     /// What is wrong with the blocks of a leaf; an error if the storage fails.
     fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
-        let ids = (leaf.first_block..).take(leaf.count.into()).map(|block| BlockId { block, ..leaf.first() });
         let entries = match self.reader.leaf(leaf) {
-            Err(failed @ wavesplat_format::Error::Io(_)) => return Err(self.failed(failed)),
-            Err(wrong) => return Ok(ids.map(|id| (id, wrong.to_string())).collect()),
+            Err(failed) if failed.is_of_storage() => return Err(self.failed(failed)),
+            Err(wrong) => return Ok(leaf.ids().map(|id| (id, wrong.to_string())).collect()),
             Ok(entries) => entries,
         };
         let mut found = Vec::new();
         for entry in entries {
             match self.reader.check_stored(&entry) {
                 Ok(()) => {}
-                Err(failed @ wavesplat_format::Error::Io(_)) => return Err(self.failed(failed)),
+                Err(failed) if failed.is_of_storage() => return Err(self.failed(failed)),
                 Err(wrong) => found.push((entry.id, wrong.to_string())),
             }
         }
@@ -184,10 +183,9 @@ impl CoefficientFile {
     /// The entries of a leaf's blocks.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
-        let ids = (leaf.first_block..).take(leaf.count.into()).map(|block| BlockId { block, ..leaf.first() });
         let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
-        if ids.clone().all(|id| is_lost(&id)) {
-            return Ok(ids.map(BlockEntry::of_lost).collect());
+        if leaf.ids().all(|id| is_lost(&id)) {
+            return Ok(leaf.ids().map(BlockEntry::of_lost).collect());
         }
         let entries = self.reader.leaf(leaf).map_err(|e| self.failed(e))?.into_iter();
         Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::of_lost(entry.id) } else { entry }).collect())

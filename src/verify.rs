@@ -49,10 +49,7 @@ impl VerifyReport {
     fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(read) => Ok(Some(read)),
-            Err(Error::CoefficientFile { source: failed @ wavesplat_format::Error::Io(_), path }) => {
-                Err(Error::CoefficientFile { source: failed, path })
-            }
-            Err(wrong @ Error::CoefficientFile { .. }) => {
+            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_of_storage()) => {
                 self.damage(&wrong);
                 Ok(None)
             }
@@ -129,8 +126,8 @@ impl Comparison {
     }
 }
 
-/// Checks every byte of the file, whatever of it is damaged, and with a source every sample; the source must give the frames and the region that
-/// were converted. `memory` is what may be allocated, if it is enough for one block.
+/// Checks every byte of the file, whatever of it is damaged, and with a source every sample; the source must give the
+/// frames and the region that were converted. `memory` is what may be allocated, if it is enough for one block.
 pub fn verify(
     file: &CoefficientFile,
     mut source: Option<&mut dyn FrameSource>,

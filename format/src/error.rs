@@ -44,5 +44,12 @@ pub enum Error {
     Invalid(String),
 }
 
+impl Error {
+    /// Whether the storage failed, and nothing is said of the file.
+    pub fn is_of_storage(&self) -> bool {
+        matches!(self, Self::Io(_))
+    }
+}
+
 /// The package's result.
 pub type Result<T> = std::result::Result<T, Error>;

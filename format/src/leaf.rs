@@ -102,6 +102,12 @@ impl LeafEntry {
         }
     }
 
+    /// Its blocks.
+    pub fn ids(&self) -> impl Iterator<Item = BlockId> + Clone + use<> {
+        let first = self.first();
+        (self.first_block..).take(self.count.into()).map(move |block| BlockId { block, ..first })
+    }
+
     /// Bytes that its blocks' entries take at most.
     pub(crate) fn most_raw(&self) -> usize {
         usize::from(self.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)
@@ -111,8 +117,8 @@ impl LeafEntry {
     pub(crate) fn parse(&self, raw: &[u8]) -> Check<Vec<BlockEntry>> {
         let mut fields = Fields::new(raw);
         let mut entries = Vec::with_capacity(usize::from(self.count).min(raw.len() / BLOCK_ENTRY));
-        for block in (self.first_block..).take(self.count.into()) {
-            let (entry, id) = (BlockEntry::decode(&mut fields)?, BlockId { block, ..self.first() });
+        for id in self.ids() {
+            let entry = BlockEntry::decode(&mut fields)?;
             ensure(entry.id == id, || format!("{} where {id} belongs", entry.id))?;
             entries.push(entry);
         }

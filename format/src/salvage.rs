@@ -189,7 +189,7 @@ impl Salvage {
         for entry in own.into_iter().chain(told).filter(|entry| !entry.lost) {
             match self.parts(storage, &entry) {
                 Ok(block) => return Ok(Some(block)),
-                Err(failed @ Error::Io(_)) => return Err(failed),
+                Err(failed) if failed.is_of_storage() => return Err(failed),
                 Err(_) => {}
             }
         }

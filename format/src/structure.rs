@@ -77,7 +77,7 @@ pub(crate) fn check_padding(storage: &impl Storage, from: u64) -> Result<()> {
 fn note<T>(checked: Result<T>, found: &mut dyn FnMut(Error)) -> Result<()> {
     match checked {
         Ok(_) => Ok(()),
-        Err(failed @ Error::Io(_)) => Err(failed),
+        Err(failed) if failed.is_of_storage() => Err(failed),
         Err(wrong) => {
             found(wrong);
             Ok(())

@@ -11,7 +11,7 @@ use crate::reader::read_header;
 use crate::section::{Extent, Owner, decompress, section_at};
 use crate::structure::check_padding;
 use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
-use crate::{Error, Result, Storage};
+use crate::{Result, Storage};
 
 /// Whole windows at the beginning of a file, from which [`crate::Writer::go_on`] goes on.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ impl Unfinished {
         loop {
             match found.window(storage) {
                 Ok(()) => {}
-                Err(failed @ Error::Io(_)) => return Err(failed),
+                Err(failed) if failed.is_of_storage() => return Err(failed),
                 Err(_) => return Ok(found),
             }
         }

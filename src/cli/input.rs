@@ -1,13 +1,16 @@
 //! Options that say how an archive is read.
 
 use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
+use crate::convert::setting;
 use crate::error::{Error, Result};
+use crate::file::CoefficientFile;
 use crate::mapped::Access;
 use crate::output::part_of;
 use crate::sample::SampleType;
 use crate::source::{self, FrameSource, OpenOptions, Selection};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// The order of a sample's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -92,6 +95,27 @@ impl InputArgs {
         source.archive().notes.iter().for_each(|n| common.note(n));
         Ok(source)
     }
+}
+
+impl InputArgs {
+    /// Opens the archive that a file is of, or goes on with: of its variable, and narrowed to its region and to some frames.
+    pub fn open_again(
+        &self,
+        of: &CoefficientFile,
+        inputs: &[PathBuf],
+        frames: Option<FrameRange>,
+        common: &CommonArgs,
+    ) -> Result<Box<dyn FrameSource>> {
+        let mut input = self.clone();
+        input.variable = input.variable.or_else(|| setting(of.metadata(), "variable").map(String::from));
+        narrow(input.open(inputs, common)?, frames, remembered(of, "region")?)
+    }
+}
+
+/// What a file remembers under a name of what was converted.
+pub fn remembered<T: FromStr<Err = String>>(of: &CoefficientFile, name: &str) -> Result<Option<T>> {
+    let parsed = |what: String| Error::input(of.path(), format!("its settings are not understood: {what}"));
+    setting(of.metadata(), name).map(str::parse).transpose().map_err(parsed)
 }
 
 /// Narrows an archive to some frames and voxels.

@@ -6,7 +6,7 @@ mod input;
 mod terminal;
 mod values;
 
-pub use input::{InputArgs, narrow, spare_inputs};
+pub use input::{InputArgs, narrow, remembered, spare_inputs};
 pub use terminal::TerminalProgress;
 pub use values::{Dims, FrameList, FrameRange, Numbers, Pair, RegionSpec, Size, Triple, Whole};
 

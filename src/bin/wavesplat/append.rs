@@ -3,8 +3,8 @@
 use super::convert::finish;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
-use wavesplat::convert::{Begun, ConvertConfig, of_file, setting};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, spare_inputs};
+use wavesplat::convert::{Begun, ConvertConfig, of_file};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::output::{STANDARD, part_of};
@@ -49,11 +49,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let path = linked.unwrap_or(args.file.clone()); // what is replaced is not the link
     let file = CoefficientFile::open(&path, args.input.access())?;
     let config = args.config(&file)?;
-    let parsed = |what: String| Error::input(&args.file, format!("its settings are not understood: {what}"));
-    let region = setting(file.metadata(), "region").map(str::parse).transpose().map_err(parsed)?;
-    let mut input = args.input.clone();
-    input.variable = input.variable.or_else(|| setting(file.metadata(), "variable").map(String::from));
-    let mut source = narrow(input.open(&args.inputs, &args.common)?, args.frames, region)?;
+    let mut source = args.input.open_again(&file, &args.inputs, args.frames, &args.common)?;
     let timed = source.archive().times.is_empty() == file.metadata().times.is_empty();
     if !timed {
         return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));

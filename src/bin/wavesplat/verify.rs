@@ -2,8 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print};
-use wavesplat::convert::setting;
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, print, remembered};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::report::PromiseReport;
@@ -16,8 +15,8 @@ use wavesplat::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify
 Examples:
   wavesplat verify run.wspl
   wavesplat verify run.wspl --against frames/
-Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every sample is decoded and compared; exit code 4 if any is outside the bound, or
-further off than its block says. Of a file with a sampled bound, an estimate, what is checked is the rms of each series.
+Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every
+sample is decoded and compared; exit code 4 if any is outside the bound, or further off than its block says. Of a file with a sampled bound, an estimate, what is checked is the rms of each series.
 The frames and the region that were converted are remembered and chosen again, but for --frames.")]
 pub(crate) struct VerifyArgs {
     /// Coefficient file
@@ -77,13 +76,8 @@ impl VerifyArgs {
         if self.against.is_empty() {
             return Ok(None);
         }
-        let setting = |name: &str| setting(file.metadata(), name);
-        let parsed = |what: String| Error::input(&self.file, format!("its settings are not understood: {what}"));
-        let converted = setting("frames").map(str::parse).transpose().map_err(parsed)?;
-        let region = setting("region").map(str::parse).transpose().map_err(parsed)?;
-        let mut input = self.input.clone();
-        input.variable = input.variable.or_else(|| setting("variable").map(String::from));
-        narrow(input.open(&self.against, &self.common)?, self.frames.or(converted), region).map(Some)
+        let frames = self.frames.or(remembered(file, "frames")?);
+        self.input.open_again(file, &self.against, frames, &self.common).map(Some)
     }
 }
 
