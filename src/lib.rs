@@ -64,6 +64,7 @@ pub mod bound;
 pub mod camera;
 pub mod cli;
 pub mod codec;
+pub mod colour;
 pub mod convert;
 pub mod error;
 pub mod extract;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 7] = [
     &["error", "progress", "memory"],
     &["sample", "volume", "mapped", "output"],
-    &["bound", "wavelet", "camera", "footprint", "source", "npy"],
+    &["bound", "wavelet", "camera", "footprint", "source", "npy", "colour"],
     &["codec", "scan"],
     &["file", "report"],
     &["convert", "render", "extract", "verify", "recover", "resume"],
@@ -39,7 +39,7 @@ const HOMES: [(&str, &[&str]); 12] = [
     ("indicatif::", &["cli/"]),
     ("bytesize::", &["cli/"]),
     ("png::", &["render/sink.rs"]),
-    ("colorous::", &["render/colour.rs"]),
+    ("colorous::", &["colour/named.rs"]),
     ("npyz::", &["npy.rs", "source/npy.rs"]),
     ("quick_xml::", &["source/"]),
     ("half::", &["sample.rs", "bound.rs"]),

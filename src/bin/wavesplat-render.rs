@@ -10,16 +10,16 @@ use std::sync::Arc;
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
+use wavesplat::colour::{Norm, Rgb, Scale, TransferFunction};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
 use wavesplat::output::{Output, STANDARD};
 use wavesplat::progress::Silent;
-use wavesplat::render::colour::{self, ColourMap};
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, check, default_splat_error,
-    render,
+    CoefficientScene, FrameScene, Limit, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
+    default_splat_error, render,
 };
 use wavesplat::volume::Grid;
 use wavesplat_format::Metadata;
@@ -118,7 +118,7 @@ struct Cli {
     range: Option<Pair>,
     /// Colour of the background, as ffffff
     #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
-    background: colour::Rgb,
+    background: Rgb,
     /// From coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients")]
     method: MethodName,
@@ -237,9 +237,19 @@ impl Cli {
             self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
         }
         let open = |targets: Targets, range, coloured_array| {
-            let colours = ColourMap::new(self.colormap.as_deref().unwrap_or("viridis"), range, self.background)?;
+            let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis"))?;
+            let colours = Scale::new(&map, range, Norm::Linear, self.background)?;
             let (size, frames, fps, force) = (self.size.0, config.frames.clone(), self.fps, self.force);
-            let config = SinkConfig { format: targets.format, size, frames, fps, colours, coloured_array, force };
+            let config = SinkConfig {
+                format: targets.format,
+                size,
+                frames,
+                fps,
+                pixel: Pixel::Value,
+                colours,
+                coloured_array,
+                force,
+            };
             targets.names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
         };
         let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, seen.errors, false))?;
@@ -472,7 +482,7 @@ fn summary(r: &RenderReport) -> String {
     )
 }
 
-fn parse_colour(text: &str) -> std::result::Result<colour::Rgb, String> {
+fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
     let wrong = || "takes six hexadecimal digits, as ffffff".to_string();
     let digits = text.trim_start_matches('#');
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;

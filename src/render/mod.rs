@@ -20,7 +20,6 @@ mod canvas;
 mod certificate;
 mod coded;
 mod coefficients;
-pub mod colour;
 mod expectation;
 mod eye;
 mod finish;
@@ -204,7 +203,29 @@ impl ViewReport {
     }
 }
 
-/// A finished picture: `width * height` numbers, row by row.
+/// What the numbers of a pixel are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pixel {
+    /// A value.
+    Value,
+    /// Red, green and blue, each as a value is.
+    Channels,
+    /// Red, green and blue of the light that comes out, 0 to 1, and the opacity of all that is there.
+    Light,
+}
+
+impl Pixel {
+    /// How many there are.
+    pub fn numbers(self) -> usize {
+        match self {
+            Self::Value => 1,
+            Self::Channels => 3,
+            Self::Light => 4,
+        }
+    }
+}
+
+/// A finished picture: so many numbers for each of `width * height` pixels, row by row.
 pub type Picture<'a> = &'a [f32];
 
 /// A frame as it was rendered.

@@ -1,7 +1,7 @@
 //! Finished pictures out: numbered PNG files, or one stream for another program.
 
-use super::Picture;
-use super::colour::ColourMap;
+use super::{Picture, Pixel};
+use crate::colour::{Rgb, Scale};
 use crate::error::{Error, Result};
 use crate::npy;
 use crate::output::{Output, STANDARD};
@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 pub enum PictureFormat {
     /// One PNG for each, 8 bits a channel; in a stream one after the other.
     Png,
-    /// One NumPy array for all: float32 (frames, H, W), or uint8 (frames, H, W, 3) if colours were asked for.
+    /// One NumPy array for all: float32 (frames, H, W) or, of colours and of light, (frames, H, W, 3) and (frames, H, W, 4);
+    /// uint8 (frames, H, W, 3) if colours were asked for.
     Npy,
     /// YUV4MPEG2, 4:4:4, full range: for video encoders and players.
     Y4m,
@@ -41,12 +42,26 @@ pub struct SinkConfig {
     pub frames: Vec<usize>,
     /// Frames a second, where the format says it.
     pub fps: u32,
+    /// What the numbers of a pixel are.
+    pub pixel: Pixel,
     /// Values to colours.
-    pub colours: ColourMap,
+    pub colours: Scale,
     /// Whether an array holds colours instead of values.
     pub coloured_array: bool,
     /// Replace existing files.
     pub force: bool,
+}
+
+impl SinkConfig {
+    /// The colour of a pixel.
+    fn colour(&self, pixel: &[f32]) -> Rgb {
+        match *pixel {
+            [value] => self.colours.colour(value),
+            [r, g, b] => self.colours.colour_of_channels([r, g, b]),
+            [r, g, b, opacity] => self.colours.over_background([r, g, b], opacity),
+            _ => self.colours.background(),
+        }
+    }
 }
 
 /// Where pictures go.
@@ -190,7 +205,11 @@ fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
         PictureFormat::Npy if config.coloured_array => {
             npy::write_header(SampleType::U8, &[config.frames.len(), height, width, 3], out)
         }
-        PictureFormat::Npy => npy::write_header(SampleType::F32, &[config.frames.len(), height, width], out),
+        PictureFormat::Npy => {
+            let shape = [config.frames.len(), height, width, config.pixel.numbers()];
+            let axes = if config.pixel == Pixel::Value { 3 } else { 4 };
+            npy::write_header(SampleType::F32, &shape[..axes], out)
+        }
         PictureFormat::Y4m => {
             writeln!(out, "YUV4MPEG2 W{width} H{height} F{}:1 Ip A1:1 C444 XCOLORRANGE=FULL", config.fps)
         }
@@ -200,7 +219,8 @@ fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
 
 /// Writes one picture.
 fn write(config: &SinkConfig, picture: Picture<'_>, out: &mut impl Write) -> io::Result<()> {
-    let rgb = || picture.iter().flat_map(|v| config.colours.colour(*v)).collect::<Vec<u8>>();
+    let colours = || picture.chunks_exact(config.pixel.numbers()).map(|pixel| config.colour(pixel));
+    let rgb = || colours().flatten().collect::<Vec<u8>>();
     match config.format {
         PictureFormat::Png => write_png(config.size, &rgb(), out),
         PictureFormat::Npy if !config.coloured_array => {
@@ -209,7 +229,7 @@ fn write(config: &SinkConfig, picture: Picture<'_>, out: &mut impl Write) -> io:
         PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(&rgb()),
         PictureFormat::Y4m => {
             writeln!(out, "FRAME")?;
-            let pixels: Vec<[u8; 3]> = picture.iter().map(|v| yuv(config.colours.colour(*v))).collect();
+            let pixels: Vec<[u8; 3]> = colours().map(yuv).collect();
             (0..3).try_for_each(|plane| out.write_all(&pixels.iter().map(|p| p[plane]).collect::<Vec<u8>>()))
         }
         PictureFormat::Gray16 => {

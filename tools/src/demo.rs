@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use wavesplat::camera::View;
+use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
@@ -14,7 +15,6 @@ use wavesplat::footprint::Kernel;
 use wavesplat::mapped::Access;
 use wavesplat::output::Output;
 use wavesplat::progress::Silent;
-use wavesplat::render::colour::ColourMap;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, RenderReport, Scene, What, render};
 use wavesplat::sample::SampleType;
 use wavesplat::source::{self, FrameSource, OpenOptions};
@@ -143,7 +143,8 @@ fn shown(run: &Run) -> Vec<f32> {
 /// Figure 5: a row for each method, and a row for what each differs from the first.
 fn draw(runs: &[&Run], bound: f64, path: &Path) -> Result<()> {
     let brightest = shown(runs[0]).into_iter().fold(0.0, f32::max);
-    let map = ColourMap::new("rainbow", (0.0, f64::from(brightest)), [0; 3])?;
+    let rainbow = TransferFunction::open("rainbow")?;
+    let map = Scale::new(&rainbow, (0.0, f64::from(brightest)), Norm::Linear, [0; 3])?;
     let mut rows = Vec::new();
     for (letter, run) in ('a'..).zip(runs) {
         let images = shown(run);

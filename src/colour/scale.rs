@@ -1,0 +1,117 @@
+//! The colours of a picture's pixels.
+
+use super::{Colour, Rgb, TransferFunction};
+use crate::error::{Error, Result};
+
+/// How values are spread over the colours.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Norm {
+    /// Evenly.
+    #[default]
+    Linear,
+    /// By their logarithm: every factor of ten as much as any other.
+    Log,
+}
+
+/// Values to colours: a transfer function over a range, and the background.
+#[derive(Debug, Clone)]
+pub struct Scale {
+    /// Of shares, 0 to 1.
+    map: TransferFunction,
+    range: (f64, f64),
+    norm: Norm,
+    background: Rgb,
+}
+
+impl Scale {
+    /// From the first to the last colour over `range`.
+    ///
+    /// # Errors
+    /// A range that is not finite or out of order, or not above 0 for a logarithm.
+    pub fn new(map: &TransferFunction, range: (f64, f64), norm: Norm, background: Rgb) -> Result<Self> {
+        let (lo, hi) = range;
+        if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
+            return Err(Error::usage(format!("--range {lo},{hi}: takes two numbers, the lower one first")));
+        }
+        if norm == Norm::Log && lo <= 0.0 {
+            let what = "a logarithm takes a range above 0; give --range, or --norm linear";
+            return Err(Error::usage(format!("--norm log: {what} (the range is {lo},{hi})")));
+        }
+        Ok(Self { map: map.over((0.0, 1.0))?, range, norm, background })
+    }
+
+    /// The colour of a value: beyond the range the end's, of NaN the background.
+    pub fn colour(&self, value: f32) -> Rgb {
+        if value.is_nan() {
+            return self.background;
+        }
+        self.map.colour(self.share(value)).map_or(self.background, bytes)
+    }
+
+    /// The colour of which these are the channels, each spread over the range; the background where any is NaN.
+    pub fn colour_of_channels(&self, channels: [f32; 3]) -> Rgb {
+        if channels.iter().any(|c| c.is_nan()) { self.background } else { bytes(channels.map(|c| self.share(c))) }
+    }
+
+    /// The colour of light that comes through with such an opacity, before the background.
+    pub fn over_background(&self, light: [f32; 3], opacity: f32) -> Rgb {
+        let behind = f64::from(1.0 - opacity) / 255.0;
+        let seen = |i: usize| (f64::from(light[i]) + behind * f64::from(self.background[i])).clamp(0.0, 1.0);
+        bytes(std::array::from_fn(seen))
+    }
+
+    /// Where a value lies in the range, 0 to 1; NaN counts as 0.
+    pub fn share(&self, value: f32) -> f64 {
+        let normed = |v: f64| if self.norm == Norm::Log { libm::log(v.max(f64::MIN_POSITIVE)) } else { v };
+        let (lo, hi) = (normed(self.range.0), normed(self.range.1));
+        let t = (normed(f64::from(value)) - lo) / (hi - lo);
+        if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
+    }
+
+    /// The values of the first and the last colour.
+    pub fn range(&self) -> (f64, f64) {
+        self.range
+    }
+
+    /// What is where there is nothing.
+    pub fn background(&self) -> Rgb {
+        self.background
+    }
+}
+
+/// To 8 bits a channel.
+pub(super) fn bytes(colour: Colour) -> Rgb {
+    colour.map(|c| (c * 255.0).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colour::NAMES;
+
+    #[test]
+    fn values_beyond_the_range_take_its_ends_and_nan_the_background() {
+        let grey = TransferFunction::open("grey").expect("a known map");
+        let scale = |range| Scale::new(&grey, range, Norm::Linear, [9, 8, 7]).expect("a range");
+        assert_eq!(scale((1.0, 2.0)).colour(-5.0), [0; 3]);
+        assert_eq!(scale((1.0, 2.0)).colour(7.0), [255; 3]);
+        assert_eq!(scale((1.0, 2.0)).colour(f32::NAN), [9, 8, 7]);
+        assert_eq!(scale((2.0, 2.0)).colour(2.0), [0; 3], "an empty range");
+    }
+
+    #[test]
+    fn a_logarithm_gives_every_factor_as_much() {
+        let grey = TransferFunction::open("grey").expect("a known map");
+        let scale = Scale::new(&grey, (1e-2, 1e2), Norm::Log, [0; 3]).expect("a range");
+        for (value, share) in [(1e-2, 0.0), (1e-1, 0.25), (1.0, 0.5), (1e2, 1.0), (-3.0, 0.0), (0.0, 0.0)] {
+            assert!((scale.share(value) - share).abs() < 1e-7, "{value}");
+        }
+        assert!(Scale::new(&grey, (0.0, 1.0), Norm::Log, [0; 3]).is_err());
+    }
+
+    #[test]
+    fn every_name_is_known() {
+        assert!(NAMES.iter().all(|name| TransferFunction::open(name).is_ok()));
+        assert!(TransferFunction::open("no such").is_err());
+    }
+}
