@@ -76,6 +76,11 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
     }
 
+    /// The depths of the nearest and of the farthest corner of `grid`, in world units.
+    pub fn depths_of(&self, grid: &Grid) -> [f64; 2] {
+        [self.nearest_of(grid), corners(grid).map(|p| self.project(p)[2]).fold(f64::NEG_INFINITY, f64::max)]
+    }
+
     /// The depth of the nearest corner of `grid`, which may be a part of the one that depths are counted from.
     pub fn nearest_of(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)

@@ -19,7 +19,7 @@ pub struct Kernel {
 impl Kernel {
     /// With the default sigma, 0.75 of the largest spacing, unless one is given.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
-        let sigma = sigma.unwrap_or(0.75 * grid.spacing.iter().copied().fold(0.0, f64::max));
+        let sigma = sigma.unwrap_or(0.75 * grid.largest_spacing());
         let sensible = sigma.is_finite() && sigma > 0.0 && tau.is_finite() && tau >= 0.0;
         if !sensible {
             return Err(Error::usage("--sigma takes a number above 0, and --tau a number of 0 or more"));

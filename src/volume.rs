@@ -19,6 +19,11 @@ impl Grid {
         Self { dims, spacing: [1.0; 3], origin: [0.0; 3] }
     }
 
+    /// The largest distance of neighbouring voxels, in world units.
+    pub fn largest_spacing(&self) -> f64 {
+        self.spacing.into_iter().fold(0.0, f64::max)
+    }
+
     /// The region of all voxels.
     pub fn whole(&self) -> Region {
         Region { start: [0; 3], end: self.dims }

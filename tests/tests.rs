@@ -11,6 +11,7 @@ mod choice;
 mod cli;
 mod coefficients;
 mod common;
+mod composite;
 mod determinism;
 mod every_float;
 mod expected;

@@ -9,7 +9,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
-use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
+use wavesplat::cli::{
+    self, CommonArgs, FrameList, InputArgs, OpacityPoints, Pair, RegionSpec, Triple, Whole, spare_inputs,
+};
 use wavesplat::colour::{Norm, Rgb, Scale, TransferFunction};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
@@ -18,7 +20,7 @@ use wavesplat::output::{Output, STANDARD};
 use wavesplat::progress::Silent;
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
+    CoefficientScene, FrameScene, Limit, Mode, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
     default_splat_error, render,
 };
 use wavesplat::volume::Grid;
@@ -119,6 +121,21 @@ struct Cli {
     /// Colour of the background, as ffffff
     #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
     background: Rgb,
+    /// What becomes of what lies along a ray
+    #[arg(long, value_enum, default_value = "projection", help_heading = "Along the ray")]
+    mode: ModeName,
+    /// Colours and opacities of a composite: a map's name or a file (ParaView's JSON, CSV)
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
+    transfer_function: Option<String>,
+    /// Opacities of a composite in place of the file's: share of the range and opacity, as 0:0,0.5:0.1,1:0.8
+    #[arg(long, value_name = "X:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
+    opacity: Option<OpacityPoints>,
+    /// World units of a path that has such an opacity [default: the largest spacing]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
+    opacity_unit: Option<f64>,
+    /// Slabs that the volume is cut into [default: each as thick as the largest spacing]
+    #[arg(long, value_name = "N", help_heading = "Along the ray")]
+    slabs: Option<usize>,
     /// From coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients")]
     method: MethodName,
@@ -164,6 +181,16 @@ impl From<ErrorName> for Limit {
             ErrorName::Expected => Self::Expected,
         }
     }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModeName {
+    /// It is summed up or averaged: --quantity
+    Projection,
+    /// It is coloured and hides what is behind: --transfer-function
+    Composite,
+    /// The largest value is taken
+    Mip,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -223,7 +250,8 @@ impl Cli {
         let coloured_array = self.colormap.is_some();
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
         let in_colours = pictures.format != PictureFormat::Npy || coloured_array;
-        let needed = in_colours && self.range.is_none() || certify;
+        let light = config.mode.pixel() == Pixel::Light;
+        let needed = in_colours && self.range.is_none() && !light || certify;
         let looking = RenderConfig { certify, ..config.clone() };
         if needed {
             check(scene, config)?; // or small pictures would be made in vain, and what they need be named
@@ -236,25 +264,17 @@ impl Cli {
         if certify {
             self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
         }
-        let open = |targets: Targets, range, coloured_array| {
+        let open = |targets: Targets, pixel, range, coloured_array| {
             let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis"))?;
             let colours = Scale::new(&map, range, Norm::Linear, self.background)?;
             let (size, frames, fps, force) = (self.size.0, config.frames.clone(), self.fps, self.force);
-            let config = SinkConfig {
-                format: targets.format,
-                size,
-                frames,
-                fps,
-                pixel: Pixel::Value,
-                colours,
-                coloured_array,
-                force,
-            };
+            let config =
+                SinkConfig { format: targets.format, size, frames, fps, pixel, colours, coloured_array, force };
             targets.names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
         };
-        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, seen.errors, false))?;
+        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, Pixel::Value, seen.errors, false))?;
         let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
-        Ok((open(pictures, range, coloured_array)?, errors, coloured))
+        Ok((open(pictures, config.mode.pixel(), range, coloured_array)?, errors, coloured))
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -330,11 +350,30 @@ impl Cli {
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
+            mode: self.mode()?,
             memory: self.common.memory.0,
             reserved: self.views.len()
                 * self.orbit as usize
                 * (1 + usize::from(self.error_image.is_some()))
                 * Output::BUFFER,
+        })
+    }
+
+    /// What becomes of what lies along a ray.
+    fn mode(&self) -> Result<Mode> {
+        let slabs = self.slabs;
+        Ok(match self.mode {
+            ModeName::Projection => Mode::Projection,
+            ModeName::Mip => Mode::Mip { slabs },
+            ModeName::Composite => {
+                let transfer = TransferFunction::open(self.transfer_function.as_deref().unwrap_or("viridis"))?;
+                let transfer = self.range.map_or(Ok(transfer.clone()), |r| transfer.over((r.0[0], r.0[1])))?;
+                let transfer = match &self.opacity {
+                    Some(points) => transfer.with_opacity(&points.0).map_err(Error::usage)?,
+                    None => transfer,
+                };
+                Mode::Composite { transfer, unit: self.opacity_unit, slabs }
+            }
         })
     }
 

@@ -8,7 +8,7 @@ mod values;
 
 pub use input::{InputArgs, narrow, remembered, spare_inputs};
 pub use terminal::TerminalProgress;
-pub use values::{Dims, FrameList, FrameRange, Numbers, Pair, RegionSpec, Size, Triple, Whole};
+pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole};
 
 use crate::error::{Error, Result};
 use crate::mapped;

@@ -191,6 +191,23 @@ impl RegionSpec {
     }
 }
 
+/// Opacities at shares of a range, as `0:0,0.5:0.1,1:0.8`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpacityPoints(pub Vec<(f64, f64)>);
+
+impl FromStr for OpacityPoints {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let point = |text: &str| {
+            let (share, opacity) = text.split_once(':')?;
+            Some((share.trim().parse().ok()?, opacity.trim().parse().ok()?))
+        };
+        let points = text.split(',').map(point).collect::<Option<Vec<_>>>();
+        points.map(Self).ok_or_else(|| "takes pairs of a share and an opacity, as 0:0,0.5:0.1,1:0.8".into())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -61,14 +61,24 @@ impl<'a> Canvas<'a> {
 
     /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
     pub(super) fn finish<T: Send>(&self, pictures: &mut [T], finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync) {
+        self.finish_some(pictures, |_| true, finish);
+    }
+
+    /// The same for every tile that is `wanted`.
+    pub(super) fn finish_some<T: Send>(
+        &self,
+        pictures: &mut [T],
+        wanted: impl Fn(&Place) -> bool + Sync,
+        finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync,
+    ) {
         let width = self.band.eye.camera.size[0];
-        let side = self.band.eye.lattice.as_ref().map_or(TILE, Lattice::tile);
+        let side = self.band.eye.tile();
         let columns = width.div_ceil(side);
         let places = Place::cover(width, self.band.rows.clone(), side);
         let bands = self.by_rows_of_tiles(pictures, side);
         places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
             let mut pixels = Pixels { planes, width, top: places[0].y.start };
-            for (i, place) in places.iter().enumerate() {
+            for (i, place) in places.iter().enumerate().filter(|(_, place)| wanted(place)) {
                 let sums = match &self.sums {
                     Sums::Tiles(tiles) => OfTile::Tile(&tiles[n * columns + i]),
                     Sums::Cells(lattice, cells) => OfTile::Gather(lattice.gather(cells, place)),
@@ -138,10 +148,17 @@ pub(super) struct Pixels<'a, T> {
     top: usize,
 }
 
+impl<T> Pixels<'_, T> {
+    /// Neighbouring pixels of a row of a picture.
+    pub(super) fn at(&mut self, picture: usize, [x, y]: [usize; 2], count: usize) -> &mut [T] {
+        &mut self.planes[picture][(y - self.top) * self.width + x..][..count]
+    }
+}
+
 impl<T: Copy> Pixels<'_, T> {
     /// Puts neighbouring pixels of a row into a picture.
     pub(super) fn put(&mut self, picture: usize, [x, y]: [usize; 2], pixels: &[T]) {
-        self.planes[picture][(y - self.top) * self.width + x..][..pixels.len()].copy_from_slice(pixels);
+        self.at(picture, [x, y], pixels.len()).copy_from_slice(pixels);
     }
 }
 
@@ -212,7 +229,8 @@ fn splat_into_cells(
         let planes = source.planes(block)?;
         let placed = |n: usize| {
             let (eye, seen) = (bands[n].eye, bands[n].sees(block));
-            seen.then(|| lattices[n].placed(&eye.blocks.region(block), &eye.clip, &there[n]))
+            let slab = eye.slab.as_ref();
+            seen.then(|| lattices[n].placed(&eye.blocks.region(block), (&eye.clip, slab), &there[n]))
         };
         let (seen, held) = ((0..bands.len()).map(placed).collect(), planes.held());
         Ok(BlockInBands { block: planes, seen, held })

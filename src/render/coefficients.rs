@@ -15,7 +15,7 @@ use crate::sample::magnitude;
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, PartEntry, PartKind, Window};
+use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,6 +154,7 @@ impl<'a> CoefficientGroup<'a> {
             values: samples || by_values || exact || record.outliers > 0 || missing,
             absent: missing,
             error_planes: error_planes(config, codec.parts()),
+            lengths: false,
             order: if samples || by_values || is_dense(record, file.grid.whole().voxels()) {
                 Order::Pixels
             } else {
@@ -291,6 +292,19 @@ impl Group for CoefficientGroup<'_> {
             }
         }
         Ok(found)
+    }
+
+    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>> {
+        let mut ranges = Vec::new();
+        for entries in self.file.entries(self.window, region) {
+            for entry in entries? {
+                let BlockStats { min, max, reached, .. } = entry.stats;
+                // What is splatted may be as far from the source's samples as those that were decoded are.
+                let off = reached.max(self.keep(&entry).certified) + reached;
+                ranges.push((entry.id.block as usize, ((min - off).next_down(), (max + off).next_up())));
+            }
+        }
+        Ok(ranges)
     }
 
     fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64> {

@@ -1,8 +1,9 @@
 //! Where a scene is seen from, and how it is splatted: everything that is the same for all frames of a view.
 
 use super::lattice::Lattice;
-use super::place::{overlap, rows_reached};
+use super::place::{TILE, overlap, pixels_reached};
 use super::scene::Scene;
+use super::slabs::Slab;
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
 use crate::camera::{Camera, View};
 use crate::error::{Error, Result};
@@ -34,6 +35,8 @@ pub(super) struct Eye {
     pub(super) stated_error: f64,
     /// Voxels further away may be left out.
     pub(super) deepest: f64,
+    /// What of the volume is seen, if not all.
+    pub(super) slab: Option<Slab>,
 }
 
 impl Eye {
@@ -64,11 +67,16 @@ impl Eye {
         let method = instead.unwrap_or(method);
         let (tau, stated_error) = (config.kernel.tau, method.stated_error);
         let deepest = f64::INFINITY;
-        Ok(Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest })
+        Ok(Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest, slab: None })
     }
 
     pub(super) fn pixels(&self) -> usize {
         self.camera.size[0] * self.camera.size[1]
+    }
+
+    /// Pixels a side of a tile.
+    pub(super) fn tile(&self) -> usize {
+        self.lattice.as_ref().map_or(TILE, Lattice::tile)
     }
 
     /// Whether a block is so deep that it may be left out.
@@ -78,17 +86,27 @@ impl Eye {
 
     /// Whether a block is to be splatted into these rows of the picture.
     pub(super) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
-        self.reaches(block, rows) && !self.is_too_deep(block)
+        self.is_in_slab(block) && self.reaches(block, rows) && !self.is_too_deep(block)
+    }
+
+    /// Whether any kernel of a block reaches into the slab that is seen.
+    pub(super) fn is_in_slab(&self, block: usize) -> bool {
+        let region = || self.blocks.region(block).intersect(&self.clip);
+        self.slab.is_none_or(|slab| slab.is_reached(&region(), &self.grid, &self.camera))
     }
 
     /// Whether any voxel of a block can reach these rows of the picture.
     pub(super) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
+        overlap(&self.pixels_reached(block)[1], rows)
+    }
+
+    /// The columns and rows that any voxel of a block can reach.
+    pub(super) fn pixels_reached(&self, block: usize) -> [Range<usize>; 2] {
         let region = self.blocks.region(block).intersect(&self.clip);
-        let reached = match &self.lattice {
-            _ if region.is_empty() => 0..0,
-            Some(lattice) => lattice.rows_reached(&region, self.camera.size),
-            None => rows_reached(&region, &self.grid, &self.camera, &self.footprint),
-        };
-        overlap(&reached, rows)
+        match &self.lattice {
+            _ if region.is_empty() => [0..0, 0..0],
+            Some(lattice) => lattice.pixels_reached(&region, self.camera.size),
+            None => pixels_reached(&region, &self.grid, &self.camera, &self.footprint),
+        }
     }
 }

@@ -84,6 +84,7 @@ impl Scene for FrameScene {
             values: true,
             absent,
             error_planes: 0,
+            lengths: false,
             order: Order::Pixels,
         };
         let errors = seen.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
@@ -127,6 +128,11 @@ impl Group for FrameGroup<'_> {
         let blocks: Vec<usize> = self.blocks.touching(region).collect();
         let empty = (self.blocks.len() - blocks.len()) as u64;
         Ok(Contents { blocks, empty, ..Contents::default() })
+    }
+
+    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>> {
+        let of_any = (f64::NEG_INFINITY, f64::INFINITY);
+        Ok(self.blocks.touching(region).map(|block| (block, of_any)).collect())
     }
 
     fn expected(&self, _: &Region, _: &Expectation<'_>) -> Result<f64> {

@@ -30,6 +30,7 @@ mod plan;
 mod reading;
 mod scene;
 pub mod sink;
+mod slabs;
 mod splat;
 mod terms;
 mod uncut;
@@ -41,6 +42,7 @@ pub use frames::FrameScene;
 pub use scene::{LeftOut, Scene};
 
 use crate::camera::View;
+use crate::colour::TransferFunction;
 use crate::error::{Error, Result};
 use crate::footprint::{Kernel, Method};
 use crate::progress::Progress;
@@ -64,9 +66,48 @@ pub enum Quantity {
     Emission,
 }
 
+/// What becomes of what lies along a ray.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum Mode {
+    /// It is summed up: the quantity that is asked for.
+    #[default]
+    Projection,
+    /// It is coloured, and hides what is behind (method.md section 7).
+    Composite {
+        /// Colour and opacity of every value.
+        transfer: TransferFunction,
+        /// World units of a path that has such an opacity; by default the largest spacing.
+        unit: Option<f64>,
+        /// Slabs that the volume is cut into; by default each is about as thick as the largest spacing.
+        slabs: Option<usize>,
+    },
+    /// The largest value is taken.
+    Mip {
+        /// As of [`Self::Composite`].
+        slabs: Option<usize>,
+    },
+}
+
+impl Mode {
+    /// What the numbers of a pixel are.
+    pub fn pixel(&self) -> Pixel {
+        if matches!(self, Self::Composite { .. }) { Pixel::Light } else { Pixel::Value }
+    }
+
+    /// How many slabs are asked for.
+    fn slabs(&self) -> Option<usize> {
+        match self {
+            Self::Projection => None,
+            Self::Composite { slabs, .. } | Self::Mip { slabs } => *slabs,
+        }
+    }
+}
+
 /// How to render.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
+    /// What becomes of what lies along a ray.
+    pub mode: Mode,
     /// From where; pictures of all views are equally large.
     pub views: Vec<View>,
     /// The kernel.
@@ -119,7 +160,16 @@ impl RenderConfig {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
             return Err(Error::usage("takes one view or more, with pictures of one size"));
         }
-        Ok(())
+        if self.mode == Mode::Projection {
+            return Ok(());
+        }
+        let refused = [
+            (self.kernel.tau != 0.0, "--tau: attenuates projections; what hides what is the transfer function's"),
+            (self.certify, "--error-image: certifies projections alone"),
+            (self.chooses_by_view(), "--error expected: is of projections alone"),
+            (self.quantity != Quantity::Mean, "--quantity: is of projections alone"),
+        ];
+        refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, what)| Err(Error::usage(*what)))
     }
 }
 
@@ -141,13 +191,19 @@ pub struct RenderReport {
     pub blocks_outside: u64,
     /// Blocks left out because they lie so deep that what they add is within the splat error.
     pub blocks_dimmed: u64,
+    /// Tiles of all slabs, of every group of frames.
+    pub tiles: u64,
+    /// Those among them that are clear whatever their blocks hold.
+    pub tiles_clear: u64,
+    /// Tiles of pictures that became opaque in all frames of a group, so that what is behind was left out.
+    pub tiles_opaque: u64,
     /// What a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
     /// What of these blocks was not read because it is of frames that were not asked for.
     pub other_frames: LeftOut,
     /// No sample that was splatted is further from the source's.
     pub certified_sample_error: f64,
-    /// Of all views, the root mean square of what each view reports.
+    /// Of all views, the root mean square of what each view reports; NaN unless these are projections.
     pub expected_error: f64,
     /// The largest error that a pixel may have, if pictures are certified.
     pub certified_error: Option<f64>,
@@ -178,6 +234,8 @@ pub struct ViewReport {
     pub scale: f64,
     /// The splat method.
     pub method: &'static str,
+    /// The slabs that the volume is cut into.
+    pub slabs: Option<usize>,
     /// Its stated error, in the terms of the splat error that was asked for.
     pub stated_splat_error: f64,
     /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
@@ -186,6 +244,14 @@ pub struct ViewReport {
 }
 
 impl RenderReport {
+    /// Adds what a group says of its blocks.
+    fn add(&mut self, contents: &Contents) {
+        self.blocks_empty += contents.empty;
+        self.left_out += contents.left_out;
+        self.other_frames += contents.other_frames;
+        self.certified_sample_error = self.certified_sample_error.max(contents.certified);
+    }
+
     /// Turns sums over the frames of each view into root mean squares, and all these into one.
     fn sum_up_expected_errors(&mut self) {
         let (frames, views) = (self.frames.max(1) as f64, self.views.len() as f64);
@@ -199,7 +265,7 @@ impl ViewReport {
     fn new(view: &View, eye: &Eye) -> Self {
         let &View { azimuth, elevation, .. } = view;
         let (scale, method, stated_splat_error) = (eye.camera.scale, eye.method.name, eye.stated_error);
-        Self { azimuth, elevation, scale, method, stated_splat_error, expected_error: 0.0 }
+        Self { azimuth, elevation, scale, method, slabs: None, stated_splat_error, expected_error: 0.0 }
     }
 }
 
@@ -251,7 +317,6 @@ pub fn render(
 ) -> Result<RenderReport> {
     let started = Instant::now();
     let eyes = eyes(scene, config)?;
-    progress.start(Some((eyes.len() * config.frames.len()) as u64));
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
     report.views = config.views.iter().zip(&eyes).map(|(view, eye)| ViewReport::new(view, eye)).collect();
     let mut sink_time = Duration::ZERO;
@@ -259,19 +324,61 @@ pub fn render(
         let writing = Instant::now();
         sink(rendered)?;
         sink_time += writing.elapsed();
-        progress.advance(1);
         Ok(())
     };
-    let mut first = 0;
-    while first < eyes.len() {
-        let budget = Budget::of_most(config, scene, &eyes[first..]);
-        render_views(scene, config, (&budget, first), &mut report, &mut sink)?;
-        first += budget.eyes().len();
+    if config.mode == Mode::Projection {
+        project(scene, config, &eyes, progress, &mut report, &mut sink)?;
+    } else {
+        cut_and_blend(scene, config, &eyes, progress, &mut report, &mut sink)?;
     }
     progress.finish();
     report.sum_up_expected_errors();
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
+}
+
+/// Renders projections, of as many views together as there is memory for.
+fn project(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    eyes: &[Eye],
+    progress: &dyn Progress,
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
+    progress.start(Some((eyes.len() * config.frames.len()) as u64));
+    let mut sink = |rendered: Rendered<'_>| {
+        progress.advance(1);
+        sink(rendered)
+    };
+    let mut first = 0;
+    while first < eyes.len() {
+        let budget = Budget::of_most(config, scene, &eyes[first..]);
+        render_views(scene, config, (&budget, first), report, &mut sink)?;
+        first += budget.eyes().len();
+    }
+    Ok(())
+}
+
+/// Renders pictures of slabs, view by view; progress is in rows of pixels of slabs.
+fn cut_and_blend(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    eyes: &[Eye],
+    progress: &dyn Progress,
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
+    let views = eyes.iter().map(|eye| slabs::cut(eye, config)).collect::<Result<Vec<_>>>()?;
+    let all: usize = views.iter().map(|slabs| slabs.eyes.len()).sum();
+    progress.start(Some((all * config.frames.len() * config.size()[1]) as u64));
+    for (view, slabs) in views.iter().enumerate() {
+        let mut sink = |frame, picture: &[f32]| sink(Rendered { view, frame, picture, error: None });
+        report.views[view].slabs = Some(slabs.eyes.len());
+        report.views[view].expected_error = f64::NAN;
+        slabs::render_view(scene, config, slabs, progress, report, &mut sink)?;
+    }
+    Ok(())
 }
 
 /// An error if [`render`] would refuse to begin.
@@ -284,7 +391,10 @@ fn eyes(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<Eye>> {
     config.check()?;
     let eye = |view: &View| uncut::without_what_is_dim(Eye::new(scene, config, view)?, config);
     let eyes = config.views.iter().map(eye).collect::<Result<Vec<_>>>()?;
-    Budget::check(config, scene, &eyes)?;
+    match config.mode {
+        Mode::Projection => Budget::check(config, scene, &eyes)?,
+        _ => eyes.iter().try_for_each(|eye| Budget::check(config, scene, &slabs::cut(eye, config)?.eyes))?,
+    }
     Ok(eyes)
 }
 
@@ -368,6 +478,11 @@ impl<'a> Look<'a> {
     fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
         Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
     }
+
+    /// Where nothing is weighed.
+    fn of_no_weights(eye: &'a Eye) -> Self {
+        Self { eye, weights: Weights::default() }
+    }
 }
 
 /// The pictures of a group from one view.
@@ -424,17 +539,15 @@ fn render_group(
 fn blocks_to_read(group: &dyn Group, looks: &[Look<'_>], report: &mut RenderReport) -> Result<Vec<usize>> {
     let eye = looks[0].eye;
     let all_rows = 0..eye.camera.size[1];
-    let Contents { mut blocks, empty, left_out, other_frames, certified } = group.blocks(&eye.clip)?;
+    let contents = group.blocks(&eye.clip)?;
+    report.add(&contents);
+    let mut blocks = contents.blocks;
     let held = blocks.len();
     blocks.retain(|b| looks.iter().any(|look| look.eye.reaches(*b, &all_rows)));
     let reached = blocks.len();
     blocks.retain(|b| looks.iter().any(|look| look.eye.sees(*b, &all_rows)));
     report.blocks += eye.blocks.len() as u64;
-    report.blocks_empty += empty;
     report.blocks_outside += (held - reached) as u64;
     report.blocks_dimmed += (reached - blocks.len()) as u64;
-    report.left_out += left_out;
-    report.other_frames += other_frames;
-    report.certified_sample_error = report.certified_sample_error.max(certified);
     Ok(blocks)
 }

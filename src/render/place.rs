@@ -35,15 +35,21 @@ impl Place {
     }
 }
 
-/// The rows of the picture that any voxel of a block can reach; a block that reaches no column reaches no row.
-pub(super) fn rows_reached(region: &Region, grid: &Grid, camera: &Camera, footprint: &Footprint) -> Range<usize> {
+/// The columns and rows of the picture that any voxel of a block can reach; where it reaches none of these, none of those.
+pub(super) fn pixels_reached(
+    region: &Region,
+    grid: &Grid,
+    camera: &Camera,
+    footprint: &Footprint,
+) -> [Range<usize>; 2] {
     let ends: [[f64; 3]; 2] = [grid.position(region.start), grid.position(region.end.map(|e| e - 1))];
     let corner = |n: usize| camera.project(std::array::from_fn(|a| ends[n >> a & 1][a]));
-    rows_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
+    pixels_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
 }
 
-/// The rows of a picture of such a size that are within `reach` pixels of the box around some places; none if no column is.
-pub(super) fn rows_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, size: [usize; 2]) -> Range<usize> {
+/// The columns and rows of a picture of such a size that are within `reach` pixels of the box around some places; none of
+/// either if there are none of one.
+pub(super) fn pixels_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, size: [usize; 2]) -> [Range<usize>; 2] {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for place in places {
         (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
@@ -54,7 +60,7 @@ pub(super) fn rows_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, si
         let end = to.clamp(0.0, size[i] as f64).ceil() as usize;
         from.clamp(0.0, end as f64).floor() as usize..end
     };
-    if span(0).is_empty() { 0..0 } else { span(1) }
+    if span(0).is_empty() || span(1).is_empty() { [0..0, 0..0] } else { [span(0), span(1)] }
 }
 
 /// Whether two ranges share anything.

@@ -3,12 +3,13 @@
 //! Neither the number of views and frames that are rendered together, nor the rows in a band, nor the blocks in a batch
 //! changes a pixel.
 
-use super::RenderConfig;
 use super::eye::Eye;
 use super::place::TILE;
 use super::scene::Scene;
+use super::slabs;
 use super::splat::Splats;
 use super::terms::{Layout, Terms};
+use super::{Mode, RenderConfig};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::volume::Region;
@@ -21,8 +22,8 @@ pub(super) struct Budget<'a> {
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
-    /// Finished numbers of a pixel and frame: its value, and its error.
-    numbers: usize,
+    /// Finished bytes of a pixel and frame, in the pictures of all.
+    pixel_bytes: usize,
     /// The largest block.
     block: Region,
     block_bytes: usize,
@@ -34,7 +35,7 @@ const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 impl<'a> Budget<'a> {
     /// An error unless there is memory enough for each of some views alone.
     pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, eyes: &[Eye]) -> Result<()> {
-        let planes = scene.most_planes(1, config);
+        let planes = most_planes(scene, 1, config);
         let least = |eye: &Eye| {
             let eyes = std::slice::from_ref(eye);
             fixed(config, eyes) + Budget::new(config, scene, eyes).bytes(1, planes, TILE)
@@ -50,23 +51,39 @@ impl<'a> Budget<'a> {
         )))
     }
 
-    /// For pictures of a scene from these views.
-    pub(super) fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
-        let (size, numbers) = (config.size(), 1 + usize::from(config.certify));
+    /// For pictures of a scene from these views, or of these slabs of one.
+    fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
+        let numbers = match config.mode {
+            Mode::Projection => eyes.len() * (1 + usize::from(config.certify)),
+            _ => config.mode.pixel().numbers(),
+        };
+        let (size, pixel_bytes) = (config.size(), numbers * size_of::<f32>());
         let available = config.memory.saturating_sub(fixed(config, eyes));
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
-        Self { eyes, available, size, numbers, block, block_bytes }
+        Self { eyes, available, size, pixel_bytes, block, block_bytes }
     }
 
     /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
     /// alone. Where what is read is chosen by the view, that is one.
     pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
+        let most = if config.chooses_by_view() { 1 } else { eyes.len() };
+        Self::of_first(config, scene, &eyes[..most], config.size()[1])
+    }
+
+    /// For as many slabs of a view as go together: with more than a block is deep, less would be hidden.
+    pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [Eye]) -> Self {
+        let deep = slabs.iter().filter(|slab| slab.is_in_slab(0)).count().max(1);
+        Self::of_first(config, scene, &slabs[..deep], config.size()[1].min(FEW_ROWS * TILE))
+    }
+
+    /// For as many of the first views as go together with so many rows of all pictures.
+    fn of_first(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye], rows: usize) -> Self {
         let alone = Self::new(config, scene, &eyes[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
-        let planes = scene.most_planes(frames, config);
-        let fits = |budget: &Self| budget.bytes(frames, planes, budget.size[1]) <= budget.available;
+        let planes = most_planes(scene, frames, config);
+        let fits = |budget: &Self| budget.bytes(frames, planes, rows) <= budget.available;
         let several = |count: usize| Some(Self::new(config, scene, &eyes[..count])).filter(fits);
-        let (mut best, mut least, mut most) = (alone, 1, if config.chooses_by_view() { 1 } else { eyes.len() });
+        let (mut best, mut least, mut most) = (alone, 1, eyes.len());
         while least < most {
             let middle = least.midpoint(most + 1);
             match several(middle) {
@@ -99,9 +116,9 @@ impl<'a> Budget<'a> {
         self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES)
     }
 
-    /// Finished pictures of a group, as f32.
+    /// Finished pictures of a group.
     fn picture_bytes(&self, frames: usize) -> usize {
-        self.eyes.len() * frames * self.numbers * self.pixels() * size_of::<f32>()
+        frames * self.pixels() * self.pixel_bytes
     }
 
     /// Bands of so many rows with all planes, and what threads work with.
@@ -119,7 +136,7 @@ impl<'a> Budget<'a> {
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let rows = self.size[1].min(FEW_ROWS * TILE);
-        let fits = |f: &usize| self.bytes(*f, scene.most_planes(*f, config), rows) <= self.available;
+        let fits = |f: &usize| self.bytes(*f, most_planes(scene, *f, config), rows) <= self.available;
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
@@ -150,7 +167,16 @@ const FEW_ROWS: usize = 4;
 /// Bytes that are held whatever is rendered at a time: weights among them.
 fn fixed(config: &RenderConfig, eyes: &[Eye]) -> usize {
     let [width, height] = config.size();
-    memory::FIXED + config.reserved + eyes.len() * width * height * WEIGHT_BYTES
+    let more = match (&config.mode, eyes.first()) {
+        (Mode::Projection, _) => eyes.len() * width * height * WEIGHT_BYTES,
+        (_, eye) => eye.map_or(0, slabs::bytes),
+    };
+    memory::FIXED + config.reserved + more
+}
+
+/// An upper bound of the planes that some frames of a group need.
+fn most_planes(scene: &dyn Scene, frames: usize, config: &RenderConfig) -> usize {
+    scene.most_planes(frames, config) + usize::from(config.mode != Mode::Projection)
 }
 
 /// The most frames of one group.

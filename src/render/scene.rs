@@ -49,6 +49,10 @@ pub trait Group: Sync {
     /// The blocks that touch `region` and have terms.
     fn blocks(&self, region: &Region) -> Result<Contents>;
 
+    /// The blocks that touch `region`, each with a range that holds its samples as they are splatted; out of order if all are
+    /// missing.
+    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>>;
+
     /// What the errors of all samples in `region` are expected to come to in a view, in the mean square over its pixels.
     fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64>;
 

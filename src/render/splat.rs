@@ -138,7 +138,7 @@ struct Splat {
     index: usize,
     x: f64,
     y: f64,
-    /// exp(-tau z) f(0, 0).
+    /// exp(-tau z) f(0, 0), or what of it is in a slab.
     weight: f64,
 }
 
@@ -155,7 +155,10 @@ impl Splats {
             let index = region.index(v);
             if !terms.of_voxel(index).0.is_empty() {
                 let [x, y, z] = camera.project(grid.position(v));
-                voxels.push(Splat { index, x, y, weight: footprint.at_depth(z) });
+                let share = eye.slab.map_or(1.0, |slab| slab.share(z));
+                if share > 0.0 {
+                    voxels.push(Splat { index, x, y, weight: share * footprint.at_depth(z) });
+                }
             }
         }
         let size = camera.size;

@@ -5,7 +5,7 @@ pub(super) use super::splat::Order;
 use crate::error::Result;
 
 /// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
-/// missing in single frames and of what is missing in all of them, and last errors.
+/// missing in single frames and of what is missing in all of them, then errors, and last lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Planes of coefficients.
@@ -18,6 +18,8 @@ pub struct Layout {
     pub absent: bool,
     /// Planes of errors; none unless pictures are certified.
     pub error_planes: usize,
+    /// Whether the last plane is of the weights of all voxels: lengths of the rays.
+    pub lengths: bool,
     /// How tiles should keep the planes.
     pub order: Order,
 }
@@ -57,7 +59,7 @@ impl Layout {
 
     /// Number of planes.
     pub fn planes(&self) -> usize {
-        self.first_error() + self.error_planes
+        self.first_error() + self.error_planes + usize::from(self.lengths)
     }
 }
 
@@ -117,8 +119,15 @@ mod tests {
 
     #[test]
     fn planes_follow_one_another() {
-        let layout =
-            Layout { coefficients: 5, frames: 3, values: true, absent: true, error_planes: 2, order: Order::Planes };
+        let layout = Layout {
+            coefficients: 5,
+            frames: 3,
+            values: true,
+            absent: true,
+            error_planes: 2,
+            lengths: false,
+            order: Order::Planes,
+        };
         assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all()), (5, 8, 11));
         assert_eq!((layout.first_error(), layout.planes()), (12, 14));
         let plain = Layout { values: false, absent: false, error_planes: 0, ..layout };

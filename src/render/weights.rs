@@ -112,8 +112,15 @@ impl Weights {
 }
 
 fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
-    let layout =
-        Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
+    let layout = Layout {
+        coefficients: 1,
+        frames: 1,
+        values: false,
+        absent: false,
+        error_planes: 0,
+        lengths: false,
+        order: Order::Planes,
+    };
     let mut out = vec![0.0; eye.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).collect();

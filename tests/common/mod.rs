@@ -128,6 +128,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         certify: false,
         memory: MEMORY,
         reserved: 0,
+        mode: Default::default(),
     }
 }
 

@@ -5,6 +5,7 @@
 
 pub(crate) mod camera;
 pub(crate) mod decode;
+pub(crate) mod ray;
 pub(crate) mod sampled;
 pub(crate) mod splat;
 pub(crate) mod transform;

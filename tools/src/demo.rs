@@ -125,6 +125,7 @@ fn pictures(scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
         certify: false,
         memory: MEMORY,
         reserved: 0,
+        mode: Default::default(),
     };
     let mut all = Vec::new();
     let report = render(scene, &config, &Silent, &mut |rendered| {

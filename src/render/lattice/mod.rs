@@ -15,6 +15,7 @@ mod cells;
 mod gather;
 mod kernel;
 mod picture;
+mod shares;
 mod shear;
 mod spline;
 mod spread;

@@ -8,7 +8,8 @@ use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
 use crate::camera::Camera;
 use crate::footprint::{Footprint, Kernel as Gaussian, Method};
-use crate::render::place::{Place, TILE, rows_around};
+use crate::render::place::{Place, TILE, pixels_around};
+use crate::render::slabs::Slab;
 use crate::volume::{Grid, Region};
 use std::ops::Range;
 
@@ -139,15 +140,21 @@ impl Lattice {
         shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]))
     }
 
-    /// The rows of the picture that a block can reach; one that reaches no column reaches no row.
-    pub(in crate::render) fn rows_reached(&self, region: &Region, size: [usize; 2]) -> Range<usize> {
+    /// The columns and rows of the picture that a block can reach; where it reaches none of these, none of those.
+    pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
         let (first, cells) = self.rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
-        rows_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
+        pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Where the voxels of a block that lie in `clip` are in cells, for planes of `seen`.
-    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, seen: &Rectangle) -> Placed {
+    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in cells,
+    /// for planes of `seen`.
+    pub(in crate::render) fn placed(
+        &self,
+        region: &Region,
+        clip: (&Region, Option<&Slab>),
+        seen: &Rectangle,
+    ) -> Placed {
         Placed::new(&self.spreading, region, clip, seen)
     }
 

@@ -5,9 +5,12 @@
 
 use super::Spreading;
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
+use super::shares::Shares;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::codec::real::Real;
 use crate::render::amounts::Amounts;
+use crate::render::place::intersect;
+use crate::render::slabs::Slab;
 use crate::volume::Region;
 use std::ops::Range;
 
@@ -27,6 +30,8 @@ pub(in crate::render) struct Placed {
     steps: [usize; 3],
     /// exp(-tau z) from the first voxel along b and c.
     fading: [Vec<f64>; 2],
+    /// What is in the slab, if only one is seen.
+    shares: Option<Shares>,
 }
 
 /// A slice of a block across the principal axis.
@@ -56,8 +61,14 @@ pub(in crate::render) struct Work {
 }
 
 impl Placed {
-    /// Of the block at `region`, of which the voxels in `clip` count, for planes of some cells.
-    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, seen: &Rectangle) -> Self {
+    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for planes of
+    /// some cells.
+    pub(super) fn new(
+        spreading: &Spreading,
+        region: &Region,
+        (clip, slab): (&Region, Option<&Slab>),
+        seen: &Rectangle,
+    ) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
@@ -67,7 +78,11 @@ impl Placed {
             (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
         });
         let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], seen);
-        let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
+        let mut slices: Vec<Slice> = (0..count[2]).map(slice).collect();
+        let shares = slab.map(|slab| Shares::new(slab, shear, clip.start, count));
+        if let Some(shares) = &shares {
+            slices.iter_mut().enumerate().for_each(|(k, slice)| slice.keep(shares.reached(k)));
+        }
         Self {
             spreading: *spreading,
             rectangle: rectangle_of(&slices, spreading, [count[0], count[1]]),
@@ -76,6 +91,7 @@ impl Placed {
             first: region.index(clip.start),
             steps: shear.axes.map(stride),
             fading,
+            shares,
             region: *region,
             clip,
         }
@@ -110,7 +126,8 @@ impl Placed {
         if !(0..3).all(|a| (self.clip.start[a]..self.clip.end[a]).contains(&voxel[a])) {
             return;
         }
-        let amount = amount * libm::exp(-tau * shear.depth(voxel));
+        let share = self.shares.as_ref().map_or(1.0, |shares| shares.of_depth(shear.depth(voxel)));
+        let amount = amount * share * libm::exp(-tau * shear.depth(voxel));
         let [(u, along), (v, across)] = shear.place(voxel).map(|place| spread(*degree, place));
         for (v, across) in (v..).zip(&across[..=*degree]) {
             let Some(row) = plane.rectangle.row(v) else { continue };
@@ -133,6 +150,11 @@ impl Slice {
         let cell = [u.0, v.0];
         let seen = [0, 1].map(|i| seen.seen_from(i, cell[i], spreading.degree, count[i]));
         Self { cell, along: u.1, across: v.1.map(|w| w * fading), seen }
+    }
+
+    /// Leaves of its voxels those in some ranges along b and c.
+    fn keep(&mut self, [b, c]: &[Range<usize>; 2]) {
+        self.seen = [intersect(&self.seen[0], b), intersect(&self.seen[1], c)];
     }
 }
 
@@ -180,7 +202,7 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
                 continue;
             }
             let amounts = &amounts[placed.first + k * placed.steps[2]..];
-            let (live, seen) = (fade_rows(placed, amounts, &rows, work), &slice.seen[0]);
+            let (live, seen) = (fade_rows(placed, (k, amounts), &rows, work), &slice.seen[0]);
             let live = live.start.max(seen.start / LINE)..live.end.min(seen.end.div_ceil(LINE));
             if !live.is_empty() {
                 add_rows::<Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
@@ -206,13 +228,22 @@ impl Work {
 
 /// Some rows of a slice times their fading; which of their lines of voxels have any that is not zero.
 #[inline(always)]
-fn fade_rows<R: Real>(placed: &Placed, amounts: &[R], rows: &Range<usize>, work: &mut Work) -> Range<usize> {
+fn fade_rows<R: Real>(
+    placed: &Placed,
+    (k, amounts): (usize, &[R]),
+    rows: &Range<usize>,
+    work: &mut Work,
+) -> Range<usize> {
     let ([width, ..], [along, across, _]) = (placed.count, placed.steps);
     let mut live = 0;
     let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
     for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
-        let (scale, row) = (placed.fading[1][c], &mut row[work.before..][..width]);
-        live |= fade(&amounts[c * across..], along, (scale, &placed.fading[0]), row);
+        let row = &mut row[work.before..][..width];
+        match &placed.shares {
+            None => fade(&amounts[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row),
+            Some(shares) => share(&amounts[c * across..], along, shares.of_row(k, c), row),
+        }
+        live |= live_lines(row);
     }
     behind.fill(0.0);
     let end = if live >> LAST == 1 { width.div_ceil(LINE) } else { 64 - live.leading_zeros() as usize };
@@ -222,9 +253,9 @@ fn fade_rows<R: Real>(placed: &Placed, amounts: &[R], rows: &Range<usize>, work:
 /// The bit that stands for all lines from there on.
 const LAST: usize = 63;
 
-/// Every `step`-th amount times its fading, into a row; a bit for each line that is not zero.
+/// Every `step`-th amount times its fading, into a row.
 #[inline(always)]
-fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) -> u64 {
+fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) {
     if step == 1 {
         for ((row, amount), fading) in row.iter_mut().zip(amounts).zip(fading) {
             *row = amount.to_f64() * (scale * fading);
@@ -234,6 +265,21 @@ fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row
             *row = amount.to_f64() * (scale * fading);
         }
     }
+}
+
+/// The same times the share that is in a slab, of a run of voxels; others have none.
+#[inline(always)]
+fn share<R: Real>(amounts: &[R], step: usize, (first, shares): (usize, &[f64]), row: &mut [f64]) {
+    row.fill(0.0);
+    let amounts = amounts.iter().skip(first * step).step_by(step);
+    for ((row, amount), share) in row[first..].iter_mut().zip(amounts).zip(shares) {
+        *row = amount.to_f64() * share;
+    }
+}
+
+/// A bit for each line of a row that is not zero.
+#[inline(always)]
+fn live_lines(row: &[f64]) -> u64 {
     let mut live = 0;
     for (n, line) in row.chunks(LINE).enumerate() {
         let bits = line.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)); // of either zero none is left

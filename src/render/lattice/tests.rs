@@ -92,7 +92,7 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         cut += usize::from(more.iter().any(|n| *n < 0));
         let size = [0, 1].map(|i| (high[i] - low[i] + 1 + more[i] + more[2 + i]).max(1) as usize);
         let rectangle = Rectangle::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
-        let placed = Placed::new(&spreading, &block, &clip, &rectangle);
+        let placed = Placed::new(&spreading, &block, (&clip, None), &rectangle);
         let single: Vec<f32> = amounts.iter().map(|v| *v as f32).collect();
         let few: Vec<(u32, f64)> = (0..).zip(amounts.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways = [Amounts::Double(&amounts), Amounts::Single(&single), Amounts::Few(&few), Amounts::Nothing];
@@ -103,7 +103,7 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // few may all be elsewhere
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
-        let placed = Placed::new(&spreading, &block, &clip, &whole);
+        let placed = Placed::new(&spreading, &block, (&clip, None), &whole);
         placed.add(Amounts::Double(&amounts), &mut all.planes_mut()[0], &mut work);
         let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.touched().take(2) {

@@ -163,6 +163,7 @@ fn pictures(
         certify: false,
         memory: MEMORY,
         reserved: 0,
+        mode: Default::default(),
     };
     let (mut found, mut best) = (Vec::new(), RenderReport { seconds: f64::INFINITY, ..RenderReport::default() });
     for _ in 0..if splat_error > 0.0 { REPEATS } else { 1 } {

@@ -148,6 +148,7 @@ fn by_library(
         certify,
         memory: MEMORY,
         reserved: 0,
+        mode: Default::default(),
     };
     let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered);

@@ -185,6 +185,7 @@ fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[
         certify: false,
         memory: MEMORY,
         reserved: 0,
+        mode: Default::default(),
     };
     let report = render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered.frame, rendered.picture);

@@ -1,0 +1,102 @@
+//! What of the voxels of a block is in a slab.
+
+use super::Shear;
+use crate::render::slabs::Slab;
+use std::ops::Range;
+
+/// The shares of a block's voxels that lie in a slab, row by row.
+#[derive(Debug)]
+pub(super) struct Shares {
+    slab: Slab,
+    /// Rows of a slice.
+    rows: usize,
+    /// Of each row of each slice the first voxel along b that has a share, and where its shares are.
+    runs: Vec<(usize, Range<usize>)>,
+    shares: Vec<f64>,
+    /// Of each slice the voxels along b and c that have any.
+    reached: Vec<[Range<usize>; 2]>,
+}
+
+impl Shares {
+    /// Of so many voxels along b, c and a, from `start` on.
+    pub(super) fn new(slab: &Slab, shear: &Shear, start: [usize; 3], [along, rows, slices]: [usize; 3]) -> Self {
+        let (runs, shares, reached) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { slab: *slab, rows, runs, shares, reached };
+        for k in 0..slices {
+            let mut reached = [along..0, rows..0];
+            for c in 0..rows {
+                let run = all.push(depth_of_row(shear, start, [c, k]), shear.depths[0], along);
+                if !run.is_empty() {
+                    reached = [hull(&reached[0], &run), hull(&reached[1], &(c..c + 1))];
+                }
+            }
+            all.reached.push(reached);
+        }
+        all
+    }
+
+    /// Adds a row of so many voxels, the first at a depth and each next one so much deeper. Says which have a share.
+    fn push(&mut self, depth: f64, deeper: f64, count: usize) -> Range<usize> {
+        let (run, first) = (within(self.slab.reached_from(), depth, deeper, count), self.shares.len());
+        self.shares.extend(run.clone().map(|n| self.slab.share(depth + deeper * n as f64)));
+        self.runs.push((run.start, first..self.shares.len()));
+        run
+    }
+
+    /// The shares of a row c of slice k, from its first voxel on that has one.
+    pub(super) fn of_row(&self, k: usize, c: usize) -> (usize, &[f64]) {
+        let (first, run) = &self.runs[k * self.rows + c];
+        (*first, &self.shares[run.clone()])
+    }
+
+    /// The voxels along b and c of slice k that have any.
+    pub(super) fn reached(&self, k: usize) -> &[Range<usize>; 2] {
+        &self.reached[k]
+    }
+
+    /// That of a voxel at a depth.
+    pub(super) fn of_depth(&self, z: f64) -> f64 {
+        self.slab.share(z)
+    }
+}
+
+/// The depth of the first voxel of row c of slice k.
+fn depth_of_row(shear: &Shear, start: [usize; 3], [c, k]: [usize; 2]) -> f64 {
+    let mut voxel = start;
+    voxel[shear.axes[1]] += c;
+    voxel[shear.axes[2]] += k;
+    shear.depth(voxel)
+}
+
+/// Of numbers that begin with `first` and grow by `step`, those from `from` to `to`, and maybe one beside them.
+fn within([from, to]: [f64; 2], first: f64, step: f64, count: usize) -> Range<usize> {
+    let (a, b) = ((from - first) / step, (to - first) / step);
+    let (low, high) = if a.is_nan() || b.is_nan() || step == 0.0 {
+        (0.0, if (from..=to).contains(&first) { count as f64 } else { 0.0 })
+    } else {
+        (a.min(b).floor(), a.max(b).ceil() + 1.0)
+    };
+    let end = high.clamp(0.0, count as f64) as usize;
+    (low.clamp(0.0, count as f64) as usize).min(end)..end
+}
+
+fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.min(b.start)..a.end.max(b.end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold_all_that_is_within() {
+        for (first, step) in [(0.0, 1.0), (5.0, -0.25), (-3.0, 0.0), (2.5, 0.0), (2.0, 1e-12), (1e6, -3.0)] {
+            let found = within([2.0, 3.0], first, step, 40);
+            for n in 0..40 {
+                let inside = (2.0..=3.0).contains(&(first + step * n as f64));
+                assert!(!inside || found.contains(&n), "{first} {step} {n}: {found:?}");
+            }
+            assert!(found.end <= 40 && (step.abs() < 0.1 || found.len() <= 8), "{first} {step}: {found:?}");
+        }
+    }
+}

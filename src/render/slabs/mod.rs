@@ -1,0 +1,310 @@
+//! Along the rays, slab by slab (method.md section 7): the volume is cut across the view direction, the planes of each slab
+//! are splatted and inverted for all frames, and its means are coloured and composited front to back.
+//!
+//! ```text
+//! for each view
+//!   for each group of frames of a window          plan: as many as fit
+//!     which tiles of which slabs can be seen       visible: from the ranges of blocks
+//!     for each band of rows
+//!       for each run of slabs, front to back       as many as fit, and as a block is deep
+//!         splat the blocks that they need          canvas, as for several views: each slab is an eye of its own
+//!         each slab: every tile inverts its pixels, and blends them behind what is there
+//!     give the finished frames to the sink
+//! ```
+//!
+//! A slab takes of each voxel what of its kernel lies in the slab: the kernel is a product of one along the ray and one
+//! across it, so a weight is that of the projection times a share of a Gaussian's integral ([`Slab`]). With w those weights and
+//! v the samples, a pixel of a slab has the length l = sum w and the mean g = sum w v / l, and
+//!
+//! ```text
+//! T = exp(-kappa(g) l)       kappa(v) = -ln(1 - opacity(v)) / unit
+//! ```
+//!
+//! is what it lets through. As slabs become thinner that tends to the integral along the ray through the field that the kernels
+//! make of the samples. Every mean is off by no more than the file's bound.
+
+mod blend;
+mod medium;
+mod slab;
+mod visible;
+
+pub(super) use slab::Slab;
+
+use super::amounts::{Amounts, BlockPlanes, OnesOf, Room};
+use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
+use super::expectation::Expectation;
+use super::eye::Eye;
+use super::plan::{self, Budget};
+use super::scene::{Group, Read, Scene};
+use super::terms::Layout;
+use super::{Look, Mode, RenderConfig, RenderReport, lap};
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::volume::BlockGrid;
+use crate::wavelet::{LANES, Lane};
+use blend::{Blend, Composite, Largest};
+use medium::Medium;
+use std::collections::HashSet;
+use std::ops::Range;
+use std::time::Instant;
+use visible::Visible;
+
+/// More slabs than this are refused.
+pub(super) const MOST_SLABS: usize = 1 << 16;
+/// Standard deviations of the kernel in front of the first voxels and behind the last ones that slabs are cut in, too.
+const TAIL: f64 = 3.0;
+/// A slab's mean counts where its length is this share of its thickness.
+const LEAST: f64 = 0.01;
+
+/// The slabs of a view.
+#[derive(Debug)]
+pub(super) struct Slabs {
+    /// An eye for each, from front to back.
+    pub(super) eyes: Vec<Eye>,
+    /// World units of each.
+    thickness: f64,
+}
+
+/// Cuts the volume into slabs across the view direction.
+pub(super) fn cut(eye: &Eye, config: &RenderConfig) -> Result<Slabs> {
+    let (sigma, spacing) = (config.kernel.sigma, eye.grid.largest_spacing());
+    let [nearest, farthest] = eye.camera.depths_of(&eye.grid.crop(&eye.clip));
+    let (from, to) = (nearest - TAIL * sigma, farthest + TAIL * sigma);
+    let count = config.mode.slabs().unwrap_or(((to - from) / spacing).ceil().max(1.0) as usize);
+    if !(1..=MOST_SLABS).contains(&count) {
+        return Err(Error::usage(format!("--slabs: takes 1 to {MOST_SLABS}; here it would be {count}")));
+    }
+    let end = |n: usize| match n {
+        0 => f64::NEG_INFINITY,
+        n if n == count => f64::INFINITY,
+        n => from + (to - from) * (n as f64 / count as f64),
+    };
+    let slab = |n: usize| Slab::new([end(n), end(n + 1)], (sigma, eye.method.radius), count);
+    let eyes = (0..count).map(|n| Eye { slab: Some(slab(n)), ..eye.clone() }).collect();
+    Ok(Slabs { eyes, thickness: (to - from) / count as f64 })
+}
+
+/// Bytes that telling which tiles of a view's slabs can be seen takes.
+pub(super) fn bytes(eye: &Eye) -> usize {
+    let tiles: usize = eye.camera.size.iter().map(|pixels| pixels.div_ceil(eye.tile())).product();
+    tiles * eye.slab.map_or(0, |slab| slab.count) * Visible::BYTES
+}
+
+/// Renders all frames from a view that is cut into slabs, giving each to `sink`.
+pub(super) fn render_view(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    slabs: &Slabs,
+    progress: &dyn Progress,
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
+) -> Result<()> {
+    let Slabs { eyes: slabs, thickness } = slabs;
+    let least = LEAST * thickness;
+    match &config.mode {
+        Mode::Composite { transfer, unit, .. } => {
+            let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
+            let blend = Composite(Medium::new(transfer, unit));
+            View { slabs, least, blend, config, progress }.render(scene, report, sink)
+        }
+        Mode::Mip { .. } => View { slabs, least, blend: Largest, config, progress }.render(scene, report, sink),
+        Mode::Projection => Ok(()),
+    }
+}
+
+/// A view, and how its slabs become a picture.
+struct View<'a, B> {
+    slabs: &'a [Eye],
+    /// World units that a slab is thick at least where it counts.
+    least: f64,
+    blend: B,
+    config: &'a RenderConfig,
+    progress: &'a dyn Progress,
+}
+
+impl<B: Blend> View<'_, B> {
+    fn render(
+        &self,
+        scene: &mut dyn Scene,
+        report: &mut RenderReport,
+        sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
+    ) -> Result<()> {
+        let budget = Budget::of_slabs(self.config, scene, self.slabs);
+        let look = Look::of_no_weights(&self.slabs[0]);
+        let expectation = Expectation::new(&look, self.config);
+        let mut rest = self.config.frames.as_slice();
+        while let Some(first) = rest.first() {
+            let most = plan::in_group(scene, *first, rest);
+            let (now, later) = rest.split_at(budget.frames(scene, self.config, most));
+            let pictures = loop {
+                let before = report.clone();
+                let group = scene.group(now, self.config, &expectation)?;
+                let pictures = self.render_group(group.as_ref(), &budget, report)?;
+                match group.finish()? {
+                    Read::AsExpected => break pictures,
+                    Read::Otherwise => *report = before,
+                }
+            };
+            let numbers = pictures.len() / now.len();
+            now.iter().zip(pictures.chunks_exact(numbers)).try_for_each(|(frame, picture)| sink(*frame, picture))?;
+            rest = later;
+        }
+        Ok(())
+    }
+
+    /// The pictures of all frames of a group, one after another.
+    fn render_group(&self, group: &dyn Group, budget: &Budget<'_>, report: &mut RenderReport) -> Result<Vec<f32>> {
+        let eye = &self.slabs[0];
+        let visible = Visible::new(group, self.slabs, &self.blend)?;
+        let source = WithLengths::new(group, eye, report)?;
+        let mut pixels = vec![B::EMPTY; source.layout.frames * budget.pixels()];
+        for rows in budget.bands(&source.layout) {
+            self.render_band(&source, (&visible, budget), &rows, &mut pixels, report)?;
+        }
+        let [tiles, clear, opaque] = visible.counts();
+        report.tiles += tiles;
+        report.tiles_clear += clear;
+        report.tiles_opaque += opaque;
+        Ok(B::finish(pixels))
+    }
+
+    /// Blends all slabs of a band into its pixels, as many at a time as the budget has room for.
+    fn render_band(
+        &self,
+        source: &WithLengths<'_>,
+        (visible, budget): (&Visible, &Budget<'_>),
+        rows: &Range<usize>,
+        pixels: &mut [B::Pixel],
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let mut next = 0;
+        while next < self.slabs.len() {
+            let open = (next..self.slabs.len()).filter(|slab| visible.any(*slab, rows));
+            let run: Vec<usize> = open.take(budget.eyes().len()).collect();
+            let end = if run.len() < budget.eyes().len() { self.slabs.len() } else { run[run.len() - 1] + 1 };
+            let of_slab = |slab: &usize| Canvas::new(&self.slabs[*slab], rows.clone(), &source.layout);
+            let mut canvases: Vec<_> = run.iter().map(of_slab).collect();
+            let (blocks, batch) = (visible.blocks(&run, rows), budget.batch(&source.layout, rows.len()));
+            canvas::splat(&mut canvases, &blocks, batch, source, report)?;
+            let mut clock = Instant::now();
+            for (slab, canvas) in run.iter().zip(canvases) {
+                let wanted = |place: &_| visible.is_open(*slab, place);
+                canvas.finish_some(pixels, wanted, |tile, pixels| self.blend_tile(source, visible, tile, pixels));
+            }
+            lap(&mut clock, &mut report.inverse_seconds);
+            self.progress.advance((source.layout.frames * rows.len() * (end - next)) as u64);
+            next = end;
+        }
+        Ok(())
+    }
+
+    /// Puts a tile of a slab behind what is there.
+    fn blend_tile(
+        &self,
+        source: &WithLengths<'_>,
+        visible: &Visible,
+        mut tile: Finished<'_>,
+        pixels: &mut Pixels<'_, B::Pixel>,
+    ) {
+        let layout = &source.layout;
+        let used = tile.used();
+        let mut inverse = source.group.inverse(&used);
+        let (mut planes, mut frames) = (vec![Lane::default(); layout.planes()], vec![Lane::default(); layout.frames]);
+        let (width, mut is_closed) = (tile.place.x.len(), true);
+        for (y, at) in tile.place.y.clone().zip((0..).step_by(width)) {
+            for first in (0..width).step_by(LANES) {
+                let count = LANES.min(width - first);
+                let place = [tile.place.x.start + first, y];
+                if (0..layout.frames).all(|f| pixels.at(f, place, count).iter().all(B::is_closed)) {
+                    continue;
+                }
+                is_closed = false;
+                if !used.is_empty() {
+                    tile.load(at + first, count, &mut planes);
+                    let lengths = source.lengths(&planes);
+                    inverse(&mut planes, &mut frames);
+                    for (f, (sums, lengths)) in frames.iter().zip(&lengths).enumerate() {
+                        self.blend_lane(sums, lengths, pixels.at(f, place, count));
+                    }
+                }
+            }
+        }
+        if is_closed {
+            visible.close(tile.place);
+        }
+    }
+
+    fn blend_lane(&self, sums: &Lane, lengths: &Lane, pixels: &mut [B::Pixel]) {
+        for ((pixel, sum), length) in pixels.iter_mut().zip(sums).zip(lengths) {
+            if *length > self.least {
+                self.blend.add(pixel, sum / length, *length);
+            }
+        }
+    }
+}
+
+/// The blocks of a group, with the weights of all their voxels in a plane of its own.
+struct WithLengths<'a> {
+    group: &'a dyn Group,
+    layout: Layout,
+    blocks: BlockGrid,
+    /// Those that have terms.
+    with_terms: HashSet<usize>,
+}
+
+impl<'a> WithLengths<'a> {
+    fn new(group: &'a dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Self> {
+        let contents = group.blocks(&eye.clip)?;
+        report.blocks += eye.blocks.len() as u64;
+        report.add(&contents);
+        let layout = Layout { lengths: true, ..group.layout() };
+        Ok(Self { group, layout, blocks: eye.blocks, with_terms: contents.blocks.into_iter().collect() })
+    }
+
+    /// Of each frame the lengths of some pixels, less what is missing.
+    fn lengths(&self, planes: &[Lane]) -> Vec<Lane> {
+        let all = planes[self.layout.planes() - 1];
+        if !self.layout.absent {
+            return vec![all; self.layout.frames];
+        }
+        let in_all = planes[self.layout.absent_in_all()];
+        let of_frame = |f: usize| {
+            let absent = planes[self.layout.absent(f)];
+            std::array::from_fn(|l| all[l] - absent[l] - in_all[l])
+        };
+        (0..self.layout.frames).map(of_frame).collect()
+    }
+}
+
+impl Blocks for WithLengths<'_> {
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        let planes = self.with_terms.contains(&block).then(|| self.group.planes(block)).transpose()?;
+        let ones = OnesOf(self.blocks.region(block).voxels());
+        Ok(Box::new(BlockWithLengths { planes, ones, last: self.layout.planes() - 1 }))
+    }
+}
+
+/// A block, and a 1 for each of its voxels in the last plane.
+struct BlockWithLengths<'a> {
+    planes: Option<Box<dyn BlockPlanes + 'a>>,
+    ones: OnesOf,
+    last: usize,
+}
+
+impl BlockPlanes for BlockWithLengths<'_> {
+    fn voxels(&self) -> usize {
+        self.ones.voxels()
+    }
+
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+        match &self.planes {
+            _ if plane == self.last => self.ones.plane(plane, room),
+            Some(planes) => planes.plane(plane, room),
+            None => Ok(Amounts::Nothing),
+        }
+    }
+
+    fn held(&self) -> [u64; 2] {
+        self.planes.as_ref().map_or([0; 2], |planes| planes.held())
+    }
+}

@@ -1,0 +1,117 @@
+//! Which tiles of which slabs can show anything, and the blocks that these need.
+
+use super::blend::Blend;
+use crate::error::Result;
+use crate::render::eye::Eye;
+use crate::render::place::Place;
+use crate::render::scene::Group;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// The tiles of all slabs of a view.
+pub(super) struct Visible {
+    /// Pixels a side of a tile.
+    side: usize,
+    columns: usize,
+    tiles: usize,
+    /// Whether a tile of a slab can show anything: slab * tiles + tile.
+    needed: Vec<bool>,
+    /// Tiles that are opaque in all frames.
+    closed: Vec<AtomicBool>,
+    /// Every block, and what it reaches.
+    blocks: Vec<Reached>,
+}
+
+/// What a block reaches.
+struct Reached {
+    block: usize,
+    slabs: Range<usize>,
+    /// Columns and rows of tiles.
+    tiles: [Range<usize>; 2],
+}
+
+impl Visible {
+    /// What a tile of a slab takes.
+    pub(super) const BYTES: usize = size_of::<(f64, f64)>() + size_of::<bool>();
+
+    /// Of a group from a view that is cut into slabs: a mean lies between the least and the largest value of all blocks
+    /// that reach its tile, so where no such value can be seen nothing of the tile can.
+    pub(super) fn new<B: Blend>(group: &dyn Group, slabs: &[Eye], blend: &B) -> Result<Self> {
+        let eye = &slabs[0];
+        let side = eye.tile();
+        let [columns, rows] = eye.camera.size.map(|pixels| pixels.div_ceil(side));
+        let tiles = columns * rows;
+        let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); tiles * slabs.len()];
+        let mut blocks = Vec::new();
+        for (block, (lo, hi)) in group.ranges(&eye.clip)? {
+            let reached = Reached::new(block, slabs, side);
+            for at in reached.places(columns, tiles) {
+                ranges[at] = (ranges[at].0.min(lo), ranges[at].1.max(hi));
+            }
+            blocks.push(reached);
+        }
+        let needed = ranges.into_iter().map(|range| range.0 <= range.1 && blend.shows(range)).collect();
+        let closed = (0..tiles).map(|_| AtomicBool::new(false)).collect();
+        Ok(Self { side, columns, tiles, needed, closed, blocks })
+    }
+
+    /// Whether the tile of a slab that begins at a place can still show anything.
+    pub(super) fn is_open(&self, slab: usize, place: &Place) -> bool {
+        let tile = self.tile(place);
+        self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed)
+    }
+
+    /// Notes that a tile is opaque in all frames.
+    pub(super) fn close(&self, place: &Place) {
+        self.closed[self.tile(place)].store(true, Relaxed);
+    }
+
+    fn tile(&self, place: &Place) -> usize {
+        place.y.start / self.side * self.columns + place.x.start / self.side
+    }
+
+    /// Whether any tile of some rows of a slab can still show anything.
+    pub(super) fn any(&self, slab: usize, rows: &Range<usize>) -> bool {
+        let tiles = rows.start / self.side * self.columns..rows.end.div_ceil(self.side) * self.columns;
+        tiles.into_iter().any(|tile| self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed))
+    }
+
+    /// The blocks that reach any such tile of some slabs in some rows.
+    pub(super) fn blocks(&self, slabs: &[usize], rows: &Range<usize>) -> Vec<usize> {
+        let open = |slab: usize, tile: usize| self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed);
+        let within = rows.start / self.side..rows.end.div_ceil(self.side);
+        let needs = |b: &&Reached| {
+            slabs.iter().filter(|slab| b.slabs.contains(slab)).any(|slab| {
+                let rows = b.tiles[1].start.max(within.start)..b.tiles[1].end.min(within.end);
+                rows.into_iter().any(|row| b.tiles[0].clone().any(|column| open(*slab, row * self.columns + column)))
+            })
+        };
+        self.blocks.iter().filter(needs).map(|b| b.block).collect()
+    }
+
+    /// Tiles of slabs, those among them that cannot show anything, and tiles that became opaque.
+    pub(super) fn counts(&self) -> [u64; 3] {
+        let clear = self.needed.iter().filter(|needed| !**needed).count();
+        let closed = self.closed.iter().filter(|closed| closed.load(Relaxed)).count();
+        [self.needed.len(), clear, closed].map(|n| n as u64)
+    }
+}
+
+impl Reached {
+    fn new(block: usize, slabs: &[Eye], side: usize) -> Self {
+        let pixels = slabs[0].pixels_reached(block);
+        let tiles = pixels.map(|pixels| pixels.start / side..pixels.end.div_ceil(side));
+        let first = slabs.iter().position(|eye| eye.is_in_slab(block)).unwrap_or(slabs.len());
+        let count = slabs[first..].iter().take_while(|eye| eye.is_in_slab(block)).count();
+        Self { block, slabs: first..first + count, tiles }
+    }
+
+    /// Where its tiles are among those of all slabs.
+    fn places(&self, columns: usize, tiles: usize) -> impl Iterator<Item = usize> + '_ {
+        let of_slab = move |slab: usize| {
+            let row = move |row: usize| self.tiles[0].clone().map(move |column| slab * tiles + row * columns + column);
+            self.tiles[1].clone().flat_map(row)
+        };
+        self.slabs.clone().flat_map(of_slab)
+    }
+}

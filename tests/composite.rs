@@ -1,0 +1,245 @@
+//! Colour and opacity along the ray, and the largest value: against brute force, and as slabs become thinner.
+
+use crate::common::views::{archive, field, of_reference, view};
+use crate::common::{Stored, direct, looking, pictures, settings, stored};
+use crate::images::under_less_memory;
+use crate::reference::ray::{Cut, Rays};
+use wavesplat::camera::{Camera, View};
+use wavesplat::colour::{Space, TransferFunction};
+use wavesplat::convert::{Coding, ConvertConfig};
+use wavesplat::error::Error;
+use wavesplat::render::{CoefficientScene, Mode, Quantity, RenderConfig, Scene, What};
+use wavesplat::sample::SampleType;
+use wavesplat::volume::Grid;
+use wavesplat::wavelet::Basis;
+
+const FRAMES: usize = 5;
+const GRID: Grid = Grid { dims: [13, 9, 11], spacing: [1.0, 0.8, 1.2], origin: [5.0, -2.0, 100.0] };
+
+/// From blue and clear at -1 over green to red at 4.
+const COLOURS: [(f64, [f64; 3]); 3] = [(-1.0, [0.1, 0.2, 1.0]), (1.5, [0.2, 1.0, 0.1]), (4.0, [1.0, 0.1, 0.0])];
+const OPACITIES: [(f64, f64); 3] = [(0.0, 0.0), (2.0, 0.3), (3.5, 0.9)];
+const UNIT: f64 = 1.5;
+
+fn transfer() -> TransferFunction {
+    TransferFunction::of_points(COLOURS.to_vec(), Space::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
+}
+
+/// What the transfer function is, in the reference's own words.
+fn medium(value: f64) -> [f64; 4] {
+    let linear = |points: &[(f64, f64)]| {
+        let mut found = points[0].1;
+        for ends in points.windows(2) {
+            if value > ends[0].0 {
+                let share = ((value - ends[0].0) / (ends[1].0 - ends[0].0)).min(1.0);
+                found = ends[0].1 + share * (ends[1].1 - ends[0].1);
+            }
+        }
+        found
+    };
+    let channel = |i: usize| linear(&COLOURS.map(|(v, colour)| (v, colour[i])));
+    [channel(0), channel(1), channel(2), -(1.0 - linear(&OPACITIES)).ln() / UNIT]
+}
+
+fn composite(slabs: Option<usize>) -> Mode {
+    Mode::Composite { transfer: transfer(), unit: Some(UNIT), slabs }
+}
+
+fn seen(view: View, grid: &Grid, mode: Mode) -> RenderConfig {
+    RenderConfig { mode, ..looking(view, 0.0, Quantity::Mean, grid, FRAMES) }
+}
+
+fn views() -> [View; 3] {
+    [
+        view(30.0, 25.0, [30, 26]),
+        View { roll: 40.0, ..view(200.0, -70.0, [28, 30]) },
+        View { scale: Some(1.3), ..view(0.0, 0.0, [24, 20]) },
+    ]
+}
+
+/// The largest difference of any number of any pixel of all frames from what `expected(slabs of the frame, pixel)` says.
+fn largest_difference(
+    found: &[f32],
+    (grid, config, slabs): (&Grid, &RenderConfig, usize),
+    samples: &[f64],
+    expected: impl Fn((&Rays<'_>, &Cut), [usize; 2]) -> Vec<f64>,
+) -> f64 {
+    let scale = Camera::new(&config.views[0], grid).unwrap().scale;
+    let (lattice, view) = of_reference(grid, config, scale);
+    let [width, height] = config.views[0].size;
+    let mut largest = 0.0_f64;
+    let of_frame = found.len() / FRAMES;
+    for (values, picture) in samples.chunks_exact(grid.whole().voxels()).zip(found.chunks_exact(of_frame)) {
+        let rays = Rays { lattice: &lattice, view: &view, values };
+        let cut = rays.cut(slabs);
+        for (pixel, numbers) in picture.chunks_exact(of_frame / (width * height)).enumerate() {
+            for (found, expected) in numbers.iter().zip(expected((&rays, &cut), [pixel % width, pixel / width])) {
+                let off = (f64::from(*found) - expected).abs();
+                assert_eq!(found.is_nan(), expected.is_nan(), "pixel {pixel}: {found} for {expected}");
+                largest = largest.max(if found.is_nan() { 0.0 } else { off });
+            }
+        }
+    }
+    largest
+}
+
+/// Exactly stored, so that nothing but splatting is approximate; blocks are small, so that there are many.
+fn exact(samples: &[f64], coding: impl Into<Coding>) -> Stored {
+    let config = ConvertConfig { block: Some(5), coding: coding.into(), ..settings(Basis::Haar, 4, 0.0) };
+    stored(&mut archive(GRID, SampleType::F64, samples), &config)
+}
+
+fn scene(stored: &Stored) -> CoefficientScene {
+    CoefficientScene::new(stored.open(), What::Coefficients)
+}
+
+fn with_holes(mut samples: Vec<f64>) -> Vec<f64> {
+    let voxels = GRID.whole().voxels();
+    for (i, v) in samples.iter_mut().enumerate() {
+        if i % voxels % 7 == 3 || i % 11 == 5 {
+            *v = f64::NAN;
+        }
+    }
+    samples
+}
+
+/// But for what no 8-bit picture shows: what is behind where less than 1/2048 of the light comes through.
+#[test]
+fn slabs_are_blended_as_by_brute_force() {
+    for (n, view) in views().into_iter().enumerate() {
+        let samples = field(&GRID, FRAMES, n as u64);
+        let samples = if n == 1 { with_holes(samples) } else { samples };
+        let file = exact(&samples, Basis::Haar);
+        for slabs in [1, 7, 40] {
+            let config = seen(view, &GRID, composite(Some(slabs)));
+            let expected = |(rays, cut): (&Rays<'_>, &Cut), pixel| rays.composite(pixel, cut, &medium).to_vec();
+            for (splat_error, most) in [(0.0, 6e-4), (1e-3, 2e-3)] {
+                let config = RenderConfig { splat_error, ..config.clone() };
+                let mut scenes: [Box<dyn Scene>; 2] =
+                    [Box::new(scene(&file)), Box::new(direct(&archive(GRID, SampleType::F64, &samples), None))];
+                for scene in &mut scenes {
+                    let (found, report) = pictures(scene.as_mut(), &config);
+                    let off = largest_difference(&found, (&GRID, &config, slabs), &samples, expected);
+                    assert!(off < most, "view {n}, {slabs} slabs by {}: {off:e}", report.views[0].method);
+                    assert_eq!(report.views[0].slabs, Some(slabs));
+                }
+            }
+        }
+    }
+}
+
+/// README says how the error falls.
+#[test]
+fn thinner_slabs_come_nearer_to_the_integral_along_the_ray() {
+    let grid = Grid { dims: [9, 8, 7], ..GRID };
+    let samples = field(&grid, FRAMES, 5);
+    let memory = archive(grid, SampleType::F64, &samples);
+    for view in [view(30.0, 25.0, [14, 12]), view(0.0, 90.0, [12, 12])] {
+        let error = |slabs: usize| {
+            let config = seen(view, &grid, composite(Some(slabs)));
+            let (found, _) = pictures(&mut direct(&memory, None), &config);
+            let integral = |(rays, _): (&Rays<'_>, &Cut), pixel| rays.integral(pixel, 400, &medium).to_vec();
+            largest_difference(&found, (&grid, &config, slabs), &samples, integral)
+        };
+        let errors = [4, 8, 16, 32, 64, 128].map(error);
+        assert!(errors.windows(2).all(|pair| pair[1] < 0.8 * pair[0]), "{errors:?}");
+        assert!(errors[2] < errors[0] / 8.0 && errors[5] < errors[0] / 64.0 && errors[5] < 2e-3, "{errors:?}");
+    }
+}
+
+#[test]
+fn the_largest_value_is_that_of_the_slabs() {
+    for (n, view) in views().into_iter().enumerate() {
+        let samples = field(&GRID, FRAMES, n as u64);
+        let samples = if n == 1 { with_holes(samples) } else { samples };
+        let config = seen(view, &GRID, Mode::Mip { slabs: Some(20) });
+        let file = exact(&samples, Coding::AUTO);
+        let (found, _) = pictures(&mut scene(&file), &config);
+        let off = largest_difference(&found, (&GRID, &config, 20), &samples, |(rays, cut), pixel| {
+            vec![rays.slabs(pixel, cut).into_iter().map(|slab| slab.1).fold(f64::NAN, f64::max)]
+        });
+        assert!(off < 1e-4, "view {n}: {off:e}");
+    }
+}
+
+/// A mean is off by no more than its samples, so the largest of some means is, too.
+#[test]
+fn the_bound_holds_for_the_largest_value() {
+    let samples = field(&GRID, FRAMES, 9);
+    let whole = exact(&samples, Basis::Haar);
+    for (tolerance, basis) in [(0.05, Basis::Haar), (0.01, Basis::Samples), (0.02, Basis::Learned)] {
+        let config = ConvertConfig { block: Some(6), ..settings(basis, 4, tolerance) };
+        let lossy = stored(&mut archive(GRID, SampleType::F64, &samples), &config);
+        let delta = lossy.report.delta;
+        let config = seen(view(30.0, 25.0, [30, 26]), &GRID, Mode::Mip { slabs: None });
+        let (expected, _) = pictures(&mut scene(&whole), &config);
+        let (found, _) = pictures(&mut CoefficientScene::new(lossy.open(), What::Coefficients), &config);
+        for (found, expected) in found.iter().zip(&expected) {
+            let off = f64::from((found - expected).abs());
+            assert!(found.is_nan() && expected.is_nan() || off <= delta * (1.0 + 1e-6), "{found} for {expected}");
+        }
+    }
+}
+
+/// Something small in nothing, in front of a wall that hides what is behind.
+fn scene_with_a_wall(grid: &Grid) -> Vec<f64> {
+    let value = |[x, y, z]: [usize; 3], t: usize| match y {
+        y if y > grid.dims[1] - 25 => 0.0,
+        y if y > grid.dims[1] - 31 => 4.0 + 0.1 * ((x + z + t) as f64).sin(),
+        _ => 2.0 + (0.3 * (x + y + z + t) as f64).sin(),
+    };
+    (0..FRAMES).flat_map(|t| grid.whole().iter().map(move |v| value(v, t)).collect::<Vec<_>>()).collect()
+}
+
+#[test]
+fn what_is_clear_or_hidden_is_not_read() {
+    let grid = Grid::unit([40, 64, 40]);
+    let samples = scene_with_a_wall(&grid);
+    let memory = archive(grid, SampleType::F32, &samples);
+    let config = ConvertConfig { block: Some(8), ..settings(Basis::Haar, 8, 0.0) };
+    let file = stored(&mut memory.clone(), &config);
+    let close = View { scale: Some(6.0), ..view(0.0, 0.0, [96, 96]) };
+    let config = RenderConfig { splat_error: 1e-4, ..seen(close, &grid, composite(None)) };
+    let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &config);
+    let (whole, of_all) = pictures(&mut direct(&memory, None), &config);
+    assert_eq!(found.len(), whole.len());
+    let off = found.iter().zip(&whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off < 1e-5, "{off:e}");
+    assert!(report.tiles_clear > report.tiles / 10 && of_all.tiles_clear < report.tiles_clear, "{report:?}");
+    assert!(report.tiles_opaque > 0);
+    assert!(report.blocks_read < report.blocks / 2, "{report:?}");
+}
+
+#[test]
+fn memory_changes_no_bit_of_a_composite() {
+    let samples = with_holes(field(&GRID, FRAMES, 3));
+    let files = [exact(&samples, Basis::Haar), exact(&samples, Coding::AUTO)];
+    for (splat_error, mode) in [(0.0, composite(Some(8))), (1e-3, composite(None)), (1e-3, Mode::Mip { slabs: None })] {
+        let config = RenderConfig { splat_error, ..seen(view(30.0, 25.0, [100, 90]), &GRID, mode) };
+        files.iter().for_each(|file| assert!(under_less_memory(&mut scene(file), &config) >= 3));
+    }
+}
+
+#[test]
+fn what_means_nothing_along_a_ray_is_refused() {
+    let samples = field(&GRID, FRAMES, 3);
+    let file = exact(&samples, Basis::Haar);
+    let mut scene = scene(&file);
+    let plain = seen(view(30.0, 25.0, [20, 20]), &GRID, composite(None));
+    let with = |change: &dyn Fn(&mut RenderConfig)| {
+        let mut config = plain.clone();
+        change(&mut config);
+        config
+    };
+    for (wrong, what) in [
+        (with(&|c| c.kernel.tau = 0.1), "--tau"),
+        (with(&|c| c.certify = true), "--error-image"),
+        (with(&|c| c.quantity = Quantity::Emission), "--quantity"),
+        (with(&|c| c.mode = composite(Some(0))), "--slabs"),
+        (with(&|c| c.mode = composite(Some(100_000))), "--slabs"),
+    ] {
+        let error = wavesplat::render::check(&scene, &wrong).unwrap_err();
+        assert!(matches!(&error, Error::Usage(said) if said.starts_with(what)), "{error}");
+    }
+    assert!(!pictures(&mut scene, &plain).0.is_empty());
+}
