@@ -61,29 +61,33 @@ impl<'a> Canvas<'a> {
 
     /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
     pub(super) fn finish<T: Send>(&self, pictures: &mut [T], finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync) {
-        self.finish_some(pictures, |_| true, finish);
+        Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
     }
 
-    /// The same for every tile that is `wanted`.
-    pub(super) fn finish_some<T: Send>(
-        &self,
+    /// The same for the same rows of several pictures that look alike, layers one behind the other: of every tile first those
+    /// that are `wanted` of the first few layers together, then of the next.
+    pub(super) fn finish_layers<T: Send>(
+        layers: &[Self],
+        together: usize,
         pictures: &mut [T],
-        wanted: impl Fn(&Place) -> bool + Sync,
+        wanted: impl Fn(usize, &Place) -> bool + Sync,
         finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync,
     ) {
-        let width = self.band.eye.camera.size[0];
-        let side = self.band.eye.tile();
+        let Some(Self { band, .. }) = layers.first() else { return };
+        let (width, side) = (band.eye.camera.size[0], band.eye.tile());
         let columns = width.div_ceil(side);
-        let places = Place::cover(width, self.band.rows.clone(), side);
-        let bands = self.by_rows_of_tiles(pictures, side);
+        let places = Place::cover(width, band.rows.clone(), side);
+        let bands = layers[0].by_rows_of_tiles(pictures, side);
         places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
             let mut pixels = Pixels { planes, width, top: places[0].y.start };
-            for (i, place) in places.iter().enumerate().filter(|(_, place)| wanted(place)) {
-                let sums = match &self.sums {
-                    Sums::Tiles(tiles) => OfTile::Tile(&tiles[n * columns + i]),
-                    Sums::Cells(lattice, cells) => OfTile::Gather(lattice.gather(cells, place)),
-                };
-                finish(Finished { place, planes: self.planes, sums }, &mut pixels);
+            for (i, place) in places.iter().enumerate() {
+                for first in (0..layers.len()).step_by(together) {
+                    let some = first..layers.len().min(first + together);
+                    let some: Vec<&Self> = some.filter(|n| wanted(*n, place)).map(|n| &layers[n]).collect();
+                    if !some.is_empty() {
+                        finish(Finished::new(&some, place, n * columns + i), &mut pixels);
+                    }
+                }
             }
         });
     }
@@ -101,31 +105,56 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// A tile that has all its blocks.
+/// A tile that has all its blocks, in one layer or more.
 pub(super) struct Finished<'a> {
     pub(super) place: &'a Place,
+    pub(super) layers: usize,
+    /// Of a layer.
     planes: usize,
     sums: OfTile<'a>,
 }
 
 enum OfTile<'a> {
-    Tile(&'a Tile),
+    Tiles(Vec<&'a Tile>),
     Gather(Gather<'a>),
 }
 
-impl Finished<'_> {
-    /// The planes that may have sums.
+impl<'a> Finished<'a> {
+    /// The tile with such a number in some layers that look alike.
+    fn new(layers: &[&'a Canvas<'a>], place: &'a Place, number: usize) -> Self {
+        let (mut tiles, mut cells) = (Vec::new(), Vec::new());
+        for layer in layers {
+            match &layer.sums {
+                Sums::Tiles(of_band) => tiles.push(&of_band[number]),
+                Sums::Cells(lattice, of_band) => cells.push((*lattice, of_band)),
+            }
+        }
+        let planes = layers[0].planes;
+        let sums = match cells.first() {
+            Some((lattice, _)) => {
+                let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
+                OfTile::Gather(lattice.gather((&cells, planes), place))
+            }
+            None => OfTile::Tiles(tiles),
+        };
+        Self { place, layers: layers.len(), planes, sums }
+    }
+
+    /// The planes that may have sums, counted through all layers.
     pub(super) fn used(&self) -> Vec<usize> {
         match &self.sums {
-            OfTile::Tile(_) => (0..self.planes).collect(),
+            OfTile::Tiles(_) => (0..self.layers * self.planes).collect(),
             OfTile::Gather(gather) => gather.used().to_vec(),
         }
     }
 
-    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    /// The planes of all layers at `count` pixels from `first` on, into the first lanes of `planes`.
     pub(super) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
-            OfTile::Tile(tile) => tile.load(first, count, planes),
+            OfTile::Tiles(tiles) => {
+                let of_layers = planes.chunks_exact_mut(self.planes);
+                tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
+            }
             OfTile::Gather(gather) => gather.load(first, count, planes),
         }
     }
@@ -134,7 +163,7 @@ impl Finished<'_> {
     pub(super) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut planes = [Lane::default()];
         match &mut self.sums {
-            OfTile::Tile(tile) => tile.load(first, count, &mut planes),
+            OfTile::Tiles(tiles) => tiles[0].load(first, count, &mut planes),
             OfTile::Gather(gather) => planes[0] = gather.load_one(first, count),
         }
         planes[0]

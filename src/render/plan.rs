@@ -128,7 +128,9 @@ impl<'a> Budget<'a> {
             None => self.size[0] * rows.next_multiple_of(TILE),
         };
         let lattices = self.eyes.iter().filter_map(|eye| eye.lattice.as_ref());
-        let scratch = lattices.map(|lattice| lattice.scratch(&self.block, planes)).max().unwrap_or(0);
+        let sliced = self.eyes.iter().any(|eye| eye.slab.is_some());
+        let gathered = if sliced { planes.max(slabs::TOGETHER) } else { planes };
+        let scratch = lattices.map(|lattice| lattice.scratch(&self.block, gathered)).max().unwrap_or(0);
         let numbers = planes * self.eyes.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
         numbers * size_of::<f64>()
     }

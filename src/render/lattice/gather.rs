@@ -32,10 +32,13 @@ pub(super) fn side_by_side(planes: usize) -> usize {
 const TOGETHER: usize = 16;
 
 impl<'a> Gather<'a> {
-    pub(super) fn new(lattice: &'a Lattice, cells: &Cells, place: &'a Place) -> Self {
+    /// Of layers with the same rectangle of cells and so many planes each; these are counted through all layers.
+    pub(super) fn new(lattice: &'a Lattice, (layers, count): (&[&Cells], usize), place: &'a Place) -> Self {
         let (first, size) = lattice.seen_by(&place.x, &place.y);
-        let seen = Seen::of(cells, first, size);
-        let planes: Vec<(usize, &[f64])> = cells.touched().filter(|(_, plane)| seen.any(plane)).collect();
+        let seen = Seen::of(layers[0], first, size);
+        let numbered = |n: usize| move |(plane, sums)| (n * count + plane, sums);
+        let planes = layers.iter().enumerate().flat_map(|(n, cells)| cells.touched().map(numbered(n)));
+        let planes: Vec<(usize, &[f64])> = planes.filter(|(_, plane)| seen.any(plane)).collect();
         let together = side_by_side(planes.len());
         let bundles = planes.chunks(together).map(|planes| seen.bundle(planes, together)).collect();
         let lanes = if planes.is_empty() { 0 } else { LANES }; // nothing is weighed where there is nothing

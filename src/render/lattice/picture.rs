@@ -167,9 +167,9 @@ impl Lattice {
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
     }
 
-    /// The cells of a tile of a band, as far as its pixels see them.
-    pub(in crate::render) fn gather<'a>(&'a self, cells: &Cells, place: &'a Place) -> Gather<'a> {
-        Gather::new(self, cells, place)
+    /// The cells of a tile of a band, as far as its pixels see them, in layers of so many planes each.
+    pub(in crate::render) fn gather<'a>(&'a self, layers: (&[&Cells], usize), place: &'a Place) -> Gather<'a> {
+        Gather::new(self, layers, place)
     }
 
     /// Pixels a side of a tile: as many as have cells that stay in a core's cache with all planes.

@@ -35,7 +35,7 @@ use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
 use super::expectation::Expectation;
 use super::eye::Eye;
 use super::plan::{self, Budget};
-use super::scene::{Group, Read, Scene};
+use super::scene::{Group, Inverse, Read, Scene};
 use super::terms::Layout;
 use super::{Look, Mode, RenderConfig, RenderReport, lap};
 use crate::error::{Error, Result};
@@ -53,6 +53,8 @@ use visible::Visible;
 pub(super) const MOST_SLABS: usize = 1 << 16;
 /// Standard deviations of the kernel in front of the first voxels and behind the last ones that slabs are cut in, too.
 const TAIL: f64 = 3.0;
+/// Planes of slabs that are gathered together, about: what a pixel's weights cost is shared by as many.
+pub(super) const TOGETHER: usize = 64;
 /// A slab's mean counts where its length is this share of its thickness.
 const LEAST: f64 = 0.01;
 
@@ -187,10 +189,11 @@ impl<B: Blend> View<'_, B> {
             let (blocks, batch) = (visible.blocks(&run, rows), budget.batch(&source.layout, rows.len()));
             canvas::splat(&mut canvases, &blocks, batch, source, report)?;
             let mut clock = Instant::now();
-            for (slab, canvas) in run.iter().zip(canvases) {
-                let wanted = |place: &_| visible.is_open(*slab, place);
-                canvas.finish_some(pixels, wanted, |tile, pixels| self.blend_tile(source, visible, tile, pixels));
-            }
+            let wanted = |n: usize, place: &_| visible.is_open(run[n], place);
+            let together = (TOGETHER / source.layout.planes()).max(1);
+            Canvas::finish_layers(&canvases, together, pixels, wanted, |tile, pixels| {
+                self.blend_tile(source, visible, tile, pixels);
+            });
             lap(&mut clock, &mut report.inverse_seconds);
             self.progress.advance((source.layout.frames * rows.len() * (end - next)) as u64);
             next = end;
@@ -198,7 +201,7 @@ impl<B: Blend> View<'_, B> {
         Ok(())
     }
 
-    /// Puts a tile of a slab behind what is there.
+    /// Puts a tile of some slabs, front to back, behind what is there.
     fn blend_tile(
         &self,
         source: &WithLengths<'_>,
@@ -206,26 +209,21 @@ impl<B: Blend> View<'_, B> {
         mut tile: Finished<'_>,
         pixels: &mut Pixels<'_, B::Pixel>,
     ) {
-        let layout = &source.layout;
-        let used = tile.used();
-        let mut inverse = source.group.inverse(&used);
-        let (mut planes, mut frames) = (vec![Lane::default(); layout.planes()], vec![Lane::default(); layout.frames]);
+        let (frames, count) = (source.layout.frames, source.layout.planes());
+        let mut layers = source.layers(&tile.used(), tile.layers);
+        let mut planes = vec![Lane::default(); tile.layers * count];
         let (width, mut is_closed) = (tile.place.x.len(), true);
         for (y, at) in tile.place.y.clone().zip((0..).step_by(width)) {
             for first in (0..width).step_by(LANES) {
-                let count = LANES.min(width - first);
+                let lanes = LANES.min(width - first);
                 let place = [tile.place.x.start + first, y];
-                if (0..layout.frames).all(|f| pixels.at(f, place, count).iter().all(B::is_closed)) {
+                if (0..frames).all(|f| pixels.at(f, place, lanes).iter().all(B::is_closed)) {
                     continue;
                 }
                 is_closed = false;
-                if !used.is_empty() {
-                    tile.load(at + first, count, &mut planes);
-                    let lengths = source.lengths(&planes);
-                    inverse(&mut planes, &mut frames);
-                    for (f, (sums, lengths)) in frames.iter().zip(&lengths).enumerate() {
-                        self.blend_lane(sums, lengths, pixels.at(f, place, count));
-                    }
+                tile.load(at + first, lanes, &mut planes);
+                for (layer, planes) in layers.iter_mut().zip(planes.chunks_exact_mut(count)) {
+                    layer.means(planes, |f, sums, lengths| self.blend_lane(sums, lengths, pixels.at(f, place, lanes)));
                 }
             }
         }
@@ -261,19 +259,52 @@ impl<'a> WithLengths<'a> {
         Ok(Self { group, layout, blocks: eye.blocks, with_terms: contents.blocks.into_iter().collect() })
     }
 
-    /// Of each frame the lengths of some pixels, less what is missing.
-    fn lengths(&self, planes: &[Lane]) -> Vec<Lane> {
-        let all = planes[self.layout.planes() - 1];
-        if !self.layout.absent {
-            return vec![all; self.layout.frames];
-        }
-        let in_all = planes[self.layout.absent_in_all()];
-        let of_frame = |f: usize| {
-            let absent = planes[self.layout.absent(f)];
-            std::array::from_fn(|l| all[l] - absent[l] - in_all[l])
+    /// Some layers of a tile, of which these planes may have sums.
+    fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
+        let count = self.layout.planes();
+        let layer = |n: usize| {
+            let used: Vec<usize> =
+                used.iter().filter(|plane| **plane / count == n).map(|plane| plane % count).collect();
+            let inverse = (!used.is_empty()).then(|| self.group.inverse(&used));
+            Layer { layout: self.layout, inverse, frames: vec![Lane::default(); self.layout.frames] }
         };
-        (0..self.layout.frames).map(of_frame).collect()
+        (0..layers).map(layer).collect()
     }
+}
+
+/// A slab of a tile.
+struct Layer<'a> {
+    layout: Layout,
+    /// None if it holds nothing.
+    inverse: Option<Box<Inverse<'a>>>,
+    frames: Vec<Lane>,
+}
+
+impl Layer<'_> {
+    /// Calls `each(frame, sums, lengths)` for all frames at some pixels; overwrites their planes.
+    fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
+        let Self { layout, inverse: Some(inverse), frames } = self else { return };
+        let lengths = lengths(layout, planes);
+        if lengths.iter().flatten().all(|length| *length <= 0.0) {
+            return;
+        }
+        inverse(planes, frames);
+        frames.iter().zip(&lengths).enumerate().for_each(|(f, (sums, lengths))| each(f, sums, lengths));
+    }
+}
+
+/// Of each frame the lengths of some pixels, less what is missing.
+fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
+    let all = planes[layout.planes() - 1];
+    if !layout.absent {
+        return vec![all; layout.frames];
+    }
+    let in_all = planes[layout.absent_in_all()];
+    let of_frame = |f: usize| {
+        let absent = planes[layout.absent(f)];
+        std::array::from_fn(|l| all[l] - absent[l] - in_all[l])
+    };
+    (0..layout.frames).map(of_frame).collect()
 }
 
 impl Blocks for WithLengths<'_> {
