@@ -25,6 +25,23 @@ pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files>
     Ok(files)
 }
 
+/// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case, no
+/// dot), those that match a pattern, or the one of that name, which need not exist.
+///
+/// # Errors
+/// A folder that cannot be listed, an invalid pattern, and either without any such file.
+pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
+    if !input.is_dir() {
+        return if !input.exists() && is_pattern(input) { matching(input) } else { Ok(vec![input.into()]) };
+    }
+    let mut files = visible_files(input)?;
+    files.retain(|file| format::extension(file) == extension);
+    if files.is_empty() {
+        return Err(Error::usage(format!("{}: has no .{extension} file", input.display())));
+    }
+    Ok(files)
+}
+
 fn expand_one(input: &Path, options: &OpenOptions) -> Result<Files> {
     if input.is_dir() {
         return directory(input, options);

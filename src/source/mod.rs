@@ -24,6 +24,8 @@ mod vti;
 mod vti_header;
 mod xml;
 
+pub use inputs::files;
+pub use npy::{ArrayHeader, array_header};
 pub use select::{Selection, select};
 
 use crate::error::Result;

@@ -30,6 +30,28 @@ pub(super) struct Array {
     pub(super) start: u64,
 }
 
+/// What the header of an array of any number of dimensions says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ArrayHeader {
+    /// Lengths of the axes, the slowest first.
+    pub lengths: Vec<u64>,
+    /// The type of the samples.
+    pub sample: SampleType,
+    /// Whether samples have their most significant byte first.
+    pub big_endian: bool,
+    /// Bytes before the first sample.
+    pub start: u64,
+}
+
+/// Reads the header of an `.npy` of any number of dimensions; its size is not checked.
+///
+/// # Errors
+/// A file that cannot be read, a damaged header, types of samples that are not supported, Fortran order.
+pub fn array_header(path: &Path) -> Result<ArrayHeader> {
+    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    any_header(&mut BufReader::with_capacity(256, file), path)
+}
+
 /// Reads the header of one file and checks its size.
 pub(super) fn describe(path: &Path) -> Result<Described> {
     let state = FileBytes::open(path, Access::Read)?.state();
@@ -42,6 +64,10 @@ pub(super) fn describe(path: &Path) -> Result<Described> {
 
 /// Reads up to the first sample, and not a byte further.
 pub(super) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
+    any_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
+}
+
+fn any_header(reader: &mut impl Read, path: &Path) -> Result<ArrayHeader> {
     let bytes = header_bytes(reader).map_err(|e| match e.kind() {
         io::ErrorKind::UnexpectedEof => Error::input(path, "ends inside its npy header"),
         io::ErrorKind::InvalidData => Error::input(path, e.to_string()),
@@ -71,18 +97,25 @@ fn header_bytes(reader: &mut impl Read) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn parse(bytes: &[u8]) -> Parsed<Array> {
+impl ArrayHeader {
+    fn of_volumes(self) -> Parsed<Array> {
+        let (dims, frames) = dims(&self.lengths)?;
+        if frames == 0 {
+            return Err("its array has 0 frames".into());
+        }
+        let Self { sample, big_endian, start, .. } = self;
+        Ok(Array { shape: Shape::new(dims, sample)?, frames, big_endian, start })
+    }
+}
+
+fn parse(bytes: &[u8]) -> Parsed<ArrayHeader> {
     check_harmless(&bytes[8..])?;
     let header = NpyHeader::from_reader(bytes).map_err(|e| format!("its npy header is damaged: {e}"))?;
     let (sample, big_endian) = sample_type(&header.dtype())?;
     if header.order() == Order::Fortran {
         return Err("its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))".into());
     }
-    let (dims, frames) = dims(header.shape())?;
-    if frames == 0 {
-        return Err("its array has 0 frames".into());
-    }
-    Ok(Array { shape: Shape::new(dims, sample)?, frames, big_endian, start: bytes.len() as u64 })
+    Ok(ArrayHeader { lengths: header.shape().to_vec(), sample, big_endian, start: bytes.len() as u64 })
 }
 
 /// Stops text on which the parser would run out of stack or multiply beyond 64 bits.

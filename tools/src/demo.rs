@@ -1,5 +1,6 @@
 //! The demo: the paper's experiment in small (sections 4.1 and 4.2), from a solver's frames to figure 5 and table 1.
 
+use crate::diff::measure::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
 use crate::output::{Format, Shape, Target};
 use crate::sheet::{Image, contact_sheet, difference_images};
@@ -193,7 +194,7 @@ fn table(runs: &[&Run], truth: &[f32], bound: f64) -> String {
                 c.coefficients_per_sample,
                 c.output_bytes,
                 compared.largest_share_of_bound,
-                largest_difference(&run.pictures, truth) / bound
+                Differences::of(&run.pictures, truth).largest() / bound
             );
         }
         text.push('\n');
@@ -203,14 +204,4 @@ fn table(runs: &[&Run], truth: &[f32], bound: f64) -> String {
          A further view costs no transform. Both sides share footprints among frames; the sum of weights is left out of both.\n",
     );
     text
-}
-
-/// The largest difference of two stacks of pictures; infinite where only one has background.
-fn largest_difference(a: &[f32], b: &[f32]) -> f64 {
-    let difference = |(a, b): (&f32, &f32)| match (a.is_nan(), b.is_nan()) {
-        (true, true) => 0.0,
-        (false, false) => (f64::from(*a) - f64::from(*b)).abs(),
-        _ => f64::INFINITY,
-    };
-    a.iter().zip(b).map(difference).fold(0.0, f64::max)
 }

@@ -1,6 +1,7 @@
-//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets, the benchmark.
+//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets, differences of pictures, the benchmark.
 pub mod bench;
 pub mod demo;
+pub mod diff;
 pub mod eddy;
 pub mod lattice;
 pub mod output;

@@ -1,4 +1,4 @@
-//! The program: the demo, synthetic archives and the benchmark.
+//! The program: the demo, synthetic archives, differences of pictures and the benchmark.
 
 use clap::{Args, Parser, Subcommand};
 use std::io::{self, Write};
@@ -9,6 +9,7 @@ use wavesplat::sample::SampleType;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
+use wavesplat_tools::diff;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
 
@@ -19,6 +20,8 @@ Examples:
   wavesplat-tools synth sparse --dims 256x256x256x500 --dtype u8 -o frames/
   wavesplat-tools synth noise --dims 64x64x64x10 --format raw -o - | wc -c
   wavesplat-tools demo --frames-only -o eddy/
+  wavesplat-tools diff before.png after.png -o difference.png
+  wavesplat-tools diff exact.npy lossy.npy --fail-above 1e-3 --json
   wavesplat-tools bench -o bench-output
   wavesplat-tools bench --quick -o quick
   wavesplat-tools bench size --peers python3 -o sizes
@@ -26,7 +29,7 @@ Examples:
   wavesplat-tools bench layers mine.npy -o layers
   wavesplat-tools bench speed -o speed
 
-wavesplat's own instruments: the demo, synthetic archives and the benchmark.";
+wavesplat's own instruments: the demo, synthetic archives, differences of pictures and the benchmark.";
 
 #[derive(Parser)]
 #[command(version, about = EXAMPLES, long_about = None, subcommand_required = true)]
@@ -41,6 +44,8 @@ enum Command {
     Demo(Demo),
     /// Write a synthetic archive
     Synth(SynthArgs),
+    /// Compare two pictures or two stacks of pictures
+    Diff(diff::Args),
     /// Measure run time against error, beside the conventional method; an interrupted run goes on where it was
     Bench(Box<BenchArgs>),
     /// One measured stage of the benchmark
@@ -377,6 +382,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo(&args),
         Command::Synth(args) => synth(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Bench(args) => match &args.other {
             Some(OtherBench::Size(args)) => bench_size(args),
             Some(OtherBench::Layers(args)) => bench_layers(args),

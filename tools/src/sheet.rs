@@ -1,5 +1,6 @@
 //! Pictures next to one another: contact sheets, a colour bar, differences, labels.
 
+use crate::diff::measure::difference;
 use font8x8::legacy::BASIC_LEGACY;
 use std::io::Write;
 use wavesplat::error::{Error, Result};
@@ -112,17 +113,18 @@ pub fn difference_colour(value: f64) -> Rgb {
 /// If `a` and `b` differ in length or do not consist of whole pictures.
 pub fn difference_images(a: &[f32], b: &[f32], [width, height]: [usize; 2], scale: f64) -> Vec<Image> {
     assert!(a.len() == b.len() && a.len().is_multiple_of(width * height), "two stacks of whole pictures");
-    let colours: Vec<Rgb> = a.iter().zip(b).map(|(a, b)| pixel_difference(*a, *b, scale)).collect();
+    let colours: Vec<Rgb> = a.iter().zip(b).map(|(a, b)| heat(difference(*a, *b), scale)).collect();
     let picture = |pixels: &[Rgb]| Image { width, height, pixels: pixels.to_vec() };
     colours.chunks_exact(width * height).map(picture).collect()
 }
 
-fn pixel_difference(a: f32, b: f32, scale: f64) -> Rgb {
-    match (a.is_nan(), b.is_nan()) {
-        (true, true) => [0; 3],
-        (false, false) if a == b => difference_colour(0.0),
-        (false, false) => difference_colour((f64::from(a) - f64::from(b)).abs() / scale),
-        _ => difference_colour(1.0),
+/// A [`difference`] as a share of `scale` in [`difference_colour`]; black for none, where both are background.
+pub fn heat(difference: Option<f64>, scale: f64) -> Rgb {
+    match difference {
+        None => [0; 3],
+        Some(0.0) => difference_colour(0.0), // even if the scale is 0
+        Some(f64::INFINITY) => difference_colour(1.0),
+        Some(difference) => difference_colour(difference / scale),
     }
 }
 
