@@ -192,6 +192,17 @@ mod tests {
     }
 
     #[test]
+    fn one_name_stands_for_files_of_one_ending() {
+        let folder = Folder::new();
+        let pictures = ["f2.png", "f10.PNG"].map(|name| folder.write(name, "x"));
+        folder.write("f3.txt", "x");
+        assert_eq!(files(&folder.path(""), "png").expect("a folder"), pictures);
+        assert_eq!(files(&folder.path("f?.png"), "png").expect("a pattern"), pictures[..1]);
+        assert_eq!(files(&folder.path("gone.png"), "png").expect("a name"), [folder.path("gone.png")]);
+        assert!(files(&folder.path(""), "npy").is_err() && files(&folder.path("g*.png"), "png").is_err());
+    }
+
+    #[test]
     fn a_list_is_taken_in_its_order() {
         let folder = Folder::new();
         let mut files = frames(&folder, 0..3);

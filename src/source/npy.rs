@@ -235,6 +235,19 @@ mod tests {
     }
 
     #[test]
+    fn headers_of_any_number_of_dimensions_are_read() {
+        let folder = Folder::new();
+        for lengths in [vec![], vec![7], vec![4, 6], vec![1, 1, 4, 2, 2]] {
+            let shape: String = lengths.iter().map(|n: &u64| format!("{n}, ")).collect();
+            let bytes = npy(1, &dict("'>u2'", &format!("({shape})")), &[]);
+            let expected =
+                ArrayHeader { lengths, sample: SampleType::U16, big_endian: true, start: bytes.len() as u64 };
+            assert_eq!(array_header(&folder.write("a.npy", bytes)).expect("a header"), expected);
+        }
+        assert!(array_header(&folder.write("a.npy", "text")).is_err() && array_header(&folder.path("gone")).is_err());
+    }
+
+    #[test]
     fn no_damage_panics() {
         survives_damage("a.npy", &npy(1, &dict("'<f4'", "(2, 2, 4)"), &[0; 64]));
     }

@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn shrinking_keeps_the_largest_difference() {
-        assert_eq!((shrinking(PIXELS), shrinking(PIXELS + 1), shrinking(16 * PIXELS)), (1, 1, 4));
+        assert_eq!((shrinking(PIXELS), shrinking(2 * PIXELS), shrinking(16 * PIXELS)), (1, 2, 4));
         let mut differences = [Some(0.0); 15];
         differences[14] = Some(2.0);
         let image = map(&differences, 5, 2, 2.0);

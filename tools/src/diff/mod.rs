@@ -16,26 +16,27 @@ use wavesplat::cli::{self, spare_inputs};
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
 
+// Each paragraph is one line, which is broken to fit the terminal.
 const HELP: &str = "\
-A and B are PNGs (grey or RGB, with or without alpha, 8 or 16 bit), .npy arrays of (H,W), (F,H,W) or (F,H,W,C), or folders
-or quoted patterns of PNGs, which are frames in natural order. Frames, sizes, channels and types must be the same, but that
+A and B are PNGs (grey or RGB, with or without alpha, 8 or 16 bit), .npy arrays of (H,W), (F,H,W) or (F,H,W,C), or folders \
+or quoted patterns of PNGs, which are frames in natural order. Frames, sizes, channels and types must be the same, but that \
 floats may have different sizes. Numbers are in the units of the files.
 
-NaN is background. What is background in both is left out. What is background in one alone is counted, makes the largest
+NaN is background. What is background in both is left out. What is background in one alone is counted, makes the largest \
 difference infinite, and is left out of all means.
 
-PSNR: 20 log10(peak / root mean square). The peak is A's range, of all frames, for floats, else that of the type: 255 or
+PSNR: 20 log10(peak / root mean square). The peak is A's range, of all frames, for floats, else that of the type: 255 or \
 65535.
-SSIM: Wang et al. 2004; Gaussian windows of 11x11 pixels, sigma 1.5, K1 0.01, K2 0.03, that lie inside and are free of
+SSIM: Wang et al. 2004; Gaussian windows of 11x11 pixels, sigma 1.5, K1 0.01, K2 0.03, that lie inside and are free of \
 background, of the same peak; the mean over windows, then channels, then frames. Alpha is a channel as any other.
 
-The heat map shows, of each pixel, the channel that differs most: blue is no difference, red the scale or more and
-background in one alone, black background in both. Of a stack it has up to 16 frames, evenly spread. Where it would have
+The heat map shows, of each pixel, the channel that differs most: blue is no difference, red the scale or more and \
+background in one alone, black background in both. Of a stack it has up to 16 frames, evenly spread. Where it would have \
 more than 64 Mi pixels it is shrunk, and each pixel shows the largest difference of those it stands for.
 
 With --json, null stands for what is infinite or not defined; \"identical\" and \"background_in_one\" tell which.
 
-Exit codes: 0 done, 1 reading or writing failed, 2 usage, also two that cannot be compared, 3 a damaged file or one of
+Exit codes: 0 done, 1 reading or writing failed, 2 usage, also two that cannot be compared, 3 a damaged file or one of \
 another kind, 4 above --fail-above, or a file changed while it was being read.";
 
 /// What `diff` is asked.
