@@ -288,8 +288,7 @@ impl BenchArgs {
 
 /// Reads a tolerance that leaves something to measure.
 fn parse_tolerance(text: &str) -> std::result::Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|t| t.is_finite() && *t > 0.0);
-    number.ok_or_else(|| format!("{text:?} is not a number above 0"))
+    diff::above_zero(text)
 }
 
 /// Reads `NXxNYxNZxNT`.

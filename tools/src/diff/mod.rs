@@ -66,7 +66,11 @@ fn finite(text: &str, is_right: impl Fn(f64) -> bool, words: &str) -> std::resul
     number.ok_or_else(|| format!("{text:?} is not a number {words}"))
 }
 
-fn above_zero(text: &str) -> std::result::Result<f64, String> {
+/// Reads a finite number above 0.
+///
+/// # Errors
+/// Anything else, in words that quote it.
+pub fn above_zero(text: &str) -> std::result::Result<f64, String> {
     finite(text, |n| n > 0.0, "above 0")
 }
 
