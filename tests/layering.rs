@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// Where each third-party crate is at home: `src/` and then one of these.
-const HOMES: [(&str, &[&str]); 12] = [
+const HOMES: [(&str, &[&str]); 14] = [
     ("memmap2::", &["mapped.rs"]),
     ("libc::", &["mapped.rs"]),
     ("crossbeam::", &["convert/"]),
@@ -40,6 +40,8 @@ const HOMES: [(&str, &[&str]); 12] = [
     ("bytesize::", &["cli/"]),
     ("png::", &["render/sink.rs"]),
     ("colorous::", &["colour/named.rs"]),
+    ("csv::", &["colour/table.rs"]),
+    ("spleen_font::", &["render/annotate/"]),
     ("npyz::", &["npy.rs", "source/npy.rs"]),
     ("quick_xml::", &["source/"]),
     ("half::", &["sample.rs", "bound.rs"]),

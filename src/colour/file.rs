@@ -1,9 +1,170 @@
 //! Transfer functions from files.
 
-use super::TransferFunction;
+use super::{TransferFunction, paraview, table};
 use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
-/// From a file by its name.
+/// More is no colour map: a file without end must not take all memory.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// A file, and which of its maps: the name behind `#`.
+pub(super) fn split(name: &str) -> (&str, Option<&str>) {
+    let ending = ".json#";
+    let place = name.to_ascii_lowercase().find(ending).filter(|_| !Path::new(name).exists());
+    place.map_or((name, None), |at| (&name[..at + ending.len() - 1], Some(&name[at + ending.len()..])))
+}
+
+/// From a file by its name, and for one of several maps `#` and that map's.
 pub(super) fn read(name: &str) -> Result<TransferFunction> {
-    Err(Error::input(name, "not yet"))
+    let (path, map) = split(name);
+    let parsed = match ending(path).as_str() {
+        "json" => paraview::parse(&text(path)?, map),
+        "csv" => table::parse(&text(path)?),
+        _ => {
+            let what = "takes the name of a colour map, or a file: ParaView's .json, or .csv";
+            return Err(Error::usage(format!("{path}: {what}")));
+        }
+    };
+    parsed.map_err(|what| Error::input(path, what))
+}
+
+fn ending(path: &str) -> String {
+    Path::new(path).extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
+/// What a file says.
+fn text(path: &str) -> Result<String> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "reading", e))?;
+    text_of(bytes).map_err(|what| Error::input(path, what))
+}
+
+fn text_of(bytes: Vec<u8>) -> std::result::Result<String, String> {
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(format!("is larger than {} MiB, which no colour map is", MOST_BYTES >> 20));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| "is not text, which a colour map is expected to be")?;
+    let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors begin with it
+    if text.trim().is_empty() { Err("is empty, where a colour map is expected".into()) } else { Ok(text) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::fs;
+
+    #[test]
+    fn a_map_is_named_behind_its_file() {
+        assert_eq!(split("a/b.json#Cool #1 (x.y/z)"), ("a/b.json", Some("Cool #1 (x.y/z)")));
+        assert_eq!(split("a#1/b.JSON"), ("a#1/b.JSON", None));
+        assert_eq!(split("é.JSON#é"), ("é.JSON", Some("é")));
+    }
+
+    #[test]
+    fn files_that_are_no_colour_maps_are_refused_in_words() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let long = vec![b' '; MOST_BYTES as usize + 1];
+        let cases: [(&str, &[u8], &str); 5] = [
+            ("a.json", b"", "is empty"),
+            ("b.csv", b" \n\t\n", "is empty"),
+            ("c.csv", b"\xff\xfe\x00", "not text"),
+            ("d.csv", &long, "larger than 16 MiB"),
+            ("e.xml", b"<ColorMap/>", "ParaView's .json, or .csv"),
+        ];
+        for (name, bytes, words) in cases {
+            let path = folder.path().join(name);
+            fs::write(&path, bytes).expect("written");
+            let error = TransferFunction::open(&path.to_string_lossy()).expect_err("refused").to_string();
+            assert!(error.contains(words) && error.contains(name), "{error}");
+        }
+        let missing = folder.path().join("f.json").to_string_lossy().into_owned();
+        assert!(matches!(TransferFunction::open(&missing), Err(Error::Io { .. })));
+        assert!(matches!(TransferFunction::open(&format!("{missing}#a/b")), Err(Error::Io { .. })));
+        assert!(matches!(TransferFunction::open("/dev/null.json"), Err(Error::Io { .. })));
+    }
+
+    /// What is nearly right, and what is not at all.
+    fn texts() -> impl Strategy<Value = Vec<u8>> {
+        let pieces = [
+            "[",
+            "]",
+            "{",
+            "}",
+            ",",
+            ":",
+            "\n",
+            "\"Name\"",
+            "\"ColorSpace\"",
+            "\"RGBPoints\"",
+            "\"Points\"",
+            "\"NanColor\"",
+            "\"Lab\"",
+            "\"Diverging\"",
+            "[0,0,0,1,1,1,0,0]",
+            "[0,0,0.2,0,1,1,0.5,1]",
+            "0",
+            "1",
+            "-1e308",
+            "1e308",
+            "5e-324",
+            "255",
+            "nan",
+            "inf",
+            "value,red,green,blue,opacity\n",
+            "0,0,0,1\n",
+            "1,1,0,0\n",
+            "#",
+            "\"",
+            "é",
+        ];
+        let pieces = pieces.map(|piece| piece.as_bytes().to_vec());
+        prop_oneof![
+            proptest::collection::vec(any::<u8>(), 0..200),
+            proptest::collection::vec(proptest::sample::select(pieces.to_vec()), 0..20).prop_map(|all| all.concat()),
+            proptest::collection::vec(proptest::sample::select(pieces[15..].to_vec()), 4..40).prop_map(|all| [
+                b"[{\"RGBPoints\":[".to_vec(),
+                all.join(&b','),
+                b"]}]".to_vec()
+            ]
+            .concat()),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_a_reader_panic(bytes in texts()) {
+            let Ok(text) = text_of(bytes) else { return Ok(()) };
+            for map in [paraview::parse(&text, None), table::parse(&text)].into_iter().flatten() {
+                let (lo, hi) = map.range();
+                prop_assert!(lo < hi);
+                for value in [lo, lo / 2.0 + hi / 2.0, hi, f64::INFINITY, -f64::INFINITY] {
+                    let colour = map.colour(value).expect("a value's colour");
+                    prop_assert!(colour.iter().all(|c| (0.0..=1.0).contains(c)), "{colour:?}");
+                    prop_assert!((0.0..=1.0).contains(&map.opacity(value)));
+                }
+                prop_assert_eq!(TransferFunction::of_text(&map.text()).map(|m| m.text()), Some(map.text()));
+            }
+        }
+
+        #[test]
+        fn text_gives_the_same_colours_again(
+            mut points in proptest::collection::vec((-1e300..1e300, [0.0..=1.0, 0.0..=1.0, 0.0..=1.0]), 2..9),
+            space in 0..6_usize,
+            value in -1e300..1e300,
+        ) {
+            use crate::colour::{Colour, Space};
+            points.sort_by(|a: &(f64, Colour), b| a.0.total_cmp(&b.0));
+            let spaces = [Space::Rgb, Space::Hsv, Space::HsvWrapped, Space::Lab, Space::Diverging, Space::Step];
+            let map = TransferFunction::of_points(points, spaces[space], None, None).map_err(TestCaseError::reject)?;
+            for map in [map.over((-3.3, 7.7)).expect("a range"), map] {
+                let again = TransferFunction::of_text(&map.text()).expect("the same");
+                prop_assert_eq!(&again, &map);
+                prop_assert_eq!(again.colour(value), map.colour(value));
+            }
+        }
+    }
 }

@@ -5,9 +5,12 @@
 //! after projection, or along the ray; [`Scale`] is what a picture's pixels need of it.
 
 mod file;
+mod lab;
 mod named;
+mod paraview;
 mod scale;
 mod space;
+mod table;
 
 pub use named::NAMES;
 pub use scale::{Norm, Scale};
@@ -45,12 +48,13 @@ enum Colours {
 }
 
 impl TransferFunction {
-    /// A map by its name, or that of a file: ParaView's JSON, or CSV.
+    /// A map by its name, or that of a file: ParaView's JSON, with `#` and the map's name if it holds several, or CSV.
     pub fn open(name: &str) -> Result<Self> {
         if let Some(named) = named::known(name) {
             return Ok(Self::named(named));
         }
-        if Path::new(name).extension().is_none() && !Path::new(name).exists() {
+        let path = Path::new(file::split(name).0);
+        if path.extension().is_none() && !path.exists() {
             let what = format!("{name}: no such colour map or file; the maps are {}", NAMES.join(" "));
             return Err(Error::usage(what));
         }
@@ -65,8 +69,8 @@ impl TransferFunction {
     /// Of points of some values and, unless it is to run from 0 at the first to 1 at the last of them, of opacities.
     ///
     /// # Errors
-    /// Fewer than two points, values that are not ascending, or anything that is not finite or not within 0 to 1: in words
-    /// that follow a name.
+    /// Fewer than two points, values that are not ascending or all the same, or anything that is not finite or not within
+    /// 0 to 1: in words that follow a name.
     pub fn of_points(
         points: Vec<(f64, Colour)>,
         space: Space,
@@ -77,6 +81,9 @@ impl TransferFunction {
         let range = (points[0].0, points[points.len() - 1].0);
         let opacity = opacity.unwrap_or_else(|| ramp(range));
         check_points("opacities", opacity.iter().map(|(v, a)| (*v, std::slice::from_ref(a))))?;
+        if let Some(wrong) = nan.iter().flatten().find(|c| !(0.0..=1.0).contains(*c)) {
+            return Err(format!("NaN's colour has {wrong}, where 0 to 1 is expected"));
+        }
         Ok(Self { colours: Colours::Points(points, space), opacity, nan, range, of_values: true })
     }
 
@@ -92,12 +99,12 @@ impl TransferFunction {
 
     /// The same colours and opacities, stretched over another range.
     pub fn over(&self, range: (f64, f64)) -> Result<Self> {
-        if !(range.0.is_finite() && range.1.is_finite() && range.0 < range.1) {
-            let what = "takes two numbers, the lower one first";
-            return Err(Error::usage(format!("--range {},{}: {what}", range.0, range.1)));
-        }
-        let (from, width) = (self.range.0, self.range.1 - self.range.0);
-        let moved = |v: f64| range.0 + (v - from) / width * (range.1 - range.0);
+        check_range(range)?;
+        let (from, to) = self.range;
+        let moved = |v: f64| match (v - from) / (to - from) {
+            1.0 => range.1, // and not what rounding makes of it
+            share => range.0 + share * (range.1 - range.0),
+        };
         let colours = match &self.colours {
             Colours::Named(name) => Colours::Named(name),
             Colours::Points(points, space) => {
@@ -177,6 +184,17 @@ impl TransferFunction {
     }
 }
 
+/// An error if a range that was asked for shows nothing.
+fn check_range((lo, hi): (f64, f64)) -> Result<()> {
+    let wrong = match (hi - lo).is_finite() {
+        true if lo < hi => return Ok(()),
+        true if lo == hi => "an empty range shows nothing; it takes two numbers, the lower one first",
+        true => "takes two numbers, the lower one first",
+        false => "takes two finite numbers, the lower one first, that are not too far apart",
+    };
+    Err(Error::usage(format!("--range {lo},{hi}: {wrong}")))
+}
+
 /// Opacity from 0 to 1 over a range.
 fn ramp((lo, hi): (f64, f64)) -> Vec<(f64, f64)> {
     vec![(lo, 0.0), (hi, 1.0)]
@@ -194,7 +212,7 @@ fn between<T: Copy>(points: &[(f64, T)], value: f64, mix: impl Fn(&T, &T, f64) -
 
 /// Whether points are two or more, of ascending values, with components of 0 to 1; a step has a value twice.
 fn check_points<'a>(what: &str, points: impl Iterator<Item = (f64, &'a [f64])>) -> std::result::Result<(), String> {
-    let (mut count, mut last) = (0, f64::NEG_INFINITY);
+    let (mut count, mut first, mut last) = (0, f64::INFINITY, f64::NEG_INFINITY);
     for (n, (value, components)) in (1..).zip(points) {
         if !value.is_finite() {
             return Err(format!("point {n} of its {what} has the value {value}, where a finite number is expected"));
@@ -206,9 +224,13 @@ fn check_points<'a>(what: &str, points: impl Iterator<Item = (f64, &'a [f64])>) 
         if let Some(wrong) = components.iter().find(|c| !(0.0..=1.0).contains(*c)) {
             return Err(format!("point {n} of its {what} has {wrong}, where 0 to 1 is expected"));
         }
-        (count, last) = (n, value);
+        (count, first, last) = (n, first.min(value), value);
     }
     match count {
+        2.. if first == last => Err(format!("all of its {what} have the value {last}, where a range is expected")),
+        2.. if !(last - first).is_finite() => {
+            Err(format!("the values {first} and {last} of its {what} are too far apart"))
+        }
         0 | 1 => Err(format!("has {count} point(s) of {what}, where two or more are expected")),
         _ => Ok(()),
     }

@@ -1,32 +1,190 @@
 //! From one colour to the next.
 
 use super::Colour;
+use super::lab;
+use std::f64::consts::{PI, TAU};
 
-/// How colours are interpolated.
+/// How colours are interpolated: as VTK does, so that maps look as in ParaView.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Space {
     /// Red, green and blue each by itself.
     Rgb,
-    /// Moreland's, by way of white.
+    /// Hue, saturation and value each by itself; hue is a number of 0 to 1, and does not pass 0.
+    Hsv,
+    /// As [`Self::Hsv`], but hue takes the shorter way around.
+    HsvWrapped,
+    /// CIE L*a*b* of sRGB and D65.
+    Lab,
+    /// Moreland's, by way of white where the colours are saturated and of different hues.
     Diverging,
+    /// The second colour from behind the first on.
+    Step,
 }
 
 impl Space {
+    const ALL: [Self; 6] = [Self::Rgb, Self::Hsv, Self::HsvWrapped, Self::Lab, Self::Diverging, Self::Step];
+
     /// Its name.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rgb => "RGB",
+            Self::Hsv => "HSV",
+            Self::HsvWrapped => "HSV wrapped",
+            Self::Lab => "Lab",
             Self::Diverging => "Diverging",
+            Self::Step => "Step",
         }
     }
 
     /// By its name.
     pub(super) fn named(name: &str) -> Option<Self> {
-        [Self::Rgb, Self::Diverging].into_iter().find(|space| space.name() == name)
+        Self::ALL.into_iter().find(|space| space.name().eq_ignore_ascii_case(name))
     }
 
-    /// The colour at a share of the way.
+    /// The colour at a share of the way; each channel is 0 to 1, as those of the two are.
     pub(super) fn between(self, a: Colour, b: Colour, t: f64) -> Colour {
-        std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t)
+        let colour = match self {
+            Self::Rgb => mix(a, b, t),
+            Self::Hsv => of_hsv(mix(hsv(a), hsv(b), t)),
+            Self::HsvWrapped => of_hsv(mix_wrapped(hsv(a), hsv(b), t)),
+            Self::Lab => lab::to_rgb(mix(lab::of_rgb(a), lab::of_rgb(b), t)),
+            Self::Diverging => diverging(polar(lab::of_rgb(a)), polar(lab::of_rgb(b)), t),
+            Self::Step if t > 0.0 => b,
+            Self::Step => a,
+        };
+        colour.map(|c| c.clamp(0.0, 1.0))
+    }
+}
+
+fn mix(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t)
+}
+
+/// Hue (0 to 1), saturation and value.
+fn hsv([r, g, b]: Colour) -> [f64; 3] {
+    let (value, least) = (r.max(g).max(b), r.min(g).min(b));
+    let chroma = value - least;
+    if chroma <= 0.0 {
+        return [0.0, 0.0, value];
+    }
+    let sixths = if r == value {
+        (g - b) / chroma
+    } else if g == value {
+        2.0 + (b - r) / chroma
+    } else {
+        4.0 + (r - g) / chroma
+    };
+    [sixths.rem_euclid(6.0) / 6.0, chroma / value, value]
+}
+
+fn of_hsv([hue, saturation, value]: [f64; 3]) -> Colour {
+    let channel = |sixth: f64| {
+        let place = (sixth + hue * 6.0).rem_euclid(6.0);
+        value - value * saturation * place.min(4.0 - place).clamp(0.0, 1.0)
+    };
+    [channel(5.0), channel(3.0), channel(1.0)]
+}
+
+/// Hue the shorter way around.
+fn mix_wrapped(mut a: [f64; 3], mut b: [f64; 3], t: f64) -> [f64; 3] {
+    if a[0] - b[0] > 0.5 {
+        a[0] -= 1.0;
+    } else if b[0] - a[0] > 0.5 {
+        b[0] -= 1.0;
+    }
+    mix(a, b, t)
+}
+
+/// Moreland's Msh: the length of L*a*b*, its angle to the axis of greys, and the hue; the angles in radians.
+fn polar([l, a, b]: [f64; 3]) -> [f64; 3] {
+    let length = (l * l + a * a + b * b).sqrt();
+    let angle = if length > 0.001 { libm::acos((l / length).clamp(-1.0, 1.0)) } else { 0.0 };
+    [length, angle, if angle > 0.001 { libm::atan2(b, a) } else { 0.0 }]
+}
+
+/// Angles below this are no colour, but grey.
+const SATURATED: f64 = 0.05;
+
+/// Between two colours in Msh: K. Moreland, "Diverging Color Maps for Scientific Visualization", 2009.
+fn diverging(mut a: [f64; 3], mut b: [f64; 3], mut t: f64) -> Colour {
+    let colours = a[1] > SATURATED && b[1] > SATURATED;
+    let apart = (a[2] - b[2] + PI).rem_euclid(TAU) - PI;
+    if colours && apart.abs() > 0.33 * PI {
+        let white = [a[0].max(b[0]).max(88.0), 0.0, 0.0];
+        *(if t < 0.5 { &mut b } else { &mut a }) = white;
+        t = if t < 0.5 { 2.0 * t } else { 2.0 * t - 1.0 };
+    } else if colours {
+        b[2] = a[2] - apart; // the shorter way around
+    }
+    if a[1] < SATURATED && b[1] > SATURATED {
+        a[2] = hue_of_grey(b, a[0]);
+    } else if b[1] < SATURATED && a[1] > SATURATED {
+        b[2] = hue_of_grey(a, b[0]);
+    }
+    let [length, angle, hue] = mix(a, b, t);
+    let chroma = length * libm::sin(angle);
+    lab::to_rgb([length * libm::cos(angle), chroma * libm::cos(hue), chroma * libm::sin(hue)])
+}
+
+/// The hue that a grey of such a length is given, so that colours change evenly on the way to a saturated one.
+fn hue_of_grey([length, angle, hue]: [f64; 3], grey: f64) -> f64 {
+    if length >= grey - 0.1 {
+        return hue;
+    }
+    let spin = angle * (grey * grey - length * length).sqrt() / (length * libm::sin(angle));
+    if hue > -0.3 * PI { hue + spin } else { hue - spin } // away from purple
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn near(a: Colour, b: Colour, most: f64) {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most), "{a:?} is not {b:?}");
+    }
+
+    const COOL: Colour = [0.231_373, 0.298_039, 0.752_941];
+    const WARM: Colour = [0.705_882, 0.015_686_3, 0.149_02];
+
+    #[test]
+    fn the_ends_of_every_way_are_the_colours() {
+        let colours = [[0.0; 3], [1.0; 3], COOL, WARM, [0.0, 1.0, 0.25], [0.5; 3], [1.0, 0.0, 1.0]];
+        for (space, a, b) in Space::ALL.iter().flat_map(|s| colours.map(|a| colours.map(|b| (s, a, b))).concat()) {
+            near(space.between(a, b, 0.0), a, 2e-3);
+            near(space.between(a, b, 1.0), b, 2e-3);
+            assert_eq!(Space::named(space.name()), Some(*space));
+        }
+    }
+
+    #[test]
+    fn cool_to_warm_is_the_table_of_moreland() {
+        // Bytes of the published table of 33 colours: every eighth.
+        let table = [[59, 76, 192], [141, 176, 254], [221, 221, 221], [244, 154, 123], [180, 4, 38]];
+        for (i, bytes) in table.into_iter().enumerate() {
+            let expected = bytes.map(|b: u8| f64::from(b) / 255.0);
+            near(Space::Diverging.between(COOL, WARM, i as f64 / 4.0), expected, 1.5 / 255.0);
+        }
+        near(Space::Diverging.between(COOL, WARM, 0.5), [0.865, 0.865, 0.865], 2e-3);
+    }
+
+    #[test]
+    fn hues_pass_0_only_when_wrapped() {
+        let (blue, red) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        near(Space::Hsv.between(blue, red, 0.5), [0.0, 1.0, 0.0], 1e-12);
+        near(Space::HsvWrapped.between(blue, red, 0.5), [1.0, 0.0, 1.0], 1e-12);
+        near(Space::HsvWrapped.between(red, blue, 0.5), [1.0, 0.0, 1.0], 1e-12);
+        near(Space::Hsv.between([0.5, 0.25, 0.25], [1.0, 0.5, 0.5], 0.5), [0.75, 0.375, 0.375], 1e-12);
+    }
+
+    #[test]
+    fn lab_mixes_by_lightness() {
+        near(Space::Lab.between([0.0; 3], [1.0; 3], 0.5), [0.4663; 3], 1e-3); // L* = 50
+        near(lab::of_rgb([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20], 0.05);
+    }
+
+    #[test]
+    fn a_step_has_the_colour_of_its_upper_end() {
+        assert_eq!([0.0, 0.1, 1.0].map(|t| Space::Step.between(COOL, WARM, t)), [COOL, WARM, WARM]);
     }
 }
