@@ -45,7 +45,7 @@ impl Scale {
         if value.is_nan() {
             return self.background;
         }
-        self.map.colour(self.share(value)).map_or(self.background, bytes)
+        self.colour_at(self.share(value))
     }
 
     /// The colour of which these are the channels, each spread over the range; the background where any is NaN.
@@ -60,17 +60,27 @@ impl Scale {
         bytes(std::array::from_fn(seen))
     }
 
+    /// The colour at a share of the range, 0 to 1.
+    pub fn colour_at(&self, share: f64) -> Rgb {
+        self.map.colour(share).map_or(self.background, bytes)
+    }
+
     /// Where a value lies in the range, 0 to 1; NaN counts as 0.
-    pub fn share(&self, value: f32) -> f64 {
+    pub fn share(&self, value: impl Into<f64>) -> f64 {
         let normed = |v: f64| if self.norm == Norm::Log { libm::log(v.max(f64::MIN_POSITIVE)) } else { v };
         let (lo, hi) = (normed(self.range.0), normed(self.range.1));
-        let t = (normed(f64::from(value)) - lo) / (hi - lo);
+        let t = (normed(value.into()) - lo) / (hi - lo);
         if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
     }
 
     /// The values of the first and the last colour.
     pub fn range(&self) -> (f64, f64) {
         self.range
+    }
+
+    /// How values are spread over the range.
+    pub fn norm(&self) -> Norm {
+        self.norm
     }
 
     /// What is where there is nothing.

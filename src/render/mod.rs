@@ -16,6 +16,7 @@
 //! that means stay means.
 
 mod amounts;
+pub mod annotate;
 mod canvas;
 mod certificate;
 mod coded;
