@@ -38,7 +38,7 @@ const HOMES: [(&str, &[&str]); 14] = [
     ("clap::", &["cli/", "bin/"]),
     ("indicatif::", &["cli/"]),
     ("bytesize::", &["cli/"]),
-    ("png::", &["render/sink.rs"]),
+    ("png::", &["render/sink/"]),
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),

@@ -1,26 +1,29 @@
 //! `wavesplat-render`: pictures from coefficient files, or from frames by the conventional method.
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
+mod colours;
+mod targets;
+
 use clap::{Parser, ValueEnum};
+use colours::{ColourArgs, Ranges};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
+use targets::{Targets, parse_format};
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
-use wavesplat::cli::{
-    self, CommonArgs, FrameList, InputArgs, OpacityPoints, Pair, RegionSpec, Triple, Whole, spare_inputs,
-};
-use wavesplat::colour::{Norm, Rgb, Scale, TransferFunction};
+use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
+use wavesplat::colour::{Norm, Scale};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
-use wavesplat::output::{Output, STANDARD};
-use wavesplat::progress::Silent;
-use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig, names_of_views};
+use wavesplat::output::STANDARD;
+use wavesplat::render::annotate::Annotation;
+use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Mode, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
+    CoefficientScene, FrameScene, Limit, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
     default_splat_error, render,
 };
 use wavesplat::volume::Grid;
@@ -38,6 +41,8 @@ Examples:
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
   wavesplat-render run.wspl -o values.npy --size 800x600
   wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
+  wavesplat-render run.wspl --orbit 90 --frames 10 --annotate -o turntable.apng
+  wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render frames/ --method direct -o frame_%04d.png
@@ -49,7 +54,8 @@ struct Cli {
     /// Coefficient file; for --method direct also frames
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// File to write, a pattern as frame_%04d.png, or - for standard output; %v or %03v is the number of the view
+    /// File to write, a pattern as frame_%04d.png, or - for standard output; %v or %03v is the number of the view; a file that
+    /// is no pattern takes all views of one frame, one after another
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Replace existing files
@@ -111,38 +117,16 @@ struct Cli {
     /// What a pixel means
     #[arg(long, value_enum, default_value = "mean")]
     quantity: QuantityName,
-    /// Colour map: viridis turbo rainbow grey plasma inferno magma [default: viridis]
-    #[arg(long, value_name = "NAME", help_heading = "Colour")]
-    colormap: Option<String>,
-    /// Values of the first and the last colour [default: those of small pictures
-    /// of 16 frames of the archive]
-    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
-    range: Option<Pair>,
-    /// Colour of the background, as ffffff
-    #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
-    background: Rgb,
-    /// What becomes of what lies along a ray
-    #[arg(long, value_enum, default_value = "projection", help_heading = "Along the ray")]
-    mode: ModeName,
-    /// Colours and opacities of a composite: a map's name or a file (ParaView's JSON, CSV)
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
-    transfer_function: Option<String>,
-    /// Opacities of a composite in place of the file's: share of the range and opacity, as 0:0,0.5:0.1,1:0.8
-    #[arg(long, value_name = "X:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
-    opacity: Option<OpacityPoints>,
-    /// World units of a path that has such an opacity [default: the largest spacing]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
-    opacity_unit: Option<f64>,
-    /// Slabs that the volume is cut into [default: each as thick as the largest spacing]
-    #[arg(long, value_name = "N", help_heading = "Along the ray")]
-    slabs: Option<usize>,
+    #[command(flatten)]
+    colour: ColourArgs,
     /// From coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients")]
     method: MethodName,
-    /// png, npy, y4m, rgb24 or gray16 [default: by the ending of OUT; png for -]
+    /// png, npy, y4m, rgb24, gray16, apng (a moving PNG) or sheet (all pictures in one PNG) [default: by the ending of OUT; png
+    /// for -]
     #[arg(long, value_parser = parse_format)]
     format: Option<PictureFormat>,
-    /// Frames a second of a y4m
+    /// Frames a second of a y4m or apng
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
     /// A value that means "missing" in frames, besides NaN and infinities
@@ -184,16 +168,6 @@ impl From<ErrorName> for Limit {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum ModeName {
-    /// It is summed up or averaged: --quantity
-    Projection,
-    /// It is coloured and hides what is behind: --transfer-function
-    Composite,
-    /// The largest value is taken
-    Mip,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Splat coefficients once for all frames of a window
     Coefficients,
@@ -208,15 +182,18 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let (mut scene, file) = self.scene()?;
-        let config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()))?;
-        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config)?;
+        let Opened { mut scene, file, times } = self.scene()?;
+        let mut config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()))?;
+        let targets = self.targets(&config)?;
+        config.reserved =
+            targets.0.memory(&config)? + targets.1.as_ref().map_or(Ok(0), |errors| errors.memory(&config))?;
+        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, times)?;
         let progress = self.common.progress("pictures");
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
-            if let (Some(sink), Some(error)) = (errors.get_mut(rendered.view), rendered.error) {
+            if let (Some(sink), Some(error)) = (of_view(&mut errors, rendered.view), rendered.error) {
                 sink.picture(rendered.frame, error)?;
             }
-            pictures[rendered.view].picture(rendered.frame, rendered.picture)
+            of_view(&mut pictures, rendered.view).map_or(Ok(()), |sink| sink.picture(rendered.frame, rendered.picture))
         })?;
         errors.into_iter().chain(pictures).try_for_each(Sink::finish)?;
         self.common.detail(summary(&report));
@@ -245,43 +222,56 @@ impl Cli {
     }
 
     /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
-    fn sinks(&self, scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
-        let (pictures, errors) = self.targets(config)?;
-        let coloured_array = self.colormap.is_some();
+    fn sinks(
+        &self,
+        scene: &mut dyn Scene,
+        config: &RenderConfig,
+        (pictures, errors): (Targets, Option<Targets>),
+        times: Vec<f64>,
+    ) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
-        let in_colours = pictures.format != PictureFormat::Npy || coloured_array;
-        let light = config.mode.pixel() == Pixel::Light;
-        let needed = in_colours && self.range.is_none() && !light || certify;
+        let in_colours = pictures.format != PictureFormat::Npy || self.colour.is_asked();
+        let map = self.colour.map()?;
+        let needed = in_colours && self.colour.range.is_none() || certify;
         let looking = RenderConfig { certify, ..config.clone() };
         if needed {
             check(scene, config)?; // or small pictures would be made in vain, and what they need be named
         }
         let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
-        let range = self.range.map_or(seen.values, |r| (r.0[0], r.0[1]));
+        let (range, norm) = self.colour.spread(&map, &seen, in_colours, &self.common)?;
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
         }
         if certify {
             self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
         }
-        let open = |targets: Targets, pixel, range, coloured_array| {
-            let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis"))?;
-            let colours = Scale::new(&map, range, Norm::Linear, self.background)?;
-            let (size, frames, fps, force) = (self.size.0, config.frames.clone(), self.fps, self.force);
-            let config =
-                SinkConfig { format: targets.format, size, frames, fps, pixel, colours, coloured_array, force };
-            targets.names.iter().map(|name| Sink::open(name, config.clone())).collect::<Result<Vec<_>>>()
+        let annotation = self.colour.annotate.then_some(Annotation { times });
+        let open = |targets: Targets, colours, coloured_array| {
+            let sink = SinkConfig {
+                format: targets.format,
+                size: self.size.0,
+                frames: targets.frames(config),
+                fps: self.fps,
+                pixel: Pixel::Value,
+                colours,
+                coloured_array,
+                annotation: annotation.clone(),
+                force: self.force,
+            };
+            targets.names.iter().map(|name| Sink::open(name, sink.clone())).collect::<Result<Vec<_>>>()
         };
-        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, Pixel::Value, seen.errors, false))?;
+        let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
+        let of_errors = scale(seen.errors, Norm::Linear)?;
+        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, of_errors, false))?;
         let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
-        Ok((open(pictures, config.mode.pixel(), range, coloured_array)?, errors, coloured))
+        Ok((open(pictures, scale(range, norm)?, self.colour.is_asked())?, errors, coloured))
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
     fn targets(&self, config: &RenderConfig) -> Result<(Targets, Option<Targets>)> {
-        let views = config.views.len();
-        let pictures = Targets::new(&self.output, self.format, views)?;
-        let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, views)).transpose()?;
+        let pictures = Targets::new(&self.output, self.format, config)?;
+        self.colour.check(pictures.format)?;
+        let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
         if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
             return Err(Error::usage("--error-image: takes a file of its own"));
         }
@@ -313,7 +303,8 @@ impl Cli {
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            return Ok((Box::new(CoefficientScene::new(file.clone(), what)), Some(file)));
+            let times = file.metadata().times.clone();
+            return Ok(Opened { scene: Box::new(CoefficientScene::new(file.clone(), what)), file: Some(file), times });
         }
         if self.skip_damaged {
             return Err(Error::usage("--skip-damaged: is for a coefficient file"));
@@ -325,7 +316,8 @@ impl Cli {
             return Err(Error::usage("--method direct reads frames more than once, so not from standard input"));
         }
         let source = self.input.open(&self.inputs, &self.common)?;
-        Ok((Box::new(FrameScene::new(source, self.missing_value)), None))
+        let times = source.archive().times.clone();
+        Ok(Opened { scene: Box::new(FrameScene::new(source, self.missing_value)), file: None, times })
     }
 
     fn config(&self, scene: &dyn Scene, file: Option<&Metadata>) -> Result<RenderConfig> {
@@ -350,30 +342,9 @@ impl Cli {
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
-            mode: self.mode()?,
+            mode: Default::default(),
             memory: self.common.memory.0,
-            reserved: self.views.len()
-                * self.orbit as usize
-                * (1 + usize::from(self.error_image.is_some()))
-                * Output::BUFFER,
-        })
-    }
-
-    /// What becomes of what lies along a ray.
-    fn mode(&self) -> Result<Mode> {
-        let slabs = self.slabs;
-        Ok(match self.mode {
-            ModeName::Projection => Mode::Projection,
-            ModeName::Mip => Mode::Mip { slabs },
-            ModeName::Composite => {
-                let transfer = TransferFunction::open(self.transfer_function.as_deref().unwrap_or("viridis"))?;
-                let transfer = self.range.map_or(Ok(transfer.clone()), |r| transfer.over((r.0[0], r.0[1])))?;
-                let transfer = match &self.opacity {
-                    Some(points) => transfer.with_opacity(&points.0).map_err(Error::usage)?,
-                    None => transfer,
-                };
-                Mode::Composite { transfer, unit: self.opacity_unit, slabs }
-            }
+            reserved: 0,
         })
     }
 
@@ -429,8 +400,20 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     error
 }
 
-/// What is rendered, and the file that it is from.
-type Opened = (Box<dyn Scene>, Option<Arc<CoefficientFile>>);
+/// What is rendered.
+struct Opened {
+    scene: Box<dyn Scene>,
+    /// The file that it is from.
+    file: Option<Arc<CoefficientFile>>,
+    /// Of each frame, or empty.
+    times: Vec<f64>,
+}
+
+/// Where the pictures of a view go: all may go to one.
+fn of_view(sinks: &mut [Sink], view: usize) -> Option<&mut Sink> {
+    let place = if sinks.len() == 1 { 0 } else { view };
+    sinks.get_mut(place)
+}
 
 /// What `--json` says.
 #[derive(Serialize)]
@@ -451,58 +434,6 @@ struct Coloured {
     error_range: Option<(f64, f64)>,
 }
 
-/// Where pictures go: a name for each view.
-struct Targets {
-    format: PictureFormat,
-    names: Vec<PathBuf>,
-}
-
-impl Targets {
-    fn new(path: &Path, format: Option<PictureFormat>, views: usize) -> Result<Self> {
-        Ok(Self { format: format.map_or_else(|| format_of(path), Ok)?, names: names_of_views(path, views)? })
-    }
-}
-
-/// The ranges of the pictures and of their errors.
-struct Ranges {
-    values: (f64, f64),
-    errors: (f64, f64),
-}
-
-impl Default for Ranges {
-    fn default() -> Self {
-        Self { values: (0.0, 1.0), errors: (0.0, 1.0) }
-    }
-}
-
-impl Ranges {
-    /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
-    /// they show nothing; errors begin at 0.
-    fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
-        const PIXELS: f64 = 64.0;
-        const FRAMES: usize = 16;
-        for view in &mut small.views {
-            let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
-            view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
-            view.scale = view.scale.map(|s| s * shrink);
-        }
-        let last = scene.frames().unwrap_or(1).saturating_sub(1);
-        small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
-        small.frames.dedup();
-        let mut ranges = Self::default();
-        let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
-        let report = render(scene, &small, &Silent, &mut |rendered| {
-            (lo, hi) = rendered.picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-            Ok(())
-        })?;
-        if lo <= hi {
-            ranges.values = (lo.into(), hi.into());
-        }
-        ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
-        Ok(ranges)
-    }
-}
-
 fn summary(r: &RenderReport) -> String {
     let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
     let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
@@ -519,25 +450,4 @@ fn summary(r: &RenderReport) -> String {
         r.coefficients,
         r.left_out.coefficients
     )
-}
-
-fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
-    let wrong = || "takes six hexadecimal digits, as ffffff".to_string();
-    let digits = text.trim_start_matches('#');
-    let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;
-    Ok([(number >> 16) as u8, (number >> 8) as u8, number as u8])
-}
-
-fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
-    let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16".into())
-}
-
-fn format_of(path: &Path) -> Result<PictureFormat> {
-    if path == Path::new(STANDARD) {
-        return Ok(PictureFormat::Png);
-    }
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    parse_format(ending)
-        .map_err(|names| Error::usage(format!("{}: the ending says no format: {names}", path.display())))
 }

@@ -1,0 +1,165 @@
+//! Which colours values have.
+
+use clap::{Args, ValueEnum};
+use wavesplat::cli::{CommonArgs, Pair};
+use wavesplat::colour::{Norm, Rgb, TransferFunction};
+use wavesplat::error::{Error, Result};
+use wavesplat::progress::Silent;
+use wavesplat::render::sink::PictureFormat;
+use wavesplat::render::{RenderConfig, Scene, render};
+
+/// Options on colours.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Colour")]
+pub(crate) struct ColourArgs {
+    /// Colour map: viridis plasma inferno magma cividis turbo coolwarm grey rainbow, or a file: ParaView's .json (of several
+    /// maps, FILE#NAME) or .csv with value,red,green,blue [default: viridis]
+    #[arg(long, value_name = "NAME|FILE")]
+    colormap: Option<String>,
+    /// Values of the first and the last colour [default: a file's own, or those of small pictures of 16 frames of the archive;
+    /// to both sides of 0 alike with coolwarm]
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
+    pub(crate) range: Option<Pair>,
+    /// Spread values over colours evenly, or by their logarithm (no further down than to a ten-thousandth of the largest)
+    #[arg(long, value_enum, default_value = "linear")]
+    norm: NormName,
+    /// Draw a colour bar and the time of each frame into the pictures
+    #[arg(long)]
+    pub(crate) annotate: bool,
+    /// Colour of the background, as ffffff
+    #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour)]
+    pub(crate) background: Rgb,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum NormName {
+    Linear,
+    Log,
+}
+
+impl From<NormName> for Norm {
+    fn from(name: NormName) -> Self {
+        match name {
+            NormName::Linear => Self::Linear,
+            NormName::Log => Self::Log,
+        }
+    }
+}
+
+impl ColourArgs {
+    /// Whether a map was named, so that arrays hold colours too.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.colormap.is_some()
+    }
+
+    /// An error if a format has no colours to draw in.
+    pub(crate) fn check(&self, format: PictureFormat) -> Result<()> {
+        let why = match format {
+            PictureFormat::Gray16 => "gray16 has no colours to draw in; take png, or another format",
+            PictureFormat::Npy if !self.is_asked() => {
+                "an .npy holds values to compute with; give --colormap for colours"
+            }
+            _ => return Ok(()),
+        };
+        if self.annotate { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
+    }
+
+    /// The colours, over the range that was asked for.
+    pub(crate) fn map(&self) -> Result<TransferFunction> {
+        let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis")).map_err(|e| match e {
+            Error::Usage(what) => Error::usage(format!("--colormap {what}")),
+            other => other,
+        })?;
+        self.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
+    }
+
+    /// The values of the first and the last colour, and how those between are spread.
+    pub(crate) fn spread(
+        &self,
+        map: &TransferFunction,
+        seen: &Ranges,
+        in_colours: bool,
+        common: &CommonArgs,
+    ) -> Result<((f64, f64), Norm)> {
+        if !in_colours {
+            return Ok((seen.values, Norm::Linear));
+        }
+        let norm = self.norm.into();
+        if !map.is_of_values() {
+            return Ok((seen.automatic(norm, map.is_diverging())?, norm));
+        }
+        let ((lo, hi), (least, most)) = (map.range(), seen.values);
+        if self.range.is_none() && (most < lo || hi < least) {
+            let name = self.colormap.as_deref().unwrap_or_default();
+            common.note(format_args!(
+                "{name} has colours of {lo:.4e} to {hi:.4e}, and values are {least:.4e} to {most:.4e}: --range stretches them"
+            ));
+        }
+        Ok(((lo, hi), norm))
+    }
+}
+
+fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
+    let wrong = || "takes six hexadecimal digits, as ffffff".to_string();
+    let digits = text.trim_start_matches('#');
+    let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;
+    Ok([(number >> 16) as u8, (number >> 8) as u8, number as u8])
+}
+
+/// The ranges of the pictures and of their errors.
+pub(crate) struct Ranges {
+    values: (f64, f64),
+    /// The smallest value above 0, if there is one.
+    positive: Option<f64>,
+    pub(crate) errors: (f64, f64),
+}
+
+impl Default for Ranges {
+    fn default() -> Self {
+        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0) }
+    }
+}
+
+impl Ranges {
+    /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
+    /// they show nothing; errors begin at 0.
+    pub(crate) fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
+        const PIXELS: f64 = 64.0;
+        const FRAMES: usize = 16;
+        for view in &mut small.views {
+            let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
+            view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+            view.scale = view.scale.map(|s| s * shrink);
+        }
+        let last = scene.frames().unwrap_or(1).saturating_sub(1);
+        small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
+        small.frames.dedup();
+        let mut ranges = Self::default();
+        let (mut lo, mut hi, mut positive) = (f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY);
+        let report = render(scene, &small, &Silent, &mut |rendered| {
+            (lo, hi) = rendered.picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+            let above = rendered.picture.iter().filter(|v| **v > 0.0);
+            positive = above.fold(positive, |least, v| least.min(*v));
+            Ok(())
+        })?;
+        if lo <= hi {
+            ranges.values = (lo.into(), hi.into());
+            ranges.positive = positive.is_finite().then_some(positive.into());
+        }
+        ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
+        Ok(ranges)
+    }
+
+    /// What colours are spread over where nobody says it.
+    fn automatic(&self, norm: Norm, is_diverging: bool) -> Result<(f64, f64)> {
+        const DECADES: f64 = 1e-4;
+        let (lo, hi) = self.values;
+        if norm == Norm::Log {
+            let least =
+                self.positive.ok_or_else(|| Error::usage("--norm log: no value is above 0; give --norm linear"))?;
+            return Ok((least.max(hi * DECADES), hi));
+        }
+        let most = hi.max(-lo);
+        Ok(if is_diverging && lo < 0.0 && 0.0 < hi { (-most, most) } else { (lo, hi) })
+    }
+}

@@ -1,0 +1,75 @@
+//! All pictures of a run in one: a contact sheet.
+
+use super::{Picture, SinkConfig, png};
+use crate::colour::Rgb;
+use crate::error::{Error, Result};
+use crate::output::Output;
+
+/// More pixels a side than most programs show.
+const MOST_SIDE: usize = 1 << 15;
+
+/// Pictures in rows, in their order.
+#[derive(Debug)]
+pub(super) struct Sheet {
+    out: Output,
+    /// Width and height in pixels.
+    size: [usize; 2],
+    /// Empty before the first picture.
+    pixels: Vec<Rgb>,
+    placed: usize,
+}
+
+impl Sheet {
+    pub(super) fn new(out: Output, config: &SinkConfig) -> Result<Self> {
+        let size = size(config.size, config.frames.len())?;
+        Ok(Self { out, size, pixels: Vec::new(), placed: 0 })
+    }
+
+    pub(super) fn picture(&mut self, config: &SinkConfig, frame: usize, picture: Picture<'_>) {
+        let ([width, height], [across, down]) = (config.size, self.size);
+        self.pixels.resize(across * down, config.colours.background());
+        let columns = across / width;
+        let first = self.placed / columns * height * across + self.placed % columns * width;
+        for (y, row) in config.image(frame, picture).chunks_exact(width).enumerate() {
+            self.pixels[first + y * across..][..width].copy_from_slice(row);
+        }
+        self.placed += 1;
+    }
+
+    pub(super) fn finish(mut self) -> Result<()> {
+        let written = png::write(self.size, &self.pixels, &mut self.out);
+        written.map_err(|e| Error::io(self.out.path(), "writing", e))?;
+        self.out.commit()
+    }
+}
+
+/// Width and height in pixels of so many pictures in rows that are about as long together as each is.
+///
+/// # Errors
+/// A side that is too long.
+pub(super) fn size([width, height]: [usize; 2], pictures: usize) -> Result<[usize; 2]> {
+    let rows = |columns: usize| pictures.div_ceil(columns);
+    let wide = |columns: &usize| columns.saturating_mul(width) >= rows(*columns).saturating_mul(height);
+    let columns = (1..=pictures).find(wide).unwrap_or(pictures.max(1));
+    let size = [columns.saturating_mul(width), rows(columns).max(1).saturating_mul(height)];
+    if size.into_iter().all(|side| side <= MOST_SIDE) {
+        return Ok(size);
+    }
+    let [across, down] = size;
+    let what =
+        format!("a sheet of {pictures} pictures would have {across}x{down} pixels, of at most {MOST_SIDE} a side");
+    Err(Error::usage(format!("--format sheet: {what}; give a smaller --size or fewer --frames")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sheets_are_nearly_square() {
+        let sizes = [1, 2, 3, 4, 5, 16, 17].map(|n| size([20, 10], n).expect("small"));
+        assert_eq!(sizes, [[20, 10], [20, 20], [40, 20], [40, 20], [40, 30], [60, 60], [60, 60]]);
+        assert_eq!(size([1 << 15, 1 << 15], 1).expect("just"), [1 << 15, 1 << 15]);
+        assert!(size([512, 512], 5000).is_err() && size([usize::MAX, 2], 9).is_err());
+    }
+}
