@@ -158,6 +158,14 @@ impl TransferFunction {
         }
     }
 
+    /// Whether a colour takes so long that a table of them is worth it.
+    fn is_slow(&self) -> bool {
+        match &self.colours {
+            Colours::Named(name) => named::is_diverging(name),
+            Colours::Points(_, space) => !matches!(space, Space::Rgb | Space::Step),
+        }
+    }
+
     /// Its colours as text, from which [`Self::of_text`] makes them again, to the bit.
     pub fn text(&self) -> String {
         match &self.colours {

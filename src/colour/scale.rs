@@ -18,10 +18,15 @@ pub enum Norm {
 pub struct Scale {
     /// Of shares, 0 to 1.
     map: TransferFunction,
+    /// Colours of that at even shares, or none where it is quick by itself.
+    table: Vec<Rgb>,
     range: (f64, f64),
     norm: Norm,
     background: Rgb,
 }
+
+/// Shares of a table, so many that no colour is off by more than rounding.
+const SHARES: u16 = 1 << 13;
 
 impl Scale {
     /// From the first to the last colour over `range`.
@@ -37,7 +42,10 @@ impl Scale {
             let what = "a logarithm takes a range above 0; give --range, or --norm linear";
             return Err(Error::usage(format!("--norm log: {what} (the range is {lo},{hi})")));
         }
-        Ok(Self { map: map.over((0.0, 1.0))?, range, norm, background })
+        let map = map.over((0.0, 1.0))?;
+        let at = |i| map.colour(f64::from(i) / f64::from(SHARES)).map_or(background, bytes);
+        let table = if map.is_slow() { (0..=SHARES).map(at).collect() } else { Vec::new() };
+        Ok(Self { map, table, range, norm, background })
     }
 
     /// The colour of a value: beyond the range the end's, of NaN the background.
@@ -62,7 +70,8 @@ impl Scale {
 
     /// The colour at a share of the range, 0 to 1.
     pub fn colour_at(&self, share: f64) -> Rgb {
-        self.map.colour(share).map_or(self.background, bytes)
+        let tabled = self.table.get((share * f64::from(SHARES)).round() as usize);
+        tabled.copied().or_else(|| self.map.colour(share).map(bytes)).unwrap_or(self.background)
     }
 
     /// Where a value lies in the range, 0 to 1; NaN counts as 0.
@@ -117,6 +126,18 @@ mod tests {
             assert!((scale.share(value) - share).abs() < 1e-7, "{value}");
         }
         assert!(Scale::new(&grey, (0.0, 1.0), Norm::Log, [0; 3]).is_err());
+    }
+
+    #[test]
+    fn a_table_is_off_by_no_more_than_rounding() {
+        let map = TransferFunction::open("coolwarm").expect("a known map");
+        let scale = Scale::new(&map, (0.0, 1.0), Norm::Linear, [0; 3]).expect("a range");
+        assert!(!scale.table.is_empty());
+        for share in (0..=9999).map(|i| f64::from(i) / 9999.0) {
+            let exact = bytes(map.colour(share).expect("a colour"));
+            let apart = exact.iter().zip(scale.colour_at(share)).map(|(a, b)| a.abs_diff(b)).max();
+            assert!(apart <= Some(1), "{share}: {exact:?}");
+        }
     }
 
     #[test]

@@ -51,14 +51,20 @@ fn bad_values_of_convert_are_named() {
 #[test]
 fn bad_values_of_render_are_named() {
     let work = Work::with_file("");
-    let cases: [(&str, &[&str]); 18] = [
+    let cases: [(&str, &[&str]); 24] = [
         ("--view x", &["--view", "2 numbers"]),
         ("--size 0x5", &["--size", "1 to"]),
         ("--size 5", &["--size", "512x512"]),
         ("--size 90000x90000", &["pixels"]),
         ("--memory 1KiB", &["--memory", "MiB"]),
         ("--colormap jet", &["--colormap jet", "viridis", "turbo", "rainbow"]),
+        ("--colormap maps.xml", &["--colormap maps.xml", ".json", ".csv"]),
         ("--range 2,1", &["--range", "lower"]),
+        ("--range 1,1", &["--range 1,1", "shows nothing"]),
+        ("--norm sqrt", &["--norm", "linear", "log"]),
+        ("--norm log --range=-1,1 --colormap grey", &["--norm log", "above 0", "--range"]),
+        ("--annotate", &["--annotate", "npy", "--colormap"]),
+        ("--annotate --format gray16", &["--annotate", "gray16", "no colours"]),
         ("--frames 99", &["--frames", "40"]),
         ("--region 0:21,:,:", &["--region", "20x14x10"]),
         ("--tau -1", &["--tau", "0 or more"]),

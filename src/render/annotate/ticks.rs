@@ -50,7 +50,7 @@ pub(super) fn short(v: f64) -> String {
     let rounded: f64 = format!("{v:.11e}").parse().unwrap_or(v);
     match rounded.abs() {
         0.0 => "0".into(),
-        0.001..1e5 => rounded.to_string(),
+        0.001..1e6 => rounded.to_string(),
         _ => format!("{rounded:e}"),
     }
 }

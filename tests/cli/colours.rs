@@ -1,0 +1,138 @@
+//! Colour maps and their files, what is drawn into pictures, and files that hold all pictures of a run.
+
+use super::render::decode_png;
+use super::{Work, read_npy};
+use std::io::Cursor;
+
+const SIZE: &str = "--size 48x40";
+
+const MAPS: &str = r#"[
+    {"Name": "Grey", "ColorSpace": "RGB", "RGBPoints": [-1, 0, 0, 0, 2, 1, 1, 1]},
+    {"Name": "Far", "ColorSpace": "Diverging", "RGBPoints": [100, 0, 0, 1, 101, 1, 0, 0]}]"#;
+
+#[test]
+fn a_files_own_values_are_its_range() {
+    let work = Work::with_file("");
+    work.write("maps.json", MAPS);
+    work.write("map.csv", "# grey\nvalue,red,green,blue\n-1,0,0,0\n2,255,255,255\n");
+    let render = |options: &str| {
+        work.render(&format!("a.wspl {SIZE} --frames 2 -o - {options}")).ok().out // a PNG
+    };
+    let grey = render("--colormap grey --range=-1,2");
+    assert!(render("--colormap maps.json#Grey") == grey && render("--colormap map.csv") == grey);
+    assert!(render("--colormap maps.json#Grey --range 0,1") == render("--colormap grey --range 0,1"));
+    assert!(render("--colormap map.csv --range 0.1,1 --norm log") != render("--colormap map.csv --range 0.1,1"));
+    let far = work.render(&format!("a.wspl {SIZE} --frames 2 -o far.png --colormap maps.json#Far")).ok();
+    assert!(far.err.contains("1.0000e2 to 1.0100e2") && far.err.contains("--range"), "{}", far.err);
+    let quiet = work.render(&format!("a.wspl {SIZE} --frames 2 -o near.png --colormap maps.json#Grey")).ok();
+    assert!(quiet.err.is_empty(), "{}", quiet.err);
+}
+
+#[test]
+fn maps_that_cannot_be_read_are_named_with_what_was_expected() {
+    let work = Work::with_file("");
+    work.write("maps.json", MAPS);
+    work.write("cut.json", &MAPS[..90]);
+    work.write("bad.csv", "0,0,0,0\n1,1,x,1\n");
+    let render = |map: &str| work.render(&format!("a.wspl --frames 2 -o out.png --colormap {map}"));
+    render("maps.json").fails(3, &["maps.json", "2 maps", "FILE#NAME", "Grey, Far"]);
+    render("maps.json#Red").fails(3, &["maps.json", "no map 'Red'", "Grey, Far"]);
+    render("cut.json").fails(3, &["cut.json", "ParaView"]);
+    render("bad.csv").fails(3, &["bad.csv", "line 2", "a number for green"]);
+    render("none.csv").fails(1, &["none.csv"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "bad.csv", "cut.json", "maps.json"]);
+}
+
+#[test]
+fn automatic_ranges_go_with_the_map_and_the_norm() {
+    let work = Work::with_file("");
+    let range = |options: &str| {
+        let json = work.render(&format!("a.wspl {SIZE} --frames 2 -o a.png --force --json {options}")).ok().json();
+        [0, 1].map(|i| json["range"][i].as_f64().unwrap())
+    };
+    let [lo, hi] = range("");
+    assert!(lo < 0.0 && 0.0 < hi);
+    let most = hi.max(-lo);
+    assert_eq!(range("--colormap coolwarm"), [-most, most]);
+    let [least, most] = range("--norm log");
+    assert!(most == hi && hi * 1e-4 <= least && least < hi);
+    assert_eq!(range("--norm log --range 1,10"), [1.0, 10.0]);
+}
+
+#[test]
+fn the_time_and_the_colours_are_drawn_into_pictures() {
+    let work = Work::with_file("");
+    let render = |options: &str| decode_png(&work.render(&format!("a.wspl --frames 2 -o - {options}")).ok().out);
+    let differ = |a: &[u8], b: &[u8]| a.chunks(3).zip(b.chunks(3)).map(|(a, b)| a != b).collect::<Vec<_>>();
+    let (plain, drawn) = (render("--size 200x160"), render("--size 200x160 --annotate"));
+    let changed = differ(&plain, &drawn);
+    assert!(drawn.len() == plain.len() && changed[..200 * 30].contains(&true), "the time");
+    assert!(changed[200 * 80 + 170..200 * 81].contains(&true), "the bar");
+    assert!(!changed[200 * 80..200 * 80 + 100].contains(&true), "the rest");
+    let light = render("--size 200x160 --annotate --background ffffff");
+    assert!(light[..200 * 30 * 3].contains(&0), "black on white");
+    assert!(render("--size 16x16 --annotate") == render("--size 16x16"), "there is no room");
+    let array =
+        format!("a.wspl {SIZE} --frames 2 --annotate --colormap grey -o a%v.npy --error-image e%v.npy --orbit 2");
+    work.render(&array).ok();
+}
+
+#[test]
+fn a_moving_png_has_all_frames() {
+    let work = Work::with_file("");
+    work.render(&format!("a.wspl {SIZE} --frames :3 --fps 30 -o a.apng")).ok();
+    let rgb = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format rgb24")).ok().out;
+    let mut reader = png::Decoder::new(Cursor::new(work.read("a.apng"))).read_info().unwrap();
+    let control = *reader.info().animation_control().unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (3, 0), "without end");
+    for picture in rgb.chunks(48 * 40 * 3) {
+        let mut pixels = vec![0; picture.len()];
+        reader.next_frame(&mut pixels).unwrap();
+        assert!(pixels == picture);
+        let frame = *reader.info().frame_control().unwrap();
+        assert_eq!((frame.delay_num, frame.delay_den), (1, 30));
+    }
+    let piped = work.render(&format!("a.wspl {SIZE} --frames :3 --fps 30 -o - --format apng")).ok().out;
+    assert!(piped == work.read("a.apng"));
+}
+
+#[test]
+fn a_sheet_has_all_pictures_in_rows() {
+    let work = Work::with_file("");
+    work.render(&format!("a.wspl {SIZE} --frames :3 -o a.png --format sheet --background 010203")).ok();
+    let rgb = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format rgb24 --background 010203")).ok().out;
+    let sheet = decode_png(&work.read("a.png"));
+    assert_eq!(sheet.len(), 96 * 80 * 3);
+    let row = |x: usize, y: usize| &sheet[(y * 96 + x) * 3..][..48 * 3];
+    let of = |picture: usize, y: usize| &rgb[(picture * 40 + y) * 48 * 3..][..48 * 3];
+    for y in 0..40 {
+        assert!(row(0, y) == of(0, y) && row(48, y) == of(1, y) && row(0, y + 40) == of(2, y), "{y}");
+        assert!(row(48, y + 40).chunks(3).all(|pixel| pixel == [1, 2, 3]), "{y}");
+    }
+    let large = work.render("a.wspl --size 20000x20000 --frames :4 -o b.png --format sheet");
+    large.fails(2, &["4 pictures", "40000x40000", "32768", "--size"]);
+    work.render("a.wspl -o b.sheet").fails(2, &["b.sheet", "ending"]);
+    work.render("a.wspl -o b_%d.png --format sheet").fails(2, &["b_%d.png", "all frames"]);
+    let room = "--size 2000x2000 --frames :9 -o b.png --format sheet --memory 200MiB";
+    let asked = work.render(&format!("a.wspl {room}"));
+    assert!(asked.mebibytes() > 200, "{}", asked.err);
+}
+
+#[test]
+fn one_frame_of_several_views_turns() {
+    let work = Work::with_file("");
+    let render = |options: &str| work.render(&format!("a.wspl {SIZE} --range 0,1 --frames 2 --orbit 3 {options}")).ok();
+    render("-o view%v.npy");
+    render("-o all.npy");
+    let (header, values) = read_npy(&work.read("all.npy"));
+    assert!(header.contains("(3, 40, 48)"), "{header}");
+    let each: Vec<u8> = (0..3).flat_map(|view| read_npy(&work.read(&format!("view{view}.npy"))).1).collect();
+    assert!(values == each);
+    render("-o view%v.rgb24");
+    let each: Vec<u8> = (0..3).flat_map(|view| work.read(&format!("view{view}.rgb24"))).collect();
+    assert!(render("-o - --format rgb24").out == each);
+    render("-o turn.apng --error-image errors.y4m");
+    assert_eq!(work.read("errors.y4m").windows(6).filter(|w| w == b"FRAME\n").count(), 3);
+    let several = work.render(&format!("a.wspl {SIZE} --frames 2,3 --orbit 3 -o all.y4m"));
+    several.fails(2, &["all.y4m", "3 views", "%v"]);
+}
