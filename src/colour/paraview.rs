@@ -33,15 +33,15 @@ pub(super) fn parse(text: &str, name: Option<&str>) -> Result<TransferFunction, 
         Some('[') => serde_json::from_str(text).map_err(wrong)?,
         _ => vec![serde_json::from_str(text).map_err(wrong)?],
     };
-    transfer_function(chosen(maps, name)?)
+    transfer_function(chosen(&maps, name)?)
 }
 
-fn chosen(mut maps: Vec<Map>, name: Option<&str>) -> Result<Map, String> {
-    let place = match name {
-        Some(name) => maps.iter().position(|map| map.name.as_deref() == Some(name)),
-        None => (maps.len() == 1).then_some(0),
+fn chosen<'a>(maps: &'a [Map], name: Option<&str>) -> Result<&'a Map, String> {
+    let found = match name {
+        Some(name) => maps.iter().find(|map| map.name.as_deref() == Some(name)),
+        None => maps.first().filter(|_| maps.len() == 1),
     };
-    place.map(|at| maps.swap_remove(at)).ok_or_else(|| which(&maps, name))
+    found.ok_or_else(|| which(maps, name))
 }
 
 /// Asks for one of the maps.
@@ -58,7 +58,7 @@ fn which(maps: &[Map], name: Option<&str>) -> String {
     }
 }
 
-fn transfer_function(map: Map) -> Result<TransferFunction, String> {
+fn transfer_function(map: &Map) -> Result<TransferFunction, String> {
     if map.indexed.is_some() && map.colours.is_none() {
         return Err("has IndexedColors, which are of categories; RGBPoints of values are expected".into());
     }
@@ -68,7 +68,7 @@ fn transfer_function(map: Map) -> Result<TransferFunction, String> {
     let opacities = opacities.transpose()?.map(bends).transpose()?;
     let nan = map.nan.as_ref().map(|nan| <Colour>::try_from(nan.as_slice()));
     let nan = nan.transpose().map_err(|_| "has a NanColor that is not 3 numbers")?;
-    TransferFunction::of_points(points.collect(), space(&map)?, opacities, nan)
+    TransferFunction::of_points(points.collect(), space(map)?, opacities, nan)
 }
 
 /// Numbers that come in fours.
