@@ -24,7 +24,7 @@
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
 //!  pictures, and what is known of errors    render/finish.rs, weights.rs (eq 12), certificate.rs, expectation.rs,
-//!                                           colour.rs, sink.rs; output.rs
+//!                                           annotate/, sink/; colour/; output.rs
 //! ```
 //!
 //! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source, `recover.rs` saves what is whole

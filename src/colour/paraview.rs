@@ -26,9 +26,15 @@ struct Map {
     indexed: Option<Vec<f64>>,
 }
 
+/// More objects than any file of colour maps holds, of which each takes much more memory than two brackets.
+const MOST_OBJECTS: usize = 1 << 16;
+
 /// The map of such a name, or the only one.
 pub(super) fn parse(text: &str, name: Option<&str>) -> Result<TransferFunction, String> {
     let wrong = |e: serde_json::Error| format!("expected a colour map in ParaView's JSON: {e}");
+    if text.bytes().filter(|byte| *byte == b'{').count() > MOST_OBJECTS {
+        return Err(format!("holds more than {MOST_OBJECTS} objects, where colour maps are expected"));
+    }
     let maps: Vec<Map> = match text.trim_start().chars().next() {
         Some('[') => serde_json::from_str(text).map_err(wrong)?,
         _ => vec![serde_json::from_str(text).map_err(wrong)?],
@@ -154,7 +160,9 @@ mod tests {
     fn what_is_wrong_is_said() {
         let many: Vec<String> = (0..12).map(|i| format!(r#"{{"Name": "m{i}"}}"#)).collect();
         let many = format!("[{}]", many.join(","));
+        let objects = format!("[{}]", vec!["{}"; MOST_OBJECTS + 1].join(","));
         let cases = [
+            (objects.as_str(), "holds more than 65536 objects"),
             (TWO, "holds 2 maps; name one as FILE#NAME: a, b"),
             (&many, "m8, m9 and 2 more"),
             ("[]", "holds 0 maps"),

@@ -57,8 +57,8 @@ mod tests {
             assert!(
                 all.iter().flatten().all(|[x, y]| *x < letters.width && *y < letters.height) && pixels(b' ').is_empty()
             );
-            let mirrored = pixels(b'(').iter().map(|[x, _]| *x).min() > pixels(b')').iter().map(|[x, _]| *x).min();
-            assert!(mirrored, "the left is at the left");
+            let left = pixels(b'L').iter().filter(|[x, _]| *x < letters.width / 2).count();
+            assert!(2 * left > pixels(b'L').len(), "the stem is at the left");
         }
         assert!(Letters::for_side(0).pixels(" 1").iter().all(|[x, _]| *x >= 8));
     }
