@@ -18,6 +18,8 @@ pub struct ExtractConfig {
     pub frames: Vec<usize>,
     /// Which voxels.
     pub region: Region,
+    /// Which channel, from 0.
+    pub channel: usize,
     /// Bytes that may be allocated.
     pub memory: usize,
 }
@@ -57,7 +59,7 @@ pub fn extract(
     let pieces = Pieces::new(file, config)?;
     let mut bytes = Vec::new();
     for piece in pieces.list(file, config) {
-        read_piece(file, &piece, pieces.blocks, &mut bytes, &mut report)?;
+        read_piece(file, config.channel, &piece, pieces.blocks, &mut bytes, &mut report)?;
         out.write_all(&bytes).map_err(|e| Error::io(name, "writing", e))?;
         report.bytes += bytes.len() as u64;
         if piece.region.end[2] == config.region.end[2] {
@@ -124,6 +126,7 @@ fn block_bytes(file: &CoefficientFile) -> usize {
 /// Fills `out` with the samples of a piece.
 fn read_piece(
     file: &CoefficientFile,
+    channel: usize,
     piece: &Piece,
     at_once: usize,
     out: &mut Vec<u8>,
@@ -135,7 +138,7 @@ fn read_piece(
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
     out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
-    for entries in file.entries(piece.window, &piece.region) {
+    for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let decode =
                 |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));

@@ -2,10 +2,12 @@
 
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
+use crate::colour::TransferFunction;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::scan::join_ranges;
+use crate::source::{CHANNELS, Painter};
 use crate::volume::{BlockGrid, Grid, Region};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,6 +25,8 @@ pub struct CoefficientFile {
     pub grid: Grid,
     /// How it is cut into blocks.
     pub blocks: BlockGrid,
+    /// What made samples into channels, if there are several.
+    painter: Option<Painter>,
     /// Damaged blocks that are taken for missing samples, if they are.
     skipped: Option<Damage>,
 }
@@ -58,11 +62,8 @@ impl CoefficientFile {
         let dims = m.dims.map(|n| n as usize);
         let grid = Grid { dims, spacing: m.spacing, origin: m.origin };
         let blocks = BlockGrid { dims, edge: m.block_edge as usize };
-        if m.channels != 1 {
-            let what = format!("{} channels", m.channels);
-            return Err(failed(wavesplat_format::Error::Unsupported(what)));
-        }
-        Ok(Self { path: path.into(), grid, blocks, reader, skipped: None })
+        let painter = painter(m).map_err(failed)?;
+        Ok(Self { path: path.into(), grid, blocks, painter, reader, skipped: None })
     }
 
     /// Its path.
@@ -88,6 +89,22 @@ impl CoefficientFile {
     /// The type of the samples.
     pub fn sample(&self) -> SampleType {
         self.metadata().sample
+    }
+
+    /// Number of channels: 1, or of colours 3.
+    pub fn channels(&self) -> usize {
+        self.metadata().channels.into()
+    }
+
+    /// What made the samples of the source into the file's channels, if it holds colours.
+    pub fn painter(&self) -> Option<&Painter> {
+        self.painter.as_ref()
+    }
+
+    /// The type of the source's samples, and what stands for a missing one.
+    pub fn of_source(&self) -> (SampleType, Option<f64>) {
+        let plain = (self.sample(), self.metadata().missing_value);
+        self.painter.as_ref().map_or(plain, |painter| (painter.sample, painter.missing_value))
     }
 
     /// Number of frames.
@@ -132,9 +149,16 @@ impl CoefficientFile {
         WindowCodec::of_file(self.metadata(), &self.metadata().windows[window as usize]).map_err(|e| self.failed(e))
     }
 
-    /// The directory's leaves of a window.
+    /// The directory's leaves of a window, of all channels.
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
         self.reader.leaves(window)
+    }
+
+    /// The directory's leaves of one channel of a window.
+    pub fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
+        let leaves = self.leaves(window);
+        let each = leaves.len() / self.channels();
+        leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
     }
 
     /// Takes damaged blocks for blocks of missing samples from here on, once all are read to find them.
@@ -191,14 +215,15 @@ impl CoefficientFile {
         Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::of_lost(entry.id) } else { entry }).collect())
     }
 
-    /// The entries of a window's blocks that touch a region, in order, a leaf of the directory at a time.
+    /// The entries of the blocks of a channel and window that touch a region, in order, a leaf of the directory at a time.
     pub fn entries<'a>(
         &'a self,
         window: u32,
+        channel: usize,
         region: &'a Region,
     ) -> impl Iterator<Item = Result<Vec<BlockEntry>>> + use<'a> {
         let touches = |block: u32| !self.blocks.region(block as usize).intersect(region).is_empty();
-        let leaves = self.leaves(window).iter();
+        let leaves = self.leaves_of(window, channel).iter();
         let reached = leaves.filter(move |l| (l.first_block..).take(l.count.into()).any(touches));
         reached.map(move |l| Ok(self.leaf(l)?.into_iter().filter(|entry| touches(entry.id.block)).collect()))
     }
@@ -266,4 +291,41 @@ impl CoefficientFile {
     fn failed(&self, source: wavesplat_format::Error) -> Error {
         Error::CoefficientFile { path: self.path.clone(), source }
     }
+}
+
+/// The value of one of a file's settings.
+pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
+    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+}
+
+/// The settings of a file of colours: the transfer function, the type of the source's samples, and if one was declared the
+/// value that means "missing" among these.
+pub const COLOUR_SETTINGS: [&str; 3] = ["colours", "dtype", "missing-value"];
+
+/// What a file of colours remembers of how they were made.
+pub fn remembered_colours(painter: &Painter) -> impl Iterator<Item = (&'static str, String)> {
+    let Painter { colours, sample, missing_value } = painter;
+    let values = [Some(colours.text()), Some(sample.to_string()), missing_value.map(|v| format!("{v:?}"))];
+    COLOUR_SETTINGS.into_iter().zip(values).filter_map(|(name, value)| Some((name, value?)))
+}
+
+/// What made the channels of a file; an error where it has several, and does not say of what.
+fn painter(m: &Metadata) -> std::result::Result<Option<Painter>, wavesplat_format::Error> {
+    if m.channels == 1 {
+        return Ok(None);
+    }
+    let coloured = usize::from(m.channels) == CHANNELS.len() && m.sample == Painter::SAMPLE;
+    let painter = if coloured && m.missing_value.is_none() { remembered_painter(m) } else { None };
+    let unsupported = || wavesplat_format::Error::Unsupported(format!("{} channels of no known colours", m.channels));
+    painter.map(Some).ok_or_else(unsupported)
+}
+
+/// Of [`remembered_colours`].
+fn remembered_painter(m: &Metadata) -> Option<Painter> {
+    let [colours, sample, missing] = COLOUR_SETTINGS.map(|name| setting(m, name));
+    let missing_value = match missing {
+        Some(value) => Some(value.parse().ok()?),
+        None => None,
+    };
+    Some(Painter { colours: TransferFunction::of_text(colours?)?, sample: sample?.parse().ok()?, missing_value })
 }

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::mapped::FileBytes;
 use crate::progress::Progress;
+use crate::source::CHANNELS;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
@@ -42,6 +43,9 @@ pub struct Run {
     pub first: u32,
     /// The last.
     pub last: u32,
+    /// Their channel, if the file is of colours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
 }
 
 /// Writes all of `damaged` that is whole to `out`, which `name` stands for in messages.
@@ -55,13 +59,15 @@ pub fn recover(damaged: &FileBytes, name: &Path, out: impl Write, progress: &dyn
     out.flush().map_err(|e| Error::io(name, "writing", e))?;
     damaged.check_unchanged()?;
     progress.finish();
+    let coloured = usize::from(metadata.channels) == CHANNELS.len();
     let frames = |window: u32| {
         let window = &metadata.windows[window as usize];
         (window.first_frame, window.first_frame + u64::from(window.frames))
     };
     let run = |run: &[BlockId]| {
         let (first, last) = (run[0], run[run.len() - 1]);
-        Run { window: first.window, frames: frames(first.window), first: first.block, last: last.block }
+        let channel = coloured.then(|| CHANNELS.get(usize::from(first.channel)).copied()).flatten();
+        Run { window: first.window, frames: frames(first.window), first: first.block, last: last.block, channel }
     };
     let follows = |a: &BlockId, b: &BlockId| a.window == b.window && a.channel == b.channel && a.block + 1 == b.block;
     Ok(RecoverReport {

@@ -137,15 +137,16 @@ pub fn begins_with(file: &CoefficientFile, source: &mut dyn FrameSource) -> Resu
 /// Whether the first frames of `source` are those of some windows.
 fn is_of(windows: &[Window], file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
     let Archive { grid, sample, frames, .. } = source.archive().clone();
+    let (of_source, missing_value) = file.of_source();
     let needed: usize = windows.iter().map(|window| window.frames as usize).sum();
-    if (grid.dims, sample) != (file.grid.dims, file.sample()) || frames.is_some_and(|frames| frames < needed) {
+    if (grid.dims, sample) != (file.grid.dims, of_source) || frames.is_some_and(|frames| frames < needed) {
         return Ok(false);
     }
     let mut at = 0;
     for known in windows {
         let window = source.window(at, known.frames as usize)?;
         at += known.frames as usize;
-        if scan(window.as_ref(), &grid, sample, file.metadata().missing_value)?.digest != known.digest {
+        if scan(window.as_ref(), &grid, sample, missing_value)?.digest != known.digest {
             return Ok(false);
         }
     }

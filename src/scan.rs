@@ -1,8 +1,9 @@
 //! One look at all samples of a window before it is coded: value range, missing samples, a digest.
 
 use crate::error::Result;
+use crate::progress::Progress;
 use crate::sample::{self, SampleType};
-use crate::source::FrameWindow;
+use crate::source::{FrameSource, FrameWindow};
 use crate::volume::{Grid, Region};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
@@ -49,6 +50,27 @@ const RUN_BYTES: usize = 256 << 10;
 /// Looks at every sample of a window. `declared` stands for a missing sample.
 pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declared: Option<f64>) -> Result<Scan> {
     (0..window.frames()).try_fold(Scan::NOTHING, |seen, frame| scan_frame(seen, window, frame, grid, ty, declared))
+}
+
+/// The range of all samples of an archive whose frames can be read again; none if all are missing. `declared` stands for a
+/// missing sample.
+pub(crate) fn value_range(
+    source: &mut dyn FrameSource,
+    declared: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<Option<(f64, f64)>> {
+    let (grid, ty, frames) = (source.archive().grid, source.archive().sample, source.archive().frames.unwrap_or(0));
+    let declared = sample::missing_value(ty, declared);
+    progress.start(Some(frames as u64));
+    let mut range = Scan::NOTHING.range;
+    for frame in 0..frames {
+        let window = source.window(frame, 1)?;
+        range = join_ranges(range, scan(window.as_ref(), &grid, ty, declared)?.range);
+        window.check_unchanged()?;
+        progress.advance(1);
+    }
+    progress.finish();
+    Ok(Some(range).filter(|(lo, hi)| lo <= hi))
 }
 
 /// Looks at every sample of a frame, after what was `seen`; runs of rows in parallel, joined in order.

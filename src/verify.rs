@@ -9,7 +9,8 @@ use crate::memory::MOST_BLOCKS;
 use crate::progress::Progress;
 use crate::sample;
 use crate::scan::join_ranges;
-use crate::source::{FrameSource, FrameWindow, read_frames};
+use crate::source::{CHANNELS, Coloured, FrameSource, FrameWindow, read_frames};
+use crate::volume::Region;
 use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_format::{BlockEntry, PartKind};
@@ -90,6 +91,9 @@ pub struct BlockPlace {
     pub window: u32,
     /// The block in it, x fastest.
     pub block: u32,
+    /// Its channel, if the file has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
 }
 
 /// A sample of the file.
@@ -99,12 +103,16 @@ pub struct Place {
     pub frame: usize,
     /// The voxel: x, y, z, counted from the file's first.
     pub voxel: [usize; 3],
+    /// Its channel, if the file has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
 }
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y, z] = self.voxel;
-        write!(f, "frame {}, x {x}, y {y}, z {z}", self.frame)
+        write!(f, "frame {}, x {x}, y {y}, z {z}", self.frame)?;
+        self.channel.map_or(Ok(()), |channel| write!(f, ", {channel}"))
     }
 }
 
@@ -179,16 +187,16 @@ pub fn verify(
 
 fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
     let (a, b) = (source.archive(), file);
-    if a.grid.dims != b.grid.dims || a.sample != b.sample() || a.frames.is_some_and(|f| f != b.frames()) {
+    let (sample, _) = file.of_source();
+    if a.grid.dims != b.grid.dims || a.sample != sample || a.frames.is_some_and(|f| f != b.frames()) {
         let [x, y, z] = a.grid.dims;
         let [fx, fy, fz] = b.grid.dims;
         let frames = a.frames.map_or("unknown".into(), |f| f.to_string());
         return Err(Error::usage(format!(
-            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {}; --frames a:b \
+            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {sample}; --frames a:b \
              chooses those that it holds",
             a.sample,
-            b.frames(),
-            b.sample()
+            b.frames()
         )));
     }
     Ok(())
@@ -205,16 +213,31 @@ fn check_block(
     check_coefficients(file, entry, &block, codec)?;
     let Some(source) = source else { return Ok(Comparison::default()) };
     let region = file.blocks.region(entry.id.block as usize);
-    let original = read_frames(source, 0..codec.frames(), &region, codec.sample)?;
+    let original = original(file, source, codec, entry, &region)?;
     let first_frame = file.window_range(entry.id.window).start;
-    let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel) };
+    let channel = file.painter().and_then(|_| CHANNELS.get(usize::from(entry.id.channel)).copied());
+    let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel), channel };
     let (mut found, (lo, hi)) = compare(codec, &original, &block, place);
     let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
     if found.largest_error > stated || lo < entry.stats.min || hi > entry.stats.max {
         found.blocks_beyond_stated = 1;
-        found.first_beyond = Some(BlockPlace { window: entry.id.window, block: entry.id.block });
+        found.first_beyond = Some(BlockPlace { window: entry.id.window, block: entry.id.block, channel });
     }
     Ok(found)
+}
+
+/// The samples of a block as they were coded.
+fn original(
+    file: &CoefficientFile,
+    source: &dyn FrameWindow,
+    codec: &WindowCodec,
+    entry: &BlockEntry,
+    region: &Region,
+) -> Result<Vec<u8>> {
+    let frames = 0..codec.frames();
+    let Some(painter) = file.painter() else { return read_frames(source, frames, region, codec.sample) };
+    let channel = Coloured { window: source, painter, channel: entry.id.channel.into() };
+    read_frames(&channel, frames, region, codec.sample)
 }
 
 /// An error if a coefficient is larger than the directory says, on which skipping relies.

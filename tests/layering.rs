@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// The library's rooms from the lowest to the highest; a room may use those on lower floors only.
 const FLOORS: [&[&str]; 7] = [
     &["error", "progress", "memory"],
-    &["sample", "volume", "mapped", "output"],
-    &["bound", "wavelet", "camera", "footprint", "source", "npy", "colour"],
+    &["sample", "volume", "mapped", "output", "colour"],
+    &["bound", "wavelet", "camera", "footprint", "source", "npy"],
     &["codec", "scan"],
     &["file", "report"],
     &["convert", "render", "extract", "verify", "recover", "resume"],

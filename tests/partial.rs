@@ -28,7 +28,7 @@ fn file() -> crate::common::Stored {
 /// What reading some frames of a region reads of the file, opening it included.
 fn reading(of: &crate::common::Stored, frames: Vec<usize>, region: Region) -> ExtractReport {
     let file = of.open();
-    let config = ExtractConfig { frames, region, memory: MEMORY };
+    let config = ExtractConfig { frames, region, channel: 0, memory: MEMORY };
     extract(&file, &config, Path::new("out"), &mut Vec::new(), &Silent).unwrap()
 }
 

@@ -1,9 +1,9 @@
 //! Options that say how an archive is read.
 
 use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
-use crate::convert::setting;
 use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
+use crate::file::setting;
 use crate::mapped::Access;
 use crate::output::part_of;
 use crate::sample::SampleType;

@@ -2,10 +2,12 @@
 //!
 //! Standard output carries data or one JSON object; notes and progress go to standard error.
 
+mod colours;
 mod input;
 mod terminal;
 mod values;
 
+pub use colours::transfer_function;
 pub use input::{InputArgs, narrow, remembered, spare_inputs};
 pub use terminal::TerminalProgress;
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole};

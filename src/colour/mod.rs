@@ -158,6 +158,15 @@ impl TransferFunction {
         }
     }
 
+    /// Its colours in a few words, for people.
+    pub fn words(&self) -> String {
+        let (lo, hi) = self.range;
+        match &self.colours {
+            Colours::Named(name) => format!("{name} from {lo} to {hi}"),
+            Colours::Points(points, space) => format!("{} points ({}) from {lo} to {hi}", points.len(), space.name()),
+        }
+    }
+
     /// Whether a colour takes so long that a table of them is worth it.
     fn is_slow(&self) -> bool {
         match &self.colours {

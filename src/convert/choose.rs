@@ -62,7 +62,8 @@ pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
 pub(super) struct Chooser<'a> {
     pub(super) config: &'a ConvertConfig,
     pub(super) archive: &'a Archive,
-    pub(super) window: &'a dyn FrameWindow,
+    /// The window's samples, channel by channel.
+    pub(super) channels: &'a [Box<dyn FrameWindow + 'a>],
     pub(super) promise: Promise,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
@@ -182,20 +183,27 @@ impl Chooser<'_> {
         (self.bytes(&scheme, trials), scheme)
     }
 
-    /// Boxes spread over the volume: about one voxel in fifty, at least a few boxes; together at most as much as a block.
+    /// Frames of the window.
+    fn frames(&self) -> usize {
+        self.channels[0].frames()
+    }
+
+    /// Boxes spread over the volume and the channels: about one voxel in fifty, at least a few boxes; together at most as much
+    /// as a block.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
         let whole: usize = dims.iter().product();
+        let least = LEAST_BOXES.max(self.channels.len());
         let largest = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
-        let samples = |size: [usize; 3]| size.iter().product::<usize>() * self.window.frames();
+        let samples = |size: [usize; 3]| size.iter().product::<usize>() * self.frames();
         let sizes = (1..=largest).rev().map(|edge| dims.map(|n| n.min(edge)));
-        let size = sizes.into_iter().find(|size| LEAST_BOXES * samples(*size) <= self.most).unwrap_or([1; 3]);
-        let count = whole / SHARE / size.iter().product::<usize>();
-        let count = count.clamp(LEAST_BOXES, MOST_BOXES).min(self.most / samples(size)).max(1);
+        let size = sizes.into_iter().find(|size| least * samples(*size) <= self.most).unwrap_or([1; 3]);
+        let count = whole * self.channels.len() / SHARE / size.iter().product::<usize>();
+        let count = count.clamp(least, MOST_BOXES).min(self.most / samples(size)).max(1);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
-    /// The box of a number, at one of places that spread evenly: the same for every window.
+    /// The box of a number, at one of places that spread evenly: the same for every window; channels take turns.
     fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
         let dims = self.archive.grid.dims;
         let start: [usize; 3] = std::array::from_fn(|axis| {
@@ -203,7 +211,8 @@ impl Chooser<'_> {
             (place * (dims[axis] - size[axis] + 1) as f64) as usize
         });
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
-        let samples = read_frames(self.window, 0..self.window.frames(), &region, self.archive.sample)?;
+        let window = self.channels[number % self.channels.len()].as_ref();
+        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok(Sampled { size, samples })
     }
 
@@ -212,7 +221,7 @@ impl Chooser<'_> {
         let Coding { basis, space } = self.config.coding;
         let stencil = if let Space::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
-            None => (self.window.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
+            None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
             Some(Basis::Samples) => None,
             forced => forced,
         };
@@ -240,9 +249,9 @@ impl Chooser<'_> {
     /// Learned from rows all over the volume, not from the boxes that they are then tried on.
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
-        let rows = ROWS.min(self.most / (size[0] * self.window.frames())).max(1);
+        let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
         let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.sampled(LEARNING + i, size)).collect();
-        let (ty, frames) = (self.archive.sample, self.window.frames());
+        let (ty, frames) = (self.archive.sample, self.frames());
         let samples = rows?;
         let samples = samples.iter().map(|row| &row.samples[..]);
         Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
@@ -296,12 +305,12 @@ impl Chooser<'_> {
             (bytes, b.voxels())
         };
         let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let whole: usize = self.archive.grid.dims.iter().product();
+        let whole = self.archive.grid.dims.iter().product::<usize>() * self.channels.len();
         bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
     }
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
-        let frames = self.window.frames();
+        let frames = self.frames();
         let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGE);
         codec.missing_value = self.config.missing_value;
         codec

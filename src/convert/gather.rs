@@ -2,6 +2,7 @@
 
 use super::choose::{Chooser, most_samples};
 use super::sampled::{self, Pixel};
+use super::task::BRIGHTNESS;
 use super::{ConvertConfig, Done, Idle, MissingPolicy, Plan, WindowJob};
 use crate::bound::{self, Bound, Promise};
 use crate::codec::WindowCodec;
@@ -9,7 +10,7 @@ use crate::codec::scheme::Scheme;
 use crate::error::{Error, Result};
 use crate::sample;
 use crate::scan::{Scan, join_ranges, scan};
-use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
+use crate::source::{Archive, Coloured, FrameSource, FrameWindow, read_frames_into};
 use crossbeam::channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -28,13 +29,12 @@ pub(super) struct Batch {
 /// Reads all windows in order until the frames end, and sends those that are not yet done. Returns the time spent reading.
 pub(super) fn read(
     source: &mut dyn FrameSource,
-    config: &ConvertConfig,
-    plan: &Plan,
+    (config, archive): (&ConvertConfig, &Archive),
+    plan: &Plan<'_>,
     done: &Done,
     idle: &Idle<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
-    let archive = source.archive().clone();
     let pixels = match config.bound {
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
@@ -72,10 +72,11 @@ pub(super) fn read(
 
 struct WindowReader<'a> {
     config: &'a ConvertConfig,
-    plan: &'a Plan,
+    plan: &'a Plan<'a>,
     /// Room for the samples of blocks.
     idle: &'a Idle<Vec<u8>>,
-    archive: Archive,
+    /// Of the samples that are coded.
+    archive: &'a Archive,
     /// Where a sampled bound looks.
     pixels: Vec<Pixel>,
     /// Range of the frames so far.
@@ -131,7 +132,7 @@ impl WindowReader<'_> {
 
     /// Goes on after a window that is done; an error if its frames are not those that the source has now.
     fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &Done) -> Result<()> {
-        let seen = scan(window, &self.archive.grid, self.archive.sample, self.config.missing_value)?;
+        let seen = self.scan(window)?;
         window.check_unchanged()?;
         let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
         if Some(id) != done.id || seen.digest != known.digest || window.frames() != known.frames as usize {
@@ -146,20 +147,30 @@ impl WindowReader<'_> {
         Ok(())
     }
 
+    /// Looks at the samples of a window as they are read.
+    fn scan(&self, window: &dyn FrameWindow) -> Result<Scan> {
+        let plain = (self.archive.sample, self.config.missing_value);
+        let (ty, missing_value) = self.plan.painter.map_or(plain, |p| (p.sample, p.missing_value));
+        scan(window, &self.archive.grid, ty, missing_value)
+    }
+
     /// Looks at the window's samples and fixes its bound.
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
         let (config, ty, first) = (self.config, self.archive.sample, self.first());
-        let seen = scan(window, &self.archive.grid, ty, config.missing_value)?;
+        let seen = self.scan(window)?;
         self.refuse_missing(window, first, &seen)?;
-        let range = self.range.map_or(seen.range, |r| join_ranges(r, seen.range));
+        let of_window = if self.plan.painter.is_some() { BRIGHTNESS } else { seen.range };
+        let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
         let range = config.range.unwrap_or(range);
-        let delta = self.delta(window, seen.range, range)?;
+        let channels = channels(self.plan, window);
+        let delta = self.delta(&channels, of_window, range)?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
-        let magnitude = sample::magnitude(seen.range);
+        let magnitude = sample::magnitude(of_window);
         let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
         let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
-        let scheme = Chooser { config, archive: &self.archive, window, promise, magnitude, most, before }.choose()?;
+        let scheme = Chooser { config, archive: self.archive, channels: &channels, promise, magnitude, most, before };
+        let scheme = scheme.choose()?;
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
@@ -172,15 +183,21 @@ impl WindowReader<'_> {
     }
 
     /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
-    fn delta(&self, window: &dyn FrameWindow, seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
+    fn delta(&self, channels: &[Box<dyn FrameWindow + '_>], seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
         let ConvertConfig { tolerance, missing_value, .. } = *self.config;
         let magnitude = sample::magnitude(seen);
         match self.config.bound {
             Bound::Pointwise | Bound::Rms => Ok(bound::range_bound(tolerance, range)),
             Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),
             Bound::Sampled { .. } => {
-                let Archive { ref grid, sample, .. } = self.archive;
-                sampled::View { window, grid, sample, missing_value, magnitude }.bound(tolerance, &self.pixels)
+                let Archive { ref grid, sample, .. } = *self.archive;
+                let of_channel = |window: &Box<dyn FrameWindow + '_>| {
+                    let view = sampled::View { window, grid, sample, missing_value, magnitude };
+                    view.bound(tolerance, &self.pixels)
+                };
+                let deltas = channels.iter().map(of_channel).collect::<Result<Vec<_>>>()?;
+                // A channel without any light is kept by every bound.
+                Ok(deltas.into_iter().filter(|delta| *delta > 0.0).reduce(f64::min).unwrap_or(0.0))
             }
         }
     }
@@ -210,7 +227,7 @@ impl WindowReader<'_> {
         out: &Sender<Batch>,
         busy: &mut Duration,
     ) -> Result<bool> {
-        let (all, batch) = (self.plan.blocks.len(), self.plan.batch);
+        let (all, batch) = (self.plan.blocks_of_window(), self.plan.batch);
         for first in (0..all).step_by(batch) {
             let started = Instant::now();
             let blocks: Result<_> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
@@ -227,13 +244,22 @@ impl WindowReader<'_> {
         Ok(true)
     }
 
-    /// The samples of one block, frame by frame.
+    /// The samples of one block, frame by frame, as they are read; blocks are numbered through all channels.
     fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
+        let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let region = self.plan.blocks.region(block);
         let mut samples = self.idle.take().unwrap_or_default();
-        read_frames_into(window, 0..window.frames(), &region, self.archive.sample, &mut samples)?;
-        Ok((BlockId { window: job.index, block: block as u32, channel: 0 }, samples))
+        let sample = self.plan.painter.map_or(self.archive.sample, |painter| painter.sample);
+        read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
+        Ok((BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples))
     }
+}
+
+/// A window's samples as they are coded, channel by channel.
+fn channels<'a>(plan: &'a Plan<'_>, window: &'a dyn FrameWindow) -> Vec<Box<dyn FrameWindow + 'a>> {
+    let Some(painter) = plan.painter else { return vec![Box::new(window)] };
+    let channel = |channel| Box::new(Coloured { window, painter, channel }) as Box<dyn FrameWindow>;
+    (0..plan.channels()).map(channel).collect()
 }
 
 /// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
@@ -241,7 +267,7 @@ const ANEW: usize = 8;
 
 /// A name for the file that follows from settings and the digest of its first window: the same conversion has the same
 /// one everywhere.
-fn file_id(plan: &Plan, digest: u64) -> FileId {
+fn file_id(plan: &Plan<'_>, digest: u64) -> FileId {
     let all = format!("{:?} {digest}", plan.start);
     FileId(xxh3_128(all.as_bytes()).to_le_bytes())
 }

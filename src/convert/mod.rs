@@ -21,16 +21,18 @@ mod learn;
 mod record;
 pub mod sampled;
 mod settings;
+mod task;
 
 use crate::bound::Bound;
 use crate::codec::WindowCodec;
 use crate::codec::encode::{Encoded, Encoder};
+use crate::colour::TransferFunction;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::progress::Progress;
 use crate::report::{PromiseReport, WindowReport};
-use crate::sample::{self, SampleType};
-use crate::source::{Archive, FrameSource};
+use crate::sample::SampleType;
+use crate::source::{Archive, CHANNELS, FrameSource, Painter};
 use crate::volume::BlockGrid;
 use crate::wavelet;
 pub use choose::{Coding, Space};
@@ -39,11 +41,12 @@ use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
 use serde::Serialize;
-pub use settings::{of_file, setting};
+pub use settings::of_file;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use task::Task;
 use wavesplat_format::{Basis, BlockId, FileId, Metadata, Unfinished, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
@@ -72,6 +75,9 @@ pub struct ConvertConfig {
     pub missing: MissingPolicy,
     /// A value that means "missing", besides NaN and infinities.
     pub missing_value: Option<f64>,
+    /// Colours that samples are turned into before all else: three channels, 0 to 1, of which the bound then is. The value range
+    /// is by default just that.
+    pub colours: Option<TransferFunction>,
     /// Voxels a side of a block; by default as many as suit the window.
     pub block: Option<usize>,
     /// zstd level.
@@ -95,6 +101,7 @@ impl ConvertConfig {
             range: None,
             missing: MissingPolicy::Error,
             missing_value: None,
+            colours: None,
             block: None,
             level: 3,
             memory,
@@ -184,14 +191,12 @@ pub fn go_on<W: Write>(
     progress: &dyn Progress,
 ) -> Result<ConvertReport> {
     let started = Instant::now();
-    let archive = source.archive().clone();
-    let missing_value = sample::missing_value(archive.sample, config.missing_value);
-    let config = &ConvertConfig { missing_value, ..config.clone() };
-    let plan = Plan::new(config, &archive)?;
+    let Task { config, archive, painter } = &Task::new(config, source.archive());
+    let plan = Plan::new(config, archive, painter.as_ref())?;
     let done = Done::of(begun.as_ref(), &plan, name)?;
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.before);
-    progress.start(windows.map(|w| (w * plan.blocks.len()) as u64));
-    progress.advance((done.windows.len() * plan.blocks.len()) as u64);
+    progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
+    progress.advance((done.windows.len() * plan.blocks_of_window()) as u64);
     let mut recorder = Recorder::new(config, &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
@@ -199,8 +204,8 @@ pub fn go_on<W: Write>(
     let (read_time, encode_time) = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
         let (plan, done, idle) = (&plan, &done, &idle);
-        let reader = scope.spawn(move || gather::read(source, config, plan, done, idle, &to_workers));
-        let workers = scope.spawn(move || encode(config.level, plan.blocks, idle, &from_reader, &to_writer));
+        let reader = scope.spawn(move || gather::read(source, (config, archive), plan, done, idle, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, plan, idle, &from_reader, &to_writer));
         let written = recorder.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -212,8 +217,8 @@ pub fn go_on<W: Write>(
 
 /// What a file of `archive` says before its first frame: all that is decided without looking at samples.
 pub fn beginning(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
-    let missing_value = sample::missing_value(archive.sample, config.missing_value);
-    Plan::new(&ConvertConfig { missing_value, ..config.clone() }, archive).map(|plan| plan.start)
+    let Task { config, archive, painter } = &Task::new(config, archive);
+    Plan::new(config, archive, painter.as_ref()).map(|plan| plan.start)
 }
 
 /// Passes a panic of a stage on; it is a bug, not an error.
@@ -223,7 +228,9 @@ fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
 
 /// What follows from the configuration and the archive before any frame is read.
 #[derive(Debug)]
-struct Plan {
+struct Plan<'a> {
+    /// What makes samples into channels, if there are several.
+    painter: Option<&'a Painter>,
     /// What the file says before its first frame.
     start: Metadata,
     blocks: BlockGrid,
@@ -242,8 +249,8 @@ fn block_edge(coding: Coding, dims: [usize; 3], window: usize) -> usize {
     if coding.space == Space::Alone { edge } else { longest.div_ceil(longest.div_ceil(edge)) }
 }
 
-impl Plan {
-    fn new(config: &ConvertConfig, archive: &Archive) -> Result<Self> {
+impl<'a> Plan<'a> {
+    fn new(config: &ConvertConfig, archive: &Archive, painter: Option<&'a Painter>) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         if !(0.0..=1.0).contains(&config.tolerance) {
             return Err(Error::usage("--tolerance: a share, 0 to 1; 2 % is 0.02"));
@@ -258,20 +265,28 @@ impl Plan {
         if u32::try_from(blocks.len()).is_err() {
             return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
         }
-        let batch = batch_len(config, blocks, archive.sample)?;
-        Ok(Self { start: start(config, archive, edge), blocks, batch })
+        let batch = batch_len(config, blocks, archive.sample, painter)?;
+        Ok(Self { start: start(config, archive, painter, edge), painter, blocks, batch })
+    }
+
+    fn channels(&self) -> usize {
+        self.start.channels.into()
+    }
+
+    fn blocks_of_window(&self) -> usize {
+        self.blocks.len() * self.channels()
     }
 }
 
 /// What the file says before its first frame.
-fn start(config: &ConvertConfig, archive: &Archive, edge: usize) -> Metadata {
+fn start(config: &ConvertConfig, archive: &Archive, painter: Option<&Painter>, edge: usize) -> Metadata {
     Metadata {
         dims: archive.grid.dims.map(|n| n as u64),
         spacing: archive.grid.spacing,
         origin: archive.grid.origin,
         sample: archive.sample,
         block_edge: edge as u32,
-        channels: 1,
+        channels: painter.map_or(1, |_| CHANNELS.len() as u16),
         frames: 0,
         times: Vec::new(),
         variable: archive.variable.clone(),
@@ -279,7 +294,7 @@ fn start(config: &ConvertConfig, archive: &Archive, edge: usize) -> Metadata {
         tolerance: config.tolerance,
         missing_value: config.missing_value,
         windows: Vec::new(),
-        settings: settings::remembered(config),
+        settings: settings::remembered(config, painter),
         program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
     }
 }
@@ -295,7 +310,7 @@ struct Done {
 }
 
 impl Done {
-    fn of(begun: Option<&Begun>, plan: &Plan, name: &Path) -> Result<Self> {
+    fn of(begun: Option<&Begun>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
         let Some(Begun { unfinished, before }) = begun else { return Ok(Self::default()) };
         let held = unfinished.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
@@ -307,15 +322,21 @@ impl Done {
 
 /// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, a worker's scratch, and what
 /// choosing the next window's scheme takes.
-fn batch_len(config: &ConvertConfig, blocks: BlockGrid, sample: SampleType) -> Result<usize> {
+fn batch_len(
+    config: &ConvertConfig,
+    blocks: BlockGrid,
+    sample: SampleType,
+    painter: Option<&Painter>,
+) -> Result<usize> {
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
-    let raw = samples * sample.size();
+    let raw = samples * painter.map_or(sample.size(), |painter| painter.sample.size().max(sample.size()));
+    let painted = painter.map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
     let alone = config.coding.space == Space::Alone || config.tolerance == 0.0; // then no pyramid is tried
     let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
     let choice = if alone { 0 } else { choose::bytes(samples, sample) };
-    let scratch = samples + 2 * codes + field + raw + ZSTD_SCRATCH;
+    let scratch = samples + 2 * codes + field + raw + painted + ZSTD_SCRATCH;
     let needs =
         |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
     let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
@@ -343,7 +364,7 @@ const MIB: f64 = 1_048_576.0;
 /// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
 fn encode(
     level: i32,
-    grid: BlockGrid,
+    plan: &Plan<'_>,
     read: &Idle<Vec<u8>>,
     batches: &Receiver<Batch>,
     out: &Sender<EncodedBatch>,
@@ -354,7 +375,8 @@ fn encode(
         let started = Instant::now();
         let encode = |(id, samples): (BlockId, Vec<u8>)| {
             let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-            let size = grid.region(id.block as usize).dims();
+            let size = plan.blocks.region(id.block as usize).dims();
+            let samples = painted(plan.painter, id, samples, read);
             let encoded = encoder.block(&window.codec, id, size, &samples).map_err(bug);
             idle.put(encoder);
             read.put(samples);
@@ -368,6 +390,16 @@ fn encode(
         }
     }
     Ok(busy)
+}
+
+/// The samples of a block as its channel has them.
+fn painted(painter: Option<&Painter>, id: BlockId, samples: Vec<u8>, idle: &Idle<Vec<u8>>) -> Vec<u8> {
+    let Some(painter) = painter else { return samples };
+    let mut channel = idle.take().unwrap_or_default();
+    channel.resize(samples.len() / painter.sample.size() * Painter::SAMPLE.size(), 0);
+    painter.paint(id.channel.into(), &samples, &mut channel);
+    idle.put(samples);
+    channel
 }
 
 /// Things to use again: new memory costs about as much as what is done with it.

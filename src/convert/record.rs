@@ -13,7 +13,7 @@ use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
 pub(super) struct Recorder<'a, W: Write> {
     name: &'a Path,
     config: &'a ConvertConfig,
-    plan: &'a Plan,
+    plan: &'a Plan<'a>,
     /// The file's writer; made when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
@@ -24,7 +24,13 @@ pub(super) struct Recorder<'a, W: Write> {
 }
 
 impl<'a, W: Write> Recorder<'a, W> {
-    pub(super) fn new(config: &'a ConvertConfig, plan: &'a Plan, name: &'a Path, out: W, begun: Option<Begun>) -> Self {
+    pub(super) fn new(
+        config: &'a ConvertConfig,
+        plan: &'a Plan<'a>,
+        name: &'a Path,
+        out: W,
+        begun: Option<Begun>,
+    ) -> Self {
         let frames_before = begun.as_ref().map_or(0, |b| b.unfinished.metadata().frames);
         let (writer, out) = match begun {
             Some(begun) => (Some(Writer::go_on(out, begun.unfinished)), None),
@@ -83,7 +89,8 @@ impl<'a, W: Write> Recorder<'a, W> {
     fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
         let (Metadata { dims, frames, windows, .. }, range) = (metadata, metadata.range());
         let voxels = dims.iter().product::<u64>();
-        let samples = voxels * frames;
+        let (samples, voxels) = (voxels * frames, voxels * u64::from(metadata.channels));
+        let of_source = self.plan.painter.map_or(metadata.sample, |painter| painter.sample);
         let sum = |part: fn(&Window) -> u64| windows.iter().map(part).sum::<u64>();
         let largest = |part: fn(&Window) -> f64| windows.iter().map(part).fold(0.0, f64::max);
         let [read_seconds, encode_seconds, write_seconds, seconds] = seconds.map(|d| d.as_secs_f64());
@@ -91,7 +98,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             frames: *frames,
             frames_before: self.frames_before,
             windows: windows.len(),
-            input_bytes: samples * metadata.sample.size() as u64,
+            input_bytes: samples * of_source.size() as u64,
             output_bytes,
             coefficients: sum(|w| w.coded),
             coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,

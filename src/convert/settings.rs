@@ -2,17 +2,15 @@
 
 use super::{Coding, ConvertConfig, MissingPolicy, Space};
 use crate::codec::scheme::Stencil;
+use crate::colour::TransferFunction;
+use crate::file::{COLOUR_SETTINGS, remembered_colours, setting};
+use crate::source::Painter;
 use crate::wavelet::Basis;
 use std::str::FromStr;
 use wavesplat_format::Metadata;
 
-/// The value of one of a file's settings.
-pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
-    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
-}
-
 /// How a conversion is remembered; what is in the metadata anyway is not repeated.
-pub(super) fn remembered(config: &ConvertConfig) -> Vec<(String, String)> {
+pub(super) fn remembered(config: &ConvertConfig, painter: Option<&Painter>) -> Vec<(String, String)> {
     let ConvertConfig { coding, window, level, missing, range, .. } = config;
     let basis = BASES.iter().find(|(_, basis)| *basis == coding.basis).map_or("auto", |(name, _)| name);
     let space = SPACES.iter().find(|(_, space)| *space == coding.space).map_or("auto", |(name, _)| name);
@@ -20,7 +18,7 @@ pub(super) fn remembered(config: &ConvertConfig) -> Vec<(String, String)> {
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
     let more = [("level", level.to_string()), ("missing", missing.into())];
-    let all = given.into_iter().chain(more).chain(range);
+    let all = given.into_iter().chain(more).chain(range).chain(painter.into_iter().flat_map(remembered_colours));
     all.map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
 }
 
@@ -33,6 +31,14 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         Some(range) => Some(range.split_once(',').and_then(|(lo, hi)| Some((number(lo)?, number(hi)?)))?),
         None => None,
     };
+    let colours = match named("colours") {
+        Some(colours) => Some(TransferFunction::of_text(colours)?),
+        None => None,
+    };
+    let missing_value = match named("missing-value") {
+        Some(value) if colours.is_some() => Some(number(value)?),
+        _ => file.missing_value,
+    };
     Some(ConvertConfig {
         coding: Coding { basis, space },
         window: number(named("window")?)?,
@@ -40,12 +46,13 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         bound: file.bound,
         range,
         missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
-        missing_value: file.missing_value,
+        missing_value,
+        colours,
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
         memory,
         reserved: 0,
-        settings: file.settings.iter().filter(|(name, _)| !OURS.contains(&name.as_str())).cloned().collect(),
+        settings: file.settings.iter().filter(|(name, _)| !is_ours(name)).cloned().collect(),
     })
 }
 
@@ -65,7 +72,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
-        let ours = OURS.into_iter().chain(["frames", "region"]);
+        let ours = OURS.into_iter().chain(["frames", "region"]).chain(COLOUR_SETTINGS);
         let settings = ours.map(|name| (name, setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
@@ -78,7 +85,12 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
     text.parse().ok()
 }
 
-/// The names of what [`remembered`] adds by itself.
+/// Whether [`remembered`] adds a setting by itself.
+fn is_ours(name: &str) -> bool {
+    OURS.contains(&name) || COLOUR_SETTINGS.contains(&name)
+}
+
+/// The names of what [`remembered`] adds by itself, besides those of colours.
 const OURS: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
 
 const BASES: [(&str, Option<Basis>); 5] = [

@@ -48,6 +48,10 @@ impl Scene for CoefficientScene {
         self.file.blocks
     }
 
+    fn channels(&self) -> usize {
+        self.file.channels()
+    }
+
     fn frames(&self) -> Option<usize> {
         Some(self.file.frames())
     }
@@ -74,13 +78,14 @@ impl Scene for CoefficientScene {
     fn group<'a>(
         &'a mut self,
         frames: &[usize],
+        channel: usize,
         config: &RenderConfig,
         expectation: &'a Expectation<'_>,
     ) -> Result<Box<dyn Group + 'a>> {
         let window = self.file.window_of(frames[0]);
         let first = self.file.window_range(window).start;
         let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, window, frames, config, expectation)?))
+        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, (window, channel), frames, config, expectation)?))
     }
 }
 
@@ -93,9 +98,9 @@ fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     }
 }
 
-/// Whether most coefficients are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
-fn is_dense(window: &Window, voxels: usize) -> bool {
-    window.pyramid.is_some() || 2 * window.coded > voxels as u64 * u64::from(window.coefficients)
+/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
+fn is_dense(window: &Window, series: usize) -> bool {
+    window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
 }
 
 /// Whether so few frames of a window are asked for that their values are less work than the coefficients that they need. Judged by
@@ -115,6 +120,7 @@ pub(super) struct CoefficientGroup<'a> {
     file: &'a CoefficientFile,
     pub(super) what: What,
     window: u32,
+    channel: usize,
     pub(super) codec: WindowCodec,
     /// Counted from the first frame of the window.
     pub(super) frames: Vec<usize>,
@@ -135,7 +141,7 @@ impl<'a> CoefficientGroup<'a> {
     fn new(
         file: &'a CoefficientFile,
         what: What,
-        window: u32,
+        (window, channel): (u32, usize),
         frames: Vec<usize>,
         config: &RenderConfig,
         expectation: &'a Expectation<'a>,
@@ -143,8 +149,9 @@ impl<'a> CoefficientGroup<'a> {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let coded = file.leaves(window).iter().any(|leaf| leaf.coded > 0);
-        let exact = file.leaves(window).iter().any(|leaf| leaf.exact > 0);
+        let leaves = file.leaves_of(window, channel);
+        let coded = leaves.iter().any(|leaf| leaf.coded > 0);
+        let exact = leaves.iter().any(|leaf| leaf.exact > 0);
         let record = &file.metadata().windows[window as usize];
         let (samples, missing) = (what == What::Samples, file.has_missing(window));
         let by_values = !samples && !config.certify && few_asked(file, &codec, window, config);
@@ -155,7 +162,7 @@ impl<'a> CoefficientGroup<'a> {
             absent: missing,
             error_planes: error_planes(config, codec.parts()),
             lengths: false,
-            order: if samples || by_values || is_dense(record, file.grid.whole().voxels()) {
+            order: if samples || by_values || is_dense(record, file.channels() * file.grid.whole().voxels()) {
                 Order::Pixels
             } else {
                 Order::Planes
@@ -167,6 +174,7 @@ impl<'a> CoefficientGroup<'a> {
             file,
             what,
             window,
+            channel,
             codec,
             frames,
             wanted,
@@ -196,7 +204,7 @@ impl<'a> CoefficientGroup<'a> {
         }
         let region = config.region.unwrap_or(self.file.grid.whole());
         let mut cheapest = Cheapest::new(&self.allowance);
-        for entries in self.file.entries(self.window, &region) {
+        for entries in self.file.entries(self.window, self.channel, &region) {
             entries?.iter().for_each(|entry| cheapest.add(&self.place(entry, self.expectation)));
         }
         Ok(cheapest.within(self.expectation.allowed(allowed)))
@@ -206,7 +214,7 @@ impl<'a> CoefficientGroup<'a> {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
         let (mut sum, mut certified) = (0.0_f64, 0.0_f64);
-        for leaf in self.file.leaves(self.window) {
+        for leaf in self.file.leaves_of(self.window, self.channel) {
             for entry in self.file.leaf(leaf)? {
                 sum = sum.max(self.allowance.absolute_sum(&entry));
                 certified = certified.max(self.keep(&entry).certified);
@@ -257,7 +265,7 @@ impl<'a> CoefficientGroup<'a> {
     fn leaf_of(&self, block: u32) -> Result<Arc<Vec<BlockEntry>>> {
         let mut last = self.leaf.lock().unwrap_or_else(PoisonError::into_inner);
         if !last.iter().any(|entry| entry.id.block == block) {
-            let leaves = self.file.leaves(self.window);
+            let leaves = self.file.leaves_of(self.window, self.channel);
             let leaf = &leaves[leaves.partition_point(|l| l.first_block <= block) - 1];
             *last = Arc::new(self.file.leaf(leaf)?);
         }
@@ -279,7 +287,7 @@ impl Group for CoefficientGroup<'_> {
 
     fn blocks(&self, region: &Region) -> Result<Contents> {
         let mut found = Contents { empty: self.file.blocks.len() as u64, ..Contents::default() };
-        for entries in self.file.entries(self.window, region) {
+        for entries in self.file.entries(self.window, self.channel, region) {
             for entry in entries? {
                 let kept = self.keep(&entry);
                 found.left_out += kept.left_out;
@@ -296,7 +304,7 @@ impl Group for CoefficientGroup<'_> {
 
     fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>> {
         let mut ranges = Vec::new();
-        for entries in self.file.entries(self.window, region) {
+        for entries in self.file.entries(self.window, self.channel, region) {
             for entry in entries? {
                 let BlockStats { min, max, reached, .. } = entry.stats;
                 // What is splatted may be as far from the source's samples as those that were decoded are.
@@ -309,7 +317,7 @@ impl Group for CoefficientGroup<'_> {
 
     fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64> {
         let mut sum = 0.0;
-        for entries in self.file.entries(self.window, region) {
+        for entries in self.file.entries(self.window, self.channel, region) {
             entries?.iter().for_each(|entry| sum += self.allowance.keep(&self.place(entry, view)).expected);
         }
         Ok(sum)

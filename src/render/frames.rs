@@ -5,10 +5,11 @@ use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
 use super::scene::{Contents, FrameBounds, Group, Inverse, Read, SampleErrors, Scene};
 use super::terms::{Layout, Order};
+use crate::colour::TransferFunction;
 use crate::error::Result;
 use crate::sample::{self, is_missing, magnitude};
 use crate::scan::{Scan, scan_frame};
-use crate::source::{Archive, FrameSource, FrameWindow};
+use crate::source::{Archive, CHANNELS, Coloured, FrameSource, FrameWindow, Painter};
 use crate::volume::{BlockGrid, Grid, Region};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -20,8 +21,11 @@ const EDGE: usize = 32;
 /// An archive as a scene.
 pub struct FrameScene {
     source: Box<dyn FrameSource>,
+    /// Of the samples that are splatted.
     archive: Archive,
     missing_value: Option<f64>,
+    /// What makes them of those that are read, if they are not the same.
+    painter: Option<Painter>,
     /// Whether a sample turned out to be missing: from then on frames are looked at before they are splatted.
     missing_seen: AtomicBool,
 }
@@ -31,7 +35,16 @@ impl FrameScene {
     pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
         let archive = source.archive().clone();
         let missing_value = sample::missing_value(archive.sample, missing_value);
-        Self { source, archive, missing_value, missing_seen: AtomicBool::new(false) }
+        Self { source, archive, missing_value, painter: None, missing_seen: AtomicBool::new(false) }
+    }
+
+    /// As [`Self::new`], in colours: three channels, 0 to 1.
+    pub fn coloured(source: Box<dyn FrameSource>, missing_value: Option<f64>, colours: TransferFunction) -> Self {
+        let plain = Self::new(source, missing_value);
+        let (sample, missing_value) = (plain.archive.sample, plain.missing_value);
+        let archive = Archive { sample: Painter::SAMPLE, ..plain.archive };
+        let painter = Some(Painter { colours, sample, missing_value });
+        Self { archive, painter, missing_value: None, ..plain }
     }
 }
 
@@ -42,6 +55,10 @@ impl Scene for FrameScene {
 
     fn blocks(&self) -> BlockGrid {
         BlockGrid { dims: self.archive.grid.dims, edge: EDGE }
+    }
+
+    fn channels(&self) -> usize {
+        self.painter.as_ref().map_or(1, |_| CHANNELS.len())
     }
 
     fn frames(&self) -> Option<usize> {
@@ -58,17 +75,23 @@ impl Scene for FrameScene {
 
     fn block_bytes(&self) -> usize {
         // A plane of it, in the samples' type and as f64.
-        self.blocks().region(0).voxels() * (self.archive.sample.size() + 8)
+        let read = self.painter.as_ref().map_or(0, |painter| painter.sample.size());
+        self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)
     }
 
     fn group<'a>(
         &'a mut self,
         frames: &[usize],
+        channel: usize,
         config: &RenderConfig,
         _: &'a Expectation<'_>,
     ) -> Result<Box<dyn Group + 'a>> {
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
+        let window: Box<dyn FrameWindow + 'a> = match &self.painter {
+            Some(painter) => Box::new(Coloured { window, painter, channel }),
+            None => window,
+        };
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
         let look = |frame: &usize| {
@@ -112,7 +135,7 @@ struct FrameGroup<'a> {
     missing_value: Option<f64>,
     /// Where to note that a sample is missing, if nobody looked for that before.
     unexpected: Option<&'a AtomicBool>,
-    window: Box<dyn FrameWindow>,
+    window: Box<dyn FrameWindow + 'a>,
     /// Counted from the first frame of the window.
     frames: Vec<usize>,
     layout: Layout,

@@ -55,6 +55,7 @@ use finish::Finish;
 use plan::Budget;
 use scene::{Contents, Group, Read};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 use weights::Weights;
 
@@ -292,7 +293,7 @@ impl Pixel {
     }
 }
 
-/// A finished picture: so many numbers for each of `width * height` pixels, row by row.
+/// A finished picture: as many numbers as the scene has channels for each of `width * height` pixels, row by row.
 pub type Picture<'a> = &'a [f32];
 
 /// A frame as it was rendered.
@@ -390,6 +391,9 @@ pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
 /// All views, for each of which there is memory enough.
 fn eyes(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<Eye>> {
     config.check()?;
+    if scene.channels() > 1 && config.mode != Mode::Projection {
+        return Err(Error::usage("--mode: the samples are colours already, of which only projections are made"));
+    }
     let eye = |view: &View| uncut::without_what_is_dim(Eye::new(scene, config, view)?, config);
     let eyes = config.views.iter().map(eye).collect::<Result<Vec<_>>>()?;
     match config.mode {
@@ -411,30 +415,45 @@ fn render_views(
     let looks = budget.eyes().iter().map(|eye| Look::new(eye, config, budget)).collect::<Result<Vec<_>>>()?;
     let expectations: Vec<_> = looks.iter().map(|look| Expectation::new(look, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
-    let mut rest = config.frames.as_slice();
+    let (mut rest, count) = (config.frames.as_slice(), scene.channels());
     while let Some(first) = rest.first() {
         let most = plan::in_group(scene, *first, rest);
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
-        let pictures = loop {
-            let before = report.clone();
-            let group = scene.group(now, config, &expectations[0])?;
-            let pictures = render_group(group.as_ref(), &looks, config, budget, report)?;
-            for (view, expectation) in report.views[first_view..].iter_mut().zip(&expectations) {
-                // Frame by frame, so that it is the same however frames are grouped.
-                let expected = group.expected(&looks[0].eye.clip, expectation)?;
-                now.iter().for_each(|_| view.expected_error += expected);
-            }
-            match group.finish()? {
-                Read::AsExpected => break pictures,
-                Read::Otherwise => *report = before,
-            }
-        };
-        for (view, pictures) in (first_view..).zip(&pictures) {
-            pictures.frames(view, now).try_for_each(&mut *sink)?;
+        let channel = |channel| render_channel(scene, config, (now, channel), (&looks, &expectations), budget, report);
+        let channels = (0..count).map(channel).collect::<Result<Vec<_>>>()?;
+        for (i, view) in (first_view..).take(looks.len()).enumerate() {
+            let expected = channels.iter().map(|views| views[i].1).sum::<f64>() / count as f64;
+            // Frame by frame, so that it is the same however frames are grouped.
+            now.iter().for_each(|_| report.views[view].expected_error += expected);
+            let pictures: Vec<&Pictures> = channels.iter().map(|views| &views[i].0).collect();
+            Pictures::give(&pictures, (view, now), sink)?;
         }
         rest = later;
     }
     Ok(())
+}
+
+/// Renders a channel of some frames from some views, again where more is found than its layout has room for: of each view the
+/// pictures, and the mean square of the errors that are expected.
+fn render_channel(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    (frames, channel): (&[usize], usize),
+    (looks, expectations): (&[Look<'_>], &[Expectation<'_>]),
+    budget: &Budget<'_>,
+    report: &mut RenderReport,
+) -> Result<Vec<(Pictures, f64)>> {
+    loop {
+        let before = report.clone();
+        let group = scene.group(frames, channel, config, &expectations[0])?;
+        let pictures = render_group(group.as_ref(), looks, config, budget, report)?;
+        let expected = |expectation| group.expected(&looks[0].eye.clip, expectation);
+        let expected = expectations.iter().map(expected).collect::<Result<Vec<_>>>()?;
+        match group.finish()? {
+            Read::AsExpected => return Ok(pictures.into_iter().zip(expected).collect()),
+            Read::Otherwise => *report = before,
+        }
+    }
 }
 
 /// What splatting may add by default to pictures of a file of such a tolerance, or of frames: half of that, at most 1e-3.
@@ -486,7 +505,7 @@ impl<'a> Look<'a> {
     }
 }
 
-/// The pictures of a group from one view.
+/// The pictures of a channel of a group from one view.
 struct Pictures {
     pixels: usize,
     /// Those of the frames, and if they are certified, those of their errors.
@@ -494,15 +513,36 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn frames<'a>(&'a self, view: usize, numbers: &'a [usize]) -> impl Iterator<Item = Rendered<'a>> {
-        let (values, errors) = self.all.split_at(numbers.len() * self.pixels);
-        let of = |all: &'a [f32], i: usize| all.get(i * self.pixels..(i + 1) * self.pixels);
-        numbers.iter().enumerate().map(move |(i, frame)| Rendered {
-            view,
-            frame: *frame,
-            picture: of(values, i).unwrap_or_default(),
-            error: of(errors, i),
-        })
+    /// Gives the frames of all channels to the sink, the channels of each pixel side by side.
+    fn give(
+        channels: &[&Self],
+        (view, frames): (usize, &[usize]),
+        sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+    ) -> Result<()> {
+        for (i, frame) in frames.iter().enumerate() {
+            let of = |i: usize| Self::together(channels, i);
+            let (picture, error) = (of(i), of(frames.len() + i));
+            sink(Rendered {
+                view,
+                frame: *frame,
+                picture: picture.as_deref().unwrap_or_default(),
+                error: error.as_deref(),
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The picture of a number, of all channels; none if there are not so many.
+    fn together<'a>(channels: &[&'a Self], i: usize) -> Option<Cow<'a, [f32]>> {
+        let of = |channel: &&'a Self| channel.all.get(i * channel.pixels..(i + 1) * channel.pixels);
+        let [first, others @ ..] = channels else { return None };
+        let first = of(first)?;
+        if others.is_empty() {
+            return Some(first.into());
+        }
+        let others: Vec<&[f32]> = others.iter().filter_map(of).collect();
+        let pixel = |(at, value): (usize, &f32)| std::iter::once(*value).chain(others.iter().map(move |c| c[at]));
+        Some(first.iter().enumerate().flat_map(pixel).collect())
     }
 }
 

@@ -24,6 +24,8 @@ pub(super) struct Budget<'a> {
     size: [usize; 2],
     /// Finished bytes of a pixel and frame, in the pictures of all.
     pixel_bytes: usize,
+    /// Those of a frame once more, where its channels are put together when they are finished.
+    together: usize,
     /// The largest block.
     block: Region,
     block_bytes: usize,
@@ -53,14 +55,17 @@ impl<'a> Budget<'a> {
 
     /// For pictures of a scene from these views, or of these slabs of one.
     fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
-        let numbers = match config.mode {
-            Mode::Projection => eyes.len() * (1 + usize::from(config.certify)),
+        let channels = scene.channels();
+        let of_a_view = match config.mode {
+            Mode::Projection => channels * (1 + usize::from(config.certify)),
             _ => config.mode.pixel().numbers(),
         };
-        let (size, pixel_bytes) = (config.size(), numbers * size_of::<f32>());
+        let views = if config.mode == Mode::Projection { eyes.len() } else { 1 };
+        let together = if channels > 1 { of_a_view * size_of::<f32>() } else { 0 };
+        let (size, pixel_bytes) = (config.size(), views * of_a_view * size_of::<f32>());
         let available = config.memory.saturating_sub(fixed(config, eyes));
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
-        Self { eyes, available, size, pixel_bytes, block, block_bytes }
+        Self { eyes, available, size, pixel_bytes, together, block, block_bytes }
     }
 
     /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
@@ -118,7 +123,7 @@ impl<'a> Budget<'a> {
 
     /// Finished pictures of a group.
     fn picture_bytes(&self, frames: usize) -> usize {
-        frames * self.pixels() * self.pixel_bytes
+        (frames * self.pixel_bytes + self.together) * self.pixels()
     }
 
     /// Bands of so many rows with all planes, and what threads work with.

@@ -20,6 +20,11 @@ pub trait Scene {
     /// How the lattice is cut into blocks.
     fn blocks(&self) -> BlockGrid;
 
+    /// Numbers of a pixel: 1, or of colours 3.
+    fn channels(&self) -> usize {
+        1
+    }
+
     /// Number of frames, if it is known before they are read.
     fn frames(&self) -> Option<usize>;
 
@@ -32,10 +37,11 @@ pub trait Scene {
     /// An upper bound of the bytes that one block takes.
     fn block_bytes(&self) -> usize;
 
-    /// Opens some frames of one group, ascending. What is read, where that is chosen by the view, is chosen by `expectation`.
+    /// Opens one channel of some frames of one group, ascending. What is read, where that is chosen by the view, is chosen by `expectation`.
     fn group<'a>(
         &'a mut self,
         frames: &[usize],
+        channel: usize,
         config: &RenderConfig,
         expectation: &'a Expectation<'_>,
     ) -> Result<Box<dyn Group + 'a>>;

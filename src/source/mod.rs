@@ -4,6 +4,7 @@
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
 mod base64;
+mod coloured;
 mod described;
 mod format;
 mod frames;
@@ -24,6 +25,8 @@ mod vti;
 mod vti_header;
 mod xml;
 
+pub(crate) use coloured::Coloured;
+pub use coloured::{CHANNELS, Painter};
 pub use inputs::files;
 pub use npy::{ArrayHeader, array_header};
 pub use select::{Selection, select};

@@ -106,7 +106,13 @@ pub(crate) fn stored_with_a_lie(
 
 /// All samples of a file.
 pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
-    let config = ExtractConfig { frames: (0..file.frames()).collect(), region: file.grid.whole(), memory: MEMORY };
+    extracted_channel(file, 0)
+}
+
+/// All samples of one of its channels.
+pub(crate) fn extracted_channel(file: &CoefficientFile, channel: usize) -> Vec<u8> {
+    let config =
+        ExtractConfig { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel, memory: MEMORY };
     let mut out = Vec::new();
     extract(file, &config, Path::new("out"), &mut out, &Silent).unwrap();
     out

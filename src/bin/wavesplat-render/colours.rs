@@ -64,6 +64,18 @@ impl ColourArgs {
         if self.annotate { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
     }
 
+    /// An error if anything is asked of colours that are those of the samples.
+    pub(crate) fn refuse_for_colours(&self) -> Result<()> {
+        if self.is_asked() {
+            let what = "the colours are fixed, since the samples themselves were turned into them";
+            return Err(Error::usage(format!("--colormap: {what}")));
+        }
+        match self.norm {
+            NormName::Linear => Ok(()),
+            NormName::Log => Err(Error::usage("--norm: spreads values over a --colormap, and these are colours")),
+        }
+    }
+
     /// The colours, over the range that was asked for.
     pub(crate) fn map(&self) -> Result<TransferFunction> {
         let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis")).map_err(|e| match e {
@@ -148,6 +160,11 @@ impl Ranges {
         }
         ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
         Ok(ranges)
+    }
+
+    /// From 0 to the largest.
+    pub(crate) fn from_nothing(&self) -> (f64, f64) {
+        (0.0, self.values.1)
     }
 
     /// What colours are spread over where nobody says it.

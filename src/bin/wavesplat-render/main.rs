@@ -1,9 +1,11 @@
 //! `wavesplat-render`: pictures from coefficient files, or from frames by the conventional method.
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
+mod along;
 mod colours;
 mod targets;
 
+use along::{AlongArgs, ModeName};
 use clap::{Parser, ValueEnum};
 use colours::{ColourArgs, Ranges};
 use serde::Serialize;
@@ -14,8 +16,10 @@ use std::sync::Arc;
 use targets::{Targets, parse_format};
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
-use wavesplat::cli::{self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs};
-use wavesplat::colour::{Norm, Scale};
+use wavesplat::cli::{
+    self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs, transfer_function,
+};
+use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
@@ -23,7 +27,7 @@ use wavesplat::output::STANDARD;
 use wavesplat::render::annotate::Annotation;
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
+    CoefficientScene, FrameScene, Limit, Mode, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
     default_splat_error, render,
 };
 use wavesplat::volume::Grid;
@@ -119,6 +123,8 @@ struct Cli {
     quantity: QuantityName,
     #[command(flatten)]
     colour: ColourArgs,
+    #[command(flatten)]
+    along: AlongArgs,
     /// From coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients")]
     method: MethodName,
@@ -142,7 +148,7 @@ struct Cli {
     common: CommonArgs,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum QuantityName {
     /// The weighted mean along the ray, in the samples' unit
     Mean,
@@ -182,13 +188,14 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let Opened { mut scene, file, times } = self.scene()?;
-        let mut config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()))?;
+        let Opened { mut scene, file, times, colours } = self.scene()?;
+        let colours = colours.as_ref();
+        let mut config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()), colours)?;
         let targets = self.targets(&config)?;
         config.reserved =
             targets.0.memory(&config)? + targets.1.as_ref().map_or(Ok(0), |errors| errors.memory(&config))?;
-        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, times)?;
-        let progress = self.common.progress("pictures");
+        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, (times, colours))?;
+        let progress = self.common.progress(if config.mode == Mode::Projection { "pictures" } else { "rows of slabs" });
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
             if let (Some(sink), Some(error)) = (of_view(&mut errors, rendered.view), rendered.error) {
                 sink.picture(rendered.frame, error)?;
@@ -227,18 +234,27 @@ impl Cli {
         scene: &mut dyn Scene,
         config: &RenderConfig,
         (pictures, errors): (Targets, Option<Targets>),
-        times: Vec<f64>,
+        (times, colours): (Vec<f64>, Option<&TransferFunction>),
     ) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
+        let pixel = self.pixel(scene, config, [Some(&pictures), errors.as_ref()])?;
         let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
         let in_colours = pictures.format != PictureFormat::Npy || self.colour.is_asked();
-        let map = self.colour.map()?;
-        let needed = in_colours && self.colour.range.is_none() || certify;
+        let fixed = self.fixed_range(pixel, colours);
+        let needed = in_colours && fixed.is_none() || certify;
         let looking = RenderConfig { certify, ..config.clone() };
         if needed {
             check(scene, config)?; // or small pictures would be made in vain, and what they need be named
         }
         let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
-        let (range, norm) = self.colour.spread(&map, &seen, in_colours, &self.common)?;
+        let map = if pixel == Pixel::Value {
+            self.colour.map()?
+        } else {
+            colours.map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?
+        };
+        let (range, norm) = match (pixel, fixed) {
+            (Pixel::Value, _) => self.colour.spread(&map, &seen, in_colours, &self.common)?,
+            (_, fixed) => (fixed.unwrap_or(seen.from_nothing()), Norm::Linear),
+        };
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
         }
@@ -246,13 +262,13 @@ impl Cli {
             self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
         }
         let annotation = self.colour.annotate.then_some(Annotation { times });
-        let open = |targets: Targets, colours, coloured_array| {
+        let open = |targets: Targets, pixel, colours, coloured_array| {
             let sink = SinkConfig {
                 format: targets.format,
                 size: self.size.0,
                 frames: targets.frames(config),
                 fps: self.fps,
-                pixel: Pixel::Value,
+                pixel,
                 colours,
                 coloured_array,
                 annotation: annotation.clone(),
@@ -261,10 +277,39 @@ impl Cli {
             targets.names.iter().map(|name| Sink::open(name, sink.clone())).collect::<Result<Vec<_>>>()
         };
         let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
-        let of_errors = scale(seen.errors, Norm::Linear)?;
-        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, of_errors, false))?;
+        let (of_errors, of_error) =
+            (scale(seen.errors, Norm::Linear)?, if pixel == Pixel::Light { Pixel::Value } else { pixel });
+        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, of_error, of_errors, false))?;
         let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
-        Ok((open(pictures, scale(range, norm)?, self.colour.is_asked())?, errors, coloured))
+        Ok((open(pictures, pixel, scale(range, norm)?, self.colour.is_asked())?, errors, coloured))
+    }
+
+    /// What the numbers of a pixel are; an error where options or formats have no use for colours.
+    fn pixel(&self, scene: &dyn Scene, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
+        let pixel = if scene.channels() == 1 { config.mode.pixel() } else { Pixel::Channels };
+        if pixel == Pixel::Value {
+            return Ok(pixel);
+        }
+        if targets.into_iter().flatten().any(|targets| targets.format == PictureFormat::Gray16) {
+            return Err(Error::usage("gray16: holds one number a pixel, and colours are three"));
+        }
+        self.colour.refuse_for_colours()?;
+        Ok(pixel)
+    }
+
+    /// The values of the first and the last colour, where small pictures need not tell. Channels are bright between none and all;
+    /// only their sums along the ray know no end. With a transfer function --range is that of samples.
+    fn fixed_range(&self, pixel: Pixel, colours: Option<&TransferFunction>) -> Option<(f64, f64)> {
+        let bright = (self.quantity == QuantityName::Mean).then_some((0.0, 1.0));
+        match pixel {
+            Pixel::Value => self.range(),
+            Pixel::Channels => self.range().filter(|_| colours.is_none()).or(bright),
+            Pixel::Light => colours.map(TransferFunction::range),
+        }
+    }
+
+    fn range(&self) -> Option<(f64, f64)> {
+        self.colour.range.map(|range| range.0.into())
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -300,11 +345,13 @@ impl Cli {
                 return Err(Error::usage("-: a coefficient file is read from its end, so not from a pipe"));
             }
             self.input.refuse_for_coefficients()?;
+            self.along.check(false, self.colour.is_asked())?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            let times = file.metadata().times.clone();
-            return Ok(Opened { scene: Box::new(CoefficientScene::new(file.clone(), what)), file: Some(file), times });
+            let (times, colours) = (file.metadata().times.clone(), self.along.of_file(self.range(), &file)?);
+            let scene = Box::new(CoefficientScene::new(file.clone(), what));
+            return Ok(Opened { scene, file: Some(file), times, colours });
         }
         if self.skip_damaged {
             return Err(Error::usage("--skip-damaged: is for a coefficient file"));
@@ -315,12 +362,30 @@ impl Cli {
         if self.inputs == [PathBuf::from(STANDARD)] {
             return Err(Error::usage("--method direct reads frames more than once, so not from standard input"));
         }
-        let source = self.input.open(&self.inputs, &self.common)?;
+        self.along.check(true, self.colour.is_asked())?;
+        let mut source = self.input.open(&self.inputs, &self.common)?;
         let times = source.archive().times.clone();
-        Ok(Opened { scene: Box::new(FrameScene::new(source, self.missing_value)), file: None, times })
+        let colours = match self.along.colours() {
+            Some(name) => {
+                let of = (self.inputs.as_slice(), source.as_mut());
+                Some(transfer_function(name, self.colour.range, of, self.missing_value, &self.common)?)
+            }
+            None => None,
+        };
+        let before = colours.clone().filter(|_| self.along.mode == ModeName::Projection);
+        let scene = match before {
+            Some(colours) => FrameScene::coloured(source, self.missing_value, colours),
+            None => FrameScene::new(source, self.missing_value),
+        };
+        Ok(Opened { scene: Box::new(scene), file: None, times, colours })
     }
 
-    fn config(&self, scene: &dyn Scene, file: Option<&Metadata>) -> Result<RenderConfig> {
+    fn config(
+        &self,
+        scene: &dyn Scene,
+        file: Option<&Metadata>,
+        colours: Option<&TransferFunction>,
+    ) -> Result<RenderConfig> {
         let grid = scene.grid();
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
@@ -342,7 +407,7 @@ impl Cli {
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
-            mode: Default::default(),
+            mode: self.along.mode(colours)?,
             memory: self.common.memory.0,
             reserved: 0,
         })
@@ -407,6 +472,8 @@ struct Opened {
     file: Option<Arc<CoefficientFile>>,
     /// Of each frame, or empty.
     times: Vec<f64>,
+    /// What samples are turned into, before they are splatted or along the ray.
+    colours: Option<TransferFunction>,
 }
 
 /// Where the pictures of a view go: all may go to one.

@@ -3,8 +3,9 @@
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, spare_inputs};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, spare_inputs, transfer_function};
 use wavesplat::codec::scheme::Stencil;
+use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
 use wavesplat::error::{Error, Result};
 use wavesplat::output::{Output, STANDARD};
@@ -21,6 +22,7 @@ Examples:
   wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
+  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
 A run that is killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. With
 --resume the same command goes on there (frames that were converted are read again and compared); a producer behind a pipe
 must begin at its first frame again.
@@ -68,7 +70,12 @@ pub(crate) struct ConvertArgs {
     /// For --bound sampled: another seed takes other pixels [default: 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     seed: Option<u64>,
-    /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms
+    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's file.
+    /// The tolerance is a share of full brightness then
+    #[arg(long, value_name = "F")]
+    transfer_function: Option<String>,
+    /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms. With
+    /// --transfer-function: the values of its first and last colour [default: its own, or the range of all frames]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
     range: Option<Pair>,
     /// NaN, infinities and the missing value: refuse them, or keep them as they are
@@ -148,6 +155,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let config = args.config()?;
     let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
     spare_inputs(&args.inputs, &args.output)?;
+    let config = ConvertConfig { colours: args.colours(source.as_mut())?, ..config };
     if args.resume && !args.force && args.output.is_file() {
         return args.see_that_it_is_complete(&config, source.archive());
     }
@@ -205,12 +213,21 @@ impl ConvertArgs {
                 (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
             },
             missing_value: self.missing_value,
+            colours: None, // which may depend on the frames
             block: self.block,
             level: self.level,
             memory: self.common.memory.0,
             reserved: if streamed { self.common.stream_memory() } else { 0 },
             settings: self.settings(),
         })
+    }
+
+    /// The colours that samples are turned into, if they are.
+    fn colours(&self, source: &mut dyn FrameSource) -> Result<Option<TransferFunction>> {
+        let Some(name) = &self.transfer_function else { return Ok(None) };
+        spare_inputs(&[PathBuf::from(name)], &self.output)?;
+        let inputs = (self.inputs.as_slice(), source);
+        transfer_function(name, self.range, inputs, self.missing_value, &self.common).map(Some)
     }
 
     fn bound(&self) -> Result<Bound> {
@@ -235,7 +252,8 @@ impl ConvertArgs {
     }
 
     fn range(&self) -> Result<Option<(f64, f64)>> {
-        let Some((lo, hi)) = self.range.map(|r| (r.0[0], r.0[1])) else { return Ok(None) };
+        let of_samples = self.range.filter(|_| self.transfer_function.is_none());
+        let Some((lo, hi)) = of_samples.map(|r| (r.0[0], r.0[1])) else { return Ok(None) };
         let refused = match self.bound {
             BoundName::Relative => "--range: with --bound relative the tolerance refers to each sample, not to a range",
             BoundName::Sampled => "--range: with --bound sampled the tolerance refers to pixels, not to a range",

@@ -9,6 +9,7 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
 use wavesplat::npy;
 use wavesplat::output::{Output, STANDARD};
+use wavesplat::source::CHANNELS;
 
 /// Decode frames back to samples
 #[derive(Debug, Args)]
@@ -17,6 +18,7 @@ Examples:
   wavesplat extract run.wspl -o run.npy
   wavesplat extract run.wspl --frames 10:20 --region 0:32,:,5:6 -o part.npy
   wavesplat extract run.wspl -o - --format raw | python analyse.py
+  wavesplat extract coloured.wspl --channel red -o red.npy
 The samples keep their type. An .npy holds (frames, z, y, x), with one header for all frames.")]
 pub(crate) struct ExtractArgs {
     /// Coefficient file
@@ -33,6 +35,9 @@ pub(crate) struct ExtractArgs {
     /// Only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
+    /// Of a file of colours: red, green or blue
+    #[arg(long, value_name = "NAME", value_parser = parse_channel)]
+    channel: Option<usize>,
     /// npy or raw [default: by the ending of OUT; npy for -]
     #[arg(long, value_enum)]
     format: Option<Format>,
@@ -65,6 +70,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
         region: args.region.map_or(Ok(file.grid.whole()), |r| r.resolve(&file.grid))?,
+        channel: args.channel(&file)?,
         memory: args.common.memory.0,
     };
     check_memory(&file, &config)?;
@@ -83,6 +89,31 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     ));
     args.common.report(&report, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
+}
+
+impl ExtractArgs {
+    /// The channel that is meant; of a file of colours one must be named.
+    fn channel(&self, file: &CoefficientFile) -> Result<usize> {
+        let name = self.file.display();
+        match (file.painter(), self.channel) {
+            (Some(_), Some(channel)) => Ok(channel),
+            (None, None) => Ok(0),
+            (Some(_), None) => {
+                let channels = CHANNELS.join(", ");
+                Err(Error::usage(format!("{name}: holds colours, of which --channel chooses one of {channels}")))
+            }
+            (None, Some(_)) => {
+                Err(Error::usage(format!("--channel: is for a file of colours, and {name} holds values")))
+            }
+        }
+    }
+}
+
+/// A channel by its name or number.
+fn parse_channel(text: &str) -> std::result::Result<usize, String> {
+    let number = text.parse().ok().filter(|number| *number < CHANNELS.len());
+    let found = CHANNELS.iter().position(|name| *name == text).or(number);
+    found.ok_or_else(|| format!("one of {}", CHANNELS.join(", ")))
 }
 
 fn format_of(path: &Path) -> Result<Format> {

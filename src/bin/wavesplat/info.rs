@@ -10,6 +10,7 @@ use wavesplat::error::Result;
 use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
 use wavesplat::report::{PromiseReport, WindowReport};
+use wavesplat::source::CHANNELS;
 
 /// Say what a coefficient file holds, promises and reached
 #[derive(Debug, Args)]
@@ -36,6 +37,8 @@ struct Info {
     spacing: [f64; 3],
     origin: [f64; 3],
     sample: &'static str,
+    channels: usize,
+    colours: Option<String>,
     frames: u64,
     times: Vec<f64>,
     variable: Option<String>,
@@ -70,7 +73,8 @@ impl Info {
     fn of(file: &CoefficientFile) -> Self {
         let m = file.metadata();
         let voxels: u64 = m.dims.iter().product();
-        let windows: Vec<WindowReport> = m.windows.iter().map(|w| WindowReport::new(w, voxels)).collect();
+        let windows: Vec<WindowReport> =
+            m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
         Self {
             id: file.id().to_string(),
             bytes: file.bytes(),
@@ -78,6 +82,8 @@ impl Info {
             spacing: m.spacing,
             origin: m.origin,
             sample: m.sample.name(),
+            channels: file.channels(),
+            colours: file.painter().map(|painter| painter.colours.words()),
             frames: m.frames,
             times: m.times.clone(),
             variable: m.variable.clone(),
@@ -87,7 +93,7 @@ impl Info {
             missing_value: m.missing_value,
             block_edge: m.block_edge,
             blocks: m.blocks(),
-            raw_bytes: voxels * m.frames * m.sample.size() as u64,
+            raw_bytes: voxels * m.frames * file.of_source().0.size() as u64,
             coefficients: windows.iter().map(|w| w.coefficients).sum(),
             outliers: windows.iter().map(|w| w.outliers).sum(),
             missing: windows.iter().map(|w| w.missing).sum(),
@@ -128,6 +134,9 @@ impl Info {
             self.id,
             self.program
         );
+        if let Some(colours) = &self.colours {
+            let _ = writeln!(text, "colours    {} channels: {} by {colours}", self.channels, CHANNELS.join(", "));
+        }
         if self.lost_blocks > 0 {
             let lost = self.lost_blocks;
             let _ =

@@ -73,7 +73,8 @@ fn text(r: &RecoverReport) -> String {
     for run in &r.lost {
         let (from, to) = run.frames;
         let (window, first, last) = (run.window, run.first, run.last);
-        text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}\n");
+        let channel = run.channel.map_or(String::new(), |channel| format!(" of {channel}"));
+        text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}{channel}\n");
     }
     for window in &r.windows_undescribed {
         text += &format!("  nothing says how window {window} was coded\n");

@@ -66,9 +66,12 @@ fn missed(c: &Comparison) -> Option<String> {
         let place = c.worst.map_or(String::new(), |p| format!(" at {p}"));
         return Some(format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound"));
     }
-    let BlockPlace { window, block } = c.first_beyond?;
+    let BlockPlace { window, block, channel } = c.first_beyond?;
+    let channel = channel.map_or(String::new(), |channel| format!(", {channel}"));
     let blocks = c.blocks_beyond_stated;
-    Some(format!("blocks further off than the file says: {blocks}, the first of them block {block} of window {window}"))
+    Some(format!(
+        "blocks further off than the file says: {blocks}, the first of them block {block} of window {window}{channel}"
+    ))
 }
 
 impl VerifyArgs {

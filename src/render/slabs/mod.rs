@@ -140,7 +140,7 @@ impl<B: Blend> View<'_, B> {
             let (now, later) = rest.split_at(budget.frames(scene, self.config, most));
             let pictures = loop {
                 let before = report.clone();
-                let group = scene.group(now, self.config, &expectation)?;
+                let group = scene.group(now, 0, self.config, &expectation)?;
                 let pictures = self.render_group(group.as_ref(), &budget, report)?;
                 match group.finish()? {
                     Read::AsExpected => break pictures,

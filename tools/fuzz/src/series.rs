@@ -113,7 +113,7 @@ pub fn roundtrip(data: &[u8]) {
 fn check(case: &Case, file: &CoefficientFile, path: &Path) {
     let mut decoded = Vec::new();
     let (frames, region) = ((0..case.frames).collect(), file.grid.whole());
-    let config = ExtractConfig { frames, region, memory: MEMORY };
+    let config = ExtractConfig { frames, region, channel: 0, memory: MEMORY };
     extract(file, &config, path, &mut decoded, &Silent).expect("what was just written is sound");
     if case.config.tolerance == 0.0 {
         assert_eq!(decoded, case.bytes, "bits");

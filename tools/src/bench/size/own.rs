@@ -137,7 +137,7 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&Place<'_>, &Blo
         let codec = &file.codec(window)?;
         let wanted = vec![true; codec.basis.coefficients()];
         let first_frame = file.window_range(window).start;
-        for entries in file.entries(window, &whole) {
+        for entries in file.entries(window, 0, &whole) {
             for entry in entries? {
                 let region = file.blocks.region(entry.id.block as usize);
                 visit(&Place { codec, first_frame, region }, &file.block(codec, &entry, &wanted)?);

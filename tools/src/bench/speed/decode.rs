@@ -16,7 +16,7 @@ pub(super) fn codes(path: &Path) -> Result<u64> {
     for window in 0..file.metadata().windows.len() as u32 {
         let codec = &file.codec(window)?;
         let wanted = vec![true; codec.basis.coefficients()];
-        let leaves = file.entries(window, &whole).collect::<Result<Vec<_>>>()?;
+        let leaves = file.entries(window, 0, &whole).collect::<Result<Vec<_>>>()?;
         let read = |entry: &BlockEntry| {
             let block = file.block(codec, entry, &wanted)?;
             black_box(&block.codes);

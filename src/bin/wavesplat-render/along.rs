@@ -1,0 +1,121 @@
+//! What becomes of what lies along a ray.
+
+use clap::{Args, ValueEnum};
+use wavesplat::cli::OpacityPoints;
+use wavesplat::colour::TransferFunction;
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::render::Mode;
+
+/// Options on what is done along rays.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Along the ray")]
+pub(crate) struct AlongArgs {
+    /// What becomes of what lies along a ray
+    #[arg(long, value_enum, default_value = "projection")]
+    pub(crate) mode: ModeName,
+    /// Colours and opacities of a composite: a colour map's name or a file. Of --method direct without one, what every sample
+    /// is turned into before it is splatted. --range gives the values of its first and last colour [default: viridis; its
+    /// own values, or those of all frames]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) transfer_function: Option<String>,
+    /// Opacities of a composite at shares of the range, as 0:0,0.5:0.1,1:0.8 [default: the file's, or 0 to 1]
+    #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true)]
+    opacity: Option<OpacityPoints>,
+    /// World units of a path that has such an opacity [default: the largest spacing]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    opacity_unit: Option<f64>,
+    /// Slabs that the volume is cut into across the view [default: each as thick as the largest spacing]
+    #[arg(long, value_name = "N")]
+    slabs: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ModeName {
+    /// It is averaged or summed up: --quantity, --colormap
+    Projection,
+    /// It is coloured and hides what is behind: --transfer-function, --opacity
+    Composite,
+    /// The largest value is taken: --colormap
+    Mip,
+}
+
+impl AlongArgs {
+    /// An error if an option says nothing of the mode; whether a colour map is given.
+    pub(crate) fn check(&self, is_direct: bool, colour_map: bool) -> Result<()> {
+        let composite = self.mode == ModeName::Composite;
+        let colours = "colours samples along the ray (--mode composite) or those of frames (--method direct); --colormap \
+                       colours projections, and convert --transfer-function the samples of a file";
+        let wrong = [
+            (self.opacity.is_some() && !composite, "--opacity: needs --mode composite"),
+            (self.opacity_unit.is_some() && !composite, "--opacity-unit: needs --mode composite"),
+            (self.slabs.is_some() && self.mode == ModeName::Projection, "--slabs: needs --mode composite or mip"),
+            (composite && colour_map, "--colormap: a composite has the colours of --transfer-function"),
+            (
+                self.transfer_function.is_some() && self.mode == ModeName::Mip,
+                "--transfer-function: --mode mip takes --colormap",
+            ),
+        ];
+        if let Some((_, what)) = wrong.into_iter().find(|(wrong, _)| *wrong) {
+            return Err(Error::usage(what));
+        }
+        if self.transfer_function.is_some() && self.mode == ModeName::Projection && !is_direct {
+            return Err(Error::usage(format!("--transfer-function: {colours}")));
+        }
+        let positive = self.opacity_unit.is_none_or(|unit| unit.is_finite() && unit > 0.0);
+        if positive { Ok(()) } else { Err(Error::usage("--opacity-unit: takes a length above 0")) }
+    }
+
+    /// The name of the colours of a composite, or of frames.
+    pub(crate) fn colours(&self) -> Option<&str> {
+        let of_composite = (self.mode == ModeName::Composite).then_some("viridis");
+        self.transfer_function.as_deref().or(of_composite)
+    }
+
+    /// The colours of a composite of a file over the range that was asked for, their own, or that of all samples.
+    pub(crate) fn of_file(
+        &self,
+        range: Option<(f64, f64)>,
+        file: &CoefficientFile,
+    ) -> Result<Option<TransferFunction>> {
+        let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite) else { return Ok(None) };
+        let transfer = TransferFunction::open(name).map_err(named)?;
+        match range {
+            None if transfer.is_of_values() => Ok(Some(transfer)),
+            None => transfer.over(spread(&transfer, file.value_range())).map(Some),
+            Some(range) => transfer.over(range).map(Some),
+        }
+    }
+
+    /// What is to be done with such colours, if there are any.
+    pub(crate) fn mode(&self, colours: Option<&TransferFunction>) -> Result<Mode> {
+        let slabs = self.slabs;
+        Ok(match (self.mode, colours) {
+            (ModeName::Composite, Some(transfer)) => {
+                let points = self.opacity.as_ref().map(|points| transfer.with_opacity(&points.0));
+                let transfer = points.unwrap_or_else(|| Ok(transfer.clone()));
+                let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
+                Mode::Composite { transfer, unit: self.opacity_unit, slabs }
+            }
+            (ModeName::Mip, _) => Mode::Mip { slabs },
+            _ => Mode::Projection,
+        })
+    }
+}
+
+/// The error of a name, with the option's.
+fn named(error: Error) -> Error {
+    match error {
+        Error::Usage(what) => Error::usage(format!("--transfer-function {what}")),
+        other => other,
+    }
+}
+
+/// A range with room for colours; to both sides of 0 alike if they lie to both sides of a middle one.
+fn spread(transfer: &TransferFunction, (lo, hi): (f64, f64)) -> (f64, f64) {
+    let most = hi.max(-lo);
+    match transfer.is_diverging() && lo < 0.0 && 0.0 < hi {
+        true => (-most, most),
+        false => (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) }),
+    }
+}

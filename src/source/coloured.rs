@@ -1,0 +1,138 @@
+//! Samples as the colours that a transfer function gives them: three channels before any transform (method.md section 7).
+
+use super::FrameWindow;
+use crate::colour::TransferFunction;
+use crate::error::Result;
+use crate::sample::{self, SampleType};
+use crate::volume::Region;
+use std::cell::Cell;
+
+/// The channels of a colour by their names, in the order in which they are stored.
+pub const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// What makes samples into channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Painter {
+    /// The colours of values.
+    pub colours: TransferFunction,
+    /// The type of the samples that are coloured.
+    pub sample: SampleType,
+    /// Stands for a missing sample among these.
+    pub missing_value: Option<f64>,
+}
+
+impl Painter {
+    /// The type of a channel's samples: 0 to 1, NaN what is missing.
+    pub const SAMPLE: SampleType = SampleType::F32;
+
+    /// One channel of the colours of some samples, little-endian as these. `out` has room for as many of [`Self::SAMPLE`].
+    pub fn paint(&self, channel: usize, samples: &[u8], out: &mut [u8]) {
+        let first = (0.0_f64, self.component(channel, 0.0));
+        let last = Cell::new(first); // neighbours are often equal
+        sample::load_as(self.sample, samples, out.as_chunks_mut().0, |value: f64| {
+            if value.to_bits() != last.get().0.to_bits() {
+                last.set((value, self.component(channel, value)));
+            }
+            last.get().1
+        });
+    }
+
+    /// One channel of the colour of a value; what is missing has none, whatever colour NaN may have.
+    fn component(&self, channel: usize, value: f64) -> [u8; 4] {
+        let missing = sample::is_missing(value, self.missing_value);
+        let colour = if missing { None } else { self.colours.colour(value) };
+        colour.map_or(f32::NAN, |colour| colour[channel] as f32).to_le_bytes()
+    }
+}
+
+/// One channel of the colours of a window's samples.
+pub(crate) struct Coloured<'a, W> {
+    pub(crate) window: W,
+    pub(crate) painter: &'a Painter,
+    pub(crate) channel: usize,
+}
+
+impl<W: FrameWindow> FrameWindow for Coloured<'_, W> {
+    fn frames(&self) -> usize {
+        self.window.frames()
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        let mut samples = vec![0; region.voxels() * self.painter.sample.size()];
+        self.window.read_box(frame, region, &mut samples)?;
+        self.painter.paint(self.channel, &samples, out);
+        Ok(())
+    }
+
+    fn name(&self, frame: usize) -> String {
+        self.window.name(frame)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        self.window.check_unchanged()
+    }
+}
+
+impl<W: FrameWindow + ?Sized> FrameWindow for Box<W> {
+    fn frames(&self) -> usize {
+        (**self).frames()
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        (**self).read_box(frame, region, out)
+    }
+
+    fn name(&self, frame: usize) -> String {
+        (**self).name(frame)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        (**self).check_unchanged()
+    }
+}
+
+impl<W: FrameWindow + ?Sized> FrameWindow for &W {
+    fn frames(&self) -> usize {
+        (**self).frames()
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        (**self).read_box(frame, region, out)
+    }
+
+    fn name(&self, frame: usize) -> String {
+        (**self).name(frame)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        (**self).check_unchanged()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn painted(painter: &Painter, channel: usize, values: &[f64]) -> Vec<f32> {
+        let samples: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut out = vec![0; values.len() * 4];
+        painter.paint(channel, &samples, &mut out);
+        out.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    }
+
+    #[test]
+    fn values_become_the_channels_of_their_colours_and_what_is_missing_nan() {
+        let points = vec![(0.0, [0.0, 0.5, 1.0]), (2.0, [1.0, 0.5, 0.0])];
+        let nan = Some([0.25; 3]);
+        let colours = TransferFunction::of_points(points, crate::colour::Space::Rgb, None, nan).expect("two points");
+        let painter = Painter { colours, sample: SampleType::F64, missing_value: Some(1.0) };
+        let values = [0.0, -0.0, 0.5, 0.5, 3.0, 1.0, f64::NAN, f64::INFINITY, -7.0];
+        let missing = |v: &f32| v.is_nan();
+        for (channel, expected) in [[0.0, 0.25, 1.0], [0.5; 3], [1.0, 0.75, 0.0]].into_iter().enumerate() {
+            let found = painted(&painter, channel, &values);
+            assert_eq!([found[1], found[3], found[4]], expected);
+            assert_eq!((found[0], found[2], found[8]), (found[1], found[3], expected[0]));
+            assert!(found[5..8].iter().all(missing) && found.iter().filter(|v| missing(v)).count() == 3);
+        }
+    }
+}
