@@ -7,6 +7,7 @@ mod adversary;
 mod bounds;
 mod catalogue;
 mod certificates;
+mod channels;
 mod choice;
 mod cli;
 mod coefficients;

@@ -4,6 +4,7 @@
 //! `std` arithmetic is used.
 
 pub(crate) mod camera;
+pub(crate) mod colour;
 pub(crate) mod decode;
 pub(crate) mod ray;
 pub(crate) mod sampled;

@@ -367,8 +367,9 @@ impl Cli {
         let times = source.archive().times.clone();
         let colours = match self.along.colours() {
             Some(name) => {
-                let of = (self.inputs.as_slice(), source.as_mut());
-                Some(transfer_function(name, self.colour.range, of, self.missing_value, &self.common)?)
+                let inputs = self.inputs.as_slice();
+                let (range, missing_value) = (self.colour.range, self.missing_value);
+                Some(transfer_function(name, range, (inputs, source.as_mut()), missing_value, &self.common)?)
             }
             None => None,
         };
