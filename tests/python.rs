@@ -3,11 +3,12 @@
 use crate::common::memory::Memory;
 use crate::common::random::Random;
 use crate::common::series::{Kind, Mask, volume};
-use crate::common::{extracted, report, settings, stored, times};
+use crate::common::{extracted_channel, report, settings, stored, times};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use wavesplat::bound::Bound;
+use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Coding, ConvertConfig, Space};
 use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
@@ -45,7 +46,10 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let window = if basis == Some(Basis::Multi) { window.max(2) + 1 } else { window };
     let plain = settings(Basis::Haar, window, [0.0, 0.2, 0.02, 1e-3, 1e-6][random.below(5)]);
     let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor: 0.1 }][random.below(3)];
-    let config = ConvertConfig { coding: Coding { basis, space }, bound, block: Some(1 + random.below(24)), ..plain };
+    let rainbow = TransferFunction::open("rainbow").unwrap();
+    let colours = (random.below(8) == 0).then_some(rainbow); // of which most values are beyond the ends
+    let block = Some(1 + random.below(24));
+    let config = ConvertConfig { coding: Coding { basis, space }, bound, block, colours, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()
 }
 
@@ -78,7 +82,8 @@ fn python_decodes_the_same_bytes_and_refuses_damage() {
     }
     for (file, said) in files.iter().zip(decode(&python, work.path(), &files)) {
         assert!(said.starts_with("ok "), "{said}");
-        let expected = extracted(&CoefficientFile::open(file, Access::Read).unwrap());
+        let open = CoefficientFile::open(file, Access::Read).unwrap();
+        let expected: Vec<u8> = (0..open.channels()).flat_map(|channel| extracted_channel(&open, channel)).collect();
         assert!(fs::read(file.with_extension("out")).unwrap() == expected, "{}", file.display());
     }
     for said in decode(&python, work.path(), &damaged) {

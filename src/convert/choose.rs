@@ -63,7 +63,7 @@ pub(super) struct Chooser<'a> {
     pub(super) config: &'a ConvertConfig,
     pub(super) archive: &'a Archive,
     /// The window's samples, channel by channel.
-    pub(super) channels: &'a [Box<dyn FrameWindow + 'a>],
+    pub(super) channels: &'a [&'a dyn FrameWindow],
     pub(super) promise: Promise,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
@@ -211,7 +211,7 @@ impl Chooser<'_> {
             (place * (dims[axis] - size[axis] + 1) as f64) as usize
         });
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
-        let window = self.channels[number % self.channels.len()].as_ref();
+        let window = self.channels[number % self.channels.len()];
         let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok(Sampled { size, samples })
     }

@@ -163,7 +163,11 @@ impl WindowReader<'_> {
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
         let range = config.range.unwrap_or(range);
-        let channels = channels(self.plan, window);
+        let coloured = coloured(self.plan, window);
+        let channels: Vec<&dyn FrameWindow> = match &coloured[..] {
+            [] => vec![window],
+            coloured => coloured.iter().map(|channel| channel as _).collect(),
+        };
         let delta = self.delta(&channels, of_window, range)?;
         let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(of_window);
@@ -183,7 +187,7 @@ impl WindowReader<'_> {
     }
 
     /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
-    fn delta(&self, channels: &[Box<dyn FrameWindow + '_>], seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
+    fn delta(&self, channels: &[&dyn FrameWindow], seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
         let ConvertConfig { tolerance, missing_value, .. } = *self.config;
         let magnitude = sample::magnitude(seen);
         match self.config.bound {
@@ -191,8 +195,8 @@ impl WindowReader<'_> {
             Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),
             Bound::Sampled { .. } => {
                 let Archive { ref grid, sample, .. } = *self.archive;
-                let of_channel = |window: &Box<dyn FrameWindow + '_>| {
-                    let view = sampled::View { window, grid, sample, missing_value, magnitude };
+                let of_channel = |window: &&dyn FrameWindow| {
+                    let view = sampled::View { window: *window, grid, sample, missing_value, magnitude };
                     view.bound(tolerance, &self.pixels)
                 };
                 let deltas = channels.iter().map(of_channel).collect::<Result<Vec<_>>>()?;
@@ -255,11 +259,10 @@ impl WindowReader<'_> {
     }
 }
 
-/// A window's samples as they are coded, channel by channel.
-fn channels<'a>(plan: &'a Plan<'_>, window: &'a dyn FrameWindow) -> Vec<Box<dyn FrameWindow + 'a>> {
-    let Some(painter) = plan.painter else { return vec![Box::new(window)] };
-    let channel = |channel| Box::new(Coloured { window, painter, channel }) as Box<dyn FrameWindow>;
-    (0..plan.channels()).map(channel).collect()
+/// What a window's samples are coded as, if not as they are: the channels of their colours.
+fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<Coloured<'a, &'a dyn FrameWindow>> {
+    let of = |painter| (0..plan.channels()).map(move |channel| Coloured { window, painter, channel });
+    plan.painter.into_iter().flat_map(of).collect()
 }
 
 /// Every so many windows a scheme is chosen anew; the others begin with that of the window before.

@@ -73,12 +73,24 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
         let ours = OURS.into_iter().chain(["frames", "region"]).chain(COLOUR_SETTINGS);
-        let settings = ours.map(|name| (name, setting(m, name).unwrap_or("none").to_string()));
+        let settings = ours.map(|name| (option(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
     let pairs = of(before).into_iter().zip(of(now));
     let mut differ = pairs.filter(|(before, now)| before != now);
-    differ.next().map(|((what, before), (_, now))| format!("{what}: {before}, now {now}"))
+    differ.next().map(|((what, before), (_, now))| format!("{what}: {}, now {}", shown(&before), shown(&now)))
+}
+
+/// What a setting is called in messages.
+fn option(setting: &'static str) -> &'static str {
+    let of_colours = COLOUR_SETTINGS.iter().position(|name| *name == setting);
+    of_colours.map_or(setting, |i| ["--transfer-function", "--dtype", "--missing-value"][i])
+}
+
+/// As much of a setting as a message has room for: transfer functions may have many points.
+fn shown(setting: &str) -> String {
+    const MOST: usize = 60;
+    if setting.len() <= MOST { setting.into() } else { setting.chars().take(MOST).chain("...".chars()).collect() }
 }
 
 fn number<T: FromStr>(text: &str) -> Option<T> {

@@ -182,7 +182,7 @@ pub struct RenderReport {
     pub frames: usize,
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
-    /// Blocks that the scene holds, over all windows touched; as what follows up to the parts, each time counted that frames
+    /// Blocks that the scene holds, over all windows touched and their channels; as what follows up to the parts, each time counted that frames
     /// are rendered together, from views that are.
     pub blocks: u64,
     /// Blocks that were decoded, each time counted.

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::sample::{self, SampleType};
 use crate::volume::Region;
 use std::cell::Cell;
+use std::ops::Deref;
 
 /// The channels of a colour by their names, in the order in which they are stored.
 pub const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -52,7 +53,7 @@ pub(crate) struct Coloured<'a, W> {
     pub(crate) channel: usize,
 }
 
-impl<W: FrameWindow> FrameWindow for Coloured<'_, W> {
+impl<'a, W: Deref<Target = dyn FrameWindow + 'a> + Send + Sync> FrameWindow for Coloured<'_, W> {
     fn frames(&self) -> usize {
         self.window.frames()
     }
@@ -70,42 +71,6 @@ impl<W: FrameWindow> FrameWindow for Coloured<'_, W> {
 
     fn check_unchanged(&self) -> Result<()> {
         self.window.check_unchanged()
-    }
-}
-
-impl<W: FrameWindow + ?Sized> FrameWindow for Box<W> {
-    fn frames(&self) -> usize {
-        (**self).frames()
-    }
-
-    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        (**self).read_box(frame, region, out)
-    }
-
-    fn name(&self, frame: usize) -> String {
-        (**self).name(frame)
-    }
-
-    fn check_unchanged(&self) -> Result<()> {
-        (**self).check_unchanged()
-    }
-}
-
-impl<W: FrameWindow + ?Sized> FrameWindow for &W {
-    fn frames(&self) -> usize {
-        (**self).frames()
-    }
-
-    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        (**self).read_box(frame, region, out)
-    }
-
-    fn name(&self, frame: usize) -> String {
-        (**self).name(frame)
-    }
-
-    fn check_unchanged(&self) -> Result<()> {
-        (**self).check_unchanged()
     }
 }
 

@@ -2,7 +2,7 @@
 
     python wspl.py info FILE              metadata as JSON
     python wspl.py check FILE             everything in the file is as the format says
-    python wspl.py extract FILE OUT       samples, little-endian, frame by frame, x fastest
+    python wspl.py extract FILE OUT       samples, little-endian, channel by channel, frame by frame, x fastest
     python wspl.py extract-many LISTFILE  lines FILE<TAB>OUT: check and extract each
 
 Exit codes: 0 fine, 2 usage, 3 damaged, lost or not supported.
@@ -1126,12 +1126,12 @@ class Archive:
         return out
 
     def extract(self, path: str) -> None:
-        """Writes the samples of all frames."""
-        need(self.metadata.channels == 1, "metadata", f"{self.metadata.channels} channels, not 1")
+        """Writes the samples of all frames, of one channel after another."""
         try:
             with open(path, "wb") as f:
-                for number in range(len(self.metadata.windows)):
-                    f.write(self.window(number, 0))
+                for channel in range(self.metadata.channels):
+                    for number in range(len(self.metadata.windows)):
+                        f.write(self.window(number, channel))
         except Damaged:
             if os.path.isfile(path):
                 os.remove(path)  # half a series could be taken for a whole one
