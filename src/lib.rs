@@ -5,6 +5,7 @@
 //! ```text
 //!  frame files, a pipe                      source/     one file per input format behind one trait; mapped.rs
 //!    |  windows of T frames                 scan.rs     value range, missing samples: fixes the window's bound
+//!    |  or the channels of their colours    source/coloured.rs, by a transfer function of colour/
 //!    |  boxes of voxels                     convert/    reader -> workers -> writer, bounded channels, in order
 //!    v
 //!  series, 8 voxels at a time               wavelet/    forward: samples to T coefficients along time (eq 5)
@@ -35,6 +36,7 @@
 //!
 //! *frame* one time step of the whole grid; *voxel* a lattice point; *series* one voxel over time; *window* T
 //! consecutive frames; *block* a box of voxels over one window; *coefficient* c_{i,k} of voxel i and basis function k;
+//! *channel* the samples, or red, green or blue of the colours that they were turned into, coded like samples;
 //! *code* a quantised coefficient; *part* a piece of a block with its own zstd frame: a group of temporal *levels*,
 //! coarse to fine, or what overrides them (*outliers*, *missing* samples, an *exact* block); *plane* a sum of splats
 //! over pixels, or over the *cells* of the lattice that a view shears the volume's into; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed,

@@ -86,6 +86,7 @@ fn a_conversion_killed_at_any_time_is_resumed_to_the_same_bytes() {
         ("a.npy", "--window 5 --basis pyramid --tolerance 0"),
         ("a.npy", "--window 8 --basis haar --bound sampled --no-mmap"),
         ("-", "--window 8 --threads 1 --level 9 --block 16"),
+        ("a.npy", "--window 8 --transfer-function rainbow --range -1,1.5"),
     ];
     let jobs = jobs.map(|(input, options)| Job::convert(&archive(), input, options));
     rounds(&jobs, 210, 1);
@@ -97,6 +98,7 @@ fn a_killed_append_leaves_the_file_and_is_resumed_to_the_same_bytes() {
         (16, "--window 4"),
         (12, "--window 4 --threads 1 --basis haar"),
         (9, "--window 9 --basis multi --bound rms"),
+        (8, "--window 4 --transfer-function coolwarm --range -1,1.5 --basis haar"),
         (13, "--window 5 --basis pyramid --tolerance 0"), // after a window that is short
     ];
     let jobs = jobs.map(|(first, options)| Job::append(&archive(), first, options));
