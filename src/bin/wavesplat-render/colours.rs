@@ -10,24 +10,23 @@ use wavesplat::render::{RenderConfig, Scene, render};
 
 /// Options on colours.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Colour")]
 pub(crate) struct ColourArgs {
     /// Colour map: viridis plasma inferno magma cividis turbo coolwarm grey rainbow, or a file: ParaView's .json (of several
     /// maps, FILE#NAME) or .csv with value,red,green,blue [default: viridis]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Colour")]
     colormap: Option<String>,
     /// Values of the first and the last colour [default: a file's own, or those of small pictures of 16 frames of the archive;
     /// to both sides of 0 alike with coolwarm]
-    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     pub(crate) range: Option<Pair>,
     /// Spread values over colours evenly, or by their logarithm (no further down than to a ten-thousandth of the largest)
-    #[arg(long, value_enum, default_value = "linear")]
+    #[arg(long, value_enum, default_value = "linear", help_heading = "Colour")]
     norm: NormName,
     /// Draw a colour bar and the time of each frame into the pictures
-    #[arg(long)]
+    #[arg(long, help_heading = "Colour")]
     pub(crate) annotate: bool,
     /// Colour of the background, as ffffff
-    #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour)]
+    #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
     pub(crate) background: Rgb,
 }
 
