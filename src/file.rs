@@ -119,6 +119,12 @@ impl CoefficientFile {
         if range.0 <= range.1 { range } else { (0.0, 0.0) }
     }
 
+    /// The same as far as the source's samples are known to lie within.
+    pub fn source_range(&self) -> (f64, f64) {
+        let ((lo, hi), (least, most)) = (self.value_range(), self.metadata().range());
+        if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
+    }
+
     /// Samples or coefficients, whichever are more, of the largest block.
     pub fn largest_block(&self) -> usize {
         let windows = &self.metadata().windows;

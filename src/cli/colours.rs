@@ -33,7 +33,7 @@ pub fn transfer_function(
         return Err(Error::usage(format!("--transfer-function {name}: {what}")));
     }
     let (lo, hi) = value_range(source, missing_value, &common.progress("frames"))?.unwrap_or((0.0, 1.0));
-    let hi = if lo < hi { hi } else { lo + lo.abs().max(1.0) }; // of one value: the first colour
+    let (lo, hi) = colours.suitable((lo, hi));
     common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
     colours.over((lo, hi))
 }

@@ -158,6 +158,17 @@ impl TransferFunction {
         }
     }
 
+    /// What it is best stretched over for values of a range: where they lie to both sides of 0, and its colours to both sides of
+    /// a middle one, to both sides of 0 alike. Never empty.
+    pub fn suitable(&self, (lo, hi): (f64, f64)) -> (f64, f64) {
+        /// Less on one side than this share of the other is as good as none: what is around 0, and off by a little.
+        const SIDE: f64 = 0.05;
+        if self.is_diverging() && lo < -SIDE * hi && hi > -SIDE * lo {
+            return (-hi.max(-lo), hi.max(-lo));
+        }
+        (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) })
+    }
+
     /// Its colours in a few words, for people.
     pub fn words(&self) -> String {
         let (lo, hi) = self.range;

@@ -97,12 +97,12 @@ impl Eye {
 
     /// Whether any voxel of a block can reach these rows of the picture.
     pub(super) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
-        overlap(&self.pixels_reached(block)[1], rows)
+        overlap(&self.pixels_reached(&self.blocks.region(block))[1], rows)
     }
 
-    /// The columns and rows that any voxel of a block can reach.
-    pub(super) fn pixels_reached(&self, block: usize) -> [Range<usize>; 2] {
-        let region = self.blocks.region(block).intersect(&self.clip);
+    /// The columns and rows that any voxel of a region can reach.
+    pub(super) fn pixels_reached(&self, region: &Region) -> [Range<usize>; 2] {
+        let region = region.intersect(&self.clip);
         match &self.lattice {
             _ if region.is_empty() => [0..0, 0..0],
             Some(lattice) => lattice.pixels_reached(&region, self.camera.size),

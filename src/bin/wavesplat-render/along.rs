@@ -9,24 +9,23 @@ use wavesplat::render::Mode;
 
 /// Options on what is done along rays.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Along the ray")]
 pub(crate) struct AlongArgs {
     /// What becomes of what lies along a ray
-    #[arg(long, value_enum, default_value = "projection")]
+    #[arg(long, value_enum, default_value = "projection", help_heading = "Along the ray")]
     pub(crate) mode: ModeName,
     /// Colours and opacities of a composite: a colour map's name or a file. Of --method direct without one, what every sample
     /// is turned into before it is splatted. --range gives the values of its first and last colour [default: viridis; its
     /// own values, or those of all frames]
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
     pub(crate) transfer_function: Option<String>,
     /// Opacities of a composite at shares of the range, as 0:0,0.5:0.1,1:0.8 [default: the file's, or 0 to 1]
-    #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity: Option<OpacityPoints>,
     /// World units of a path that has such an opacity [default: the largest spacing]
-    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
     /// Slabs that the volume is cut into across the view [default: each as thick as the largest spacing]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Along the ray")]
     slabs: Option<usize>,
 }
 
@@ -82,7 +81,7 @@ impl AlongArgs {
         let transfer = TransferFunction::open(name).map_err(named)?;
         match range {
             None if transfer.is_of_values() => Ok(Some(transfer)),
-            None => transfer.over(spread(&transfer, file.value_range())).map(Some),
+            None => transfer.over(transfer.suitable(file.source_range())).map(Some),
             Some(range) => transfer.over(range).map(Some),
         }
     }
@@ -108,14 +107,5 @@ fn named(error: Error) -> Error {
     match error {
         Error::Usage(what) => Error::usage(format!("--transfer-function {what}")),
         other => other,
-    }
-}
-
-/// A range with room for colours; to both sides of 0 alike if they lie to both sides of a middle one.
-fn spread(transfer: &TransferFunction, (lo, hi): (f64, f64)) -> (f64, f64) {
-    let most = hi.max(-lo);
-    match transfer.is_diverging() && lo < 0.0 && 0.0 < hi {
-        true => (-most, most),
-        false => (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) }),
     }
 }

@@ -97,7 +97,7 @@ impl ColourArgs {
         }
         let norm = self.norm.into();
         if !map.is_of_values() {
-            return Ok((seen.automatic(norm, map.is_diverging())?, norm));
+            return Ok((seen.automatic(norm, map)?, norm));
         }
         let ((lo, hi), (least, most)) = (map.range(), seen.values);
         if self.range.is_none() && (most < lo || hi < least) {
@@ -167,7 +167,7 @@ impl Ranges {
     }
 
     /// What colours are spread over where nobody says it.
-    fn automatic(&self, norm: Norm, is_diverging: bool) -> Result<(f64, f64)> {
+    fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
         const DECADES: f64 = 1e-4;
         let (lo, hi) = self.values;
         if norm == Norm::Log {
@@ -175,7 +175,6 @@ impl Ranges {
                 self.positive.ok_or_else(|| Error::usage("--norm log: no value is above 0; give --norm linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
-        let most = hi.max(-lo);
-        Ok(if is_diverging && lo < 0.0 && 0.0 < hi { (-most, most) } else { (lo, hi) })
+        Ok(if lo < hi { map.suitable((lo, hi)) } else { (lo, hi) })
     }
 }

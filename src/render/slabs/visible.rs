@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::render::eye::Eye;
 use crate::render::place::Place;
 use crate::render::scene::Group;
+use crate::volume::Region;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -44,11 +45,13 @@ impl Visible {
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); tiles * slabs.len()];
         let mut blocks = Vec::new();
         for (block, (lo, hi)) in group.ranges(&eye.clip)? {
-            let reached = Reached::new(block, slabs, side);
-            for at in reached.places(columns, tiles) {
-                ranges[at] = (ranges[at].0.min(lo), ranges[at].1.max(hi));
+            let region = eye.blocks.region(block);
+            for part in parts(&region) {
+                for at in Reached::new(block, &part, slabs, side).places(columns, tiles) {
+                    ranges[at] = (ranges[at].0.min(lo), ranges[at].1.max(hi));
+                }
             }
-            blocks.push(reached);
+            blocks.push(Reached::new(block, &region, slabs, side));
         }
         let needed = ranges.into_iter().map(|range| range.0 <= range.1 && blend.shows(range)).collect();
         let closed = (0..tiles).map(|_| AtomicBool::new(false)).collect();
@@ -98,12 +101,13 @@ impl Visible {
 }
 
 impl Reached {
-    fn new(block: usize, slabs: &[Eye], side: usize) -> Self {
-        let pixels = slabs[0].pixels_reached(block);
-        let tiles = pixels.map(|pixels| pixels.start / side..pixels.end.div_ceil(side));
-        let first = slabs.iter().position(|eye| eye.is_in_slab(block)).unwrap_or(slabs.len());
-        let count = slabs[first..].iter().take_while(|eye| eye.is_in_slab(block)).count();
-        Self { block, slabs: first..first + count, tiles }
+    /// What the voxels of a region do.
+    fn new(block: usize, region: &Region, slabs: &[Eye], side: usize) -> Self {
+        let (eye, region) = (&slabs[0], region.intersect(&slabs[0].clip));
+        let tiles = eye.pixels_reached(&region).map(|pixels| pixels.start / side..pixels.end.div_ceil(side));
+        let slabs =
+            if region.is_empty() { 0..0 } else { reached(slabs, eye.camera.depths_of(&eye.grid.crop(&region))) };
+        Self { block, slabs, tiles }
     }
 
     /// Where its tiles are among those of all slabs.
@@ -114,4 +118,24 @@ impl Reached {
         };
         self.slabs.clone().flat_map(of_slab)
     }
+}
+
+/// The slabs that kernels of voxels between two depths reach into.
+fn reached(slabs: &[Eye], [nearest, farthest]: [f64; 2]) -> Range<usize> {
+    let ends = |eye: &Eye| eye.slab.map_or([f64::NEG_INFINITY, f64::INFINITY], |slab| slab.reached_from());
+    let first = slabs.partition_point(|eye| ends(eye)[1] < nearest);
+    first..slabs.partition_point(|eye| ends(eye)[0] <= farthest).max(first)
+}
+
+/// A region in parts: seen at an angle, none reaches far in pixels and in slabs at once.
+fn parts(region: &Region) -> Vec<Region> {
+    const A_SIDE: usize = 4;
+    let dims = region.dims();
+    let cut = |axis: usize, n: usize| region.start[axis] + dims[axis] * n / A_SIDE;
+    let part = |n: usize| {
+        let place = [n % A_SIDE, n / A_SIDE % A_SIDE, n / (A_SIDE * A_SIDE)];
+        let [start, end] = [0, 1].map(|more| std::array::from_fn(|axis| cut(axis, place[axis] + more)));
+        Region { start, end }
+    };
+    (0..A_SIDE.pow(3)).map(part).filter(|part| !part.is_empty()).collect()
 }
