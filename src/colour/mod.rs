@@ -13,6 +13,7 @@ mod space;
 mod table;
 
 pub use named::NAMES;
+use named::Named;
 pub use scale::{Norm, Scale};
 pub use space::Space;
 
@@ -42,7 +43,7 @@ pub struct TransferFunction {
 #[derive(Debug, Clone, PartialEq)]
 enum Colours {
     /// One of [`NAMES`].
-    Named(&'static str),
+    Named(&'static Named),
     /// (value, colour), ascending, two or more, and how to get from one to the next.
     Points(Vec<(f64, Colour)>, Space),
 }
@@ -61,9 +62,9 @@ impl TransferFunction {
         file::read(name)
     }
 
-    fn named(name: &'static str) -> Self {
+    fn named(named: &'static Named) -> Self {
         let (range, opacity) = ((0.0, 1.0), ramp((0.0, 1.0)));
-        Self { colours: Colours::Named(name), opacity, nan: None, range, of_values: false }
+        Self { colours: Colours::Named(named), opacity, nan: None, range, of_values: false }
     }
 
     /// Of points of some values and, unless it is to run from 0 at the first to 1 at the last of them, of opacities.
@@ -132,9 +133,9 @@ impl TransferFunction {
             return self.nan;
         }
         Some(match &self.colours {
-            Colours::Named(name) => {
+            Colours::Named(named) => {
                 let share = (value - self.range.0) / (self.range.1 - self.range.0);
-                named::colour(name, share.clamp(0.0, 1.0))
+                named.colour(share.clamp(0.0, 1.0))
             }
             Colours::Points(points, space) => between(points, value, |a, b, t| space.between(*a, *b, t)),
         })
@@ -153,7 +154,7 @@ impl TransferFunction {
     /// Whether colours lie to both sides of a middle one.
     pub fn is_diverging(&self) -> bool {
         match &self.colours {
-            Colours::Named(name) => named::is_diverging(name),
+            Colours::Named(named) => named.is_diverging(),
             Colours::Points(_, space) => *space == Space::Diverging,
         }
     }
@@ -173,7 +174,7 @@ impl TransferFunction {
     pub fn words(&self) -> String {
         let (lo, hi) = self.range;
         match &self.colours {
-            Colours::Named(name) => format!("{name} from {lo} to {hi}"),
+            Colours::Named(named) => format!("{} from {lo} to {hi}", named.name),
             Colours::Points(points, space) => format!("{} points ({}) from {lo} to {hi}", points.len(), space.name()),
         }
     }
@@ -181,7 +182,7 @@ impl TransferFunction {
     /// Whether a colour takes so long that a table of them is worth it.
     fn is_slow(&self) -> bool {
         match &self.colours {
-            Colours::Named(name) => named::is_diverging(name),
+            Colours::Named(_) => false,
             Colours::Points(_, space) => !matches!(space, Space::Rgb | Space::Step),
         }
     }
@@ -189,7 +190,7 @@ impl TransferFunction {
     /// Its colours as text, from which [`Self::of_text`] makes them again, to the bit.
     pub fn text(&self) -> String {
         match &self.colours {
-            Colours::Named(name) => format!("{name} {:?} {:?}", self.range.0, self.range.1),
+            Colours::Named(named) => format!("{} {:?} {:?}", named.name, self.range.0, self.range.1),
             Colours::Points(points, space) => {
                 let point = |(v, [r, g, b]): &(f64, Colour)| format!("{v:?} {r:?} {g:?} {b:?}");
                 let points: Vec<String> = points.iter().map(point).collect();

@@ -2,24 +2,46 @@
 
 use super::Colour;
 use super::space::Space;
+use std::sync::LazyLock;
 
 /// The names of the colour maps.
 pub const NAMES: [&str; 9] =
     ["viridis", "plasma", "inferno", "magma", "cividis", "turbo", "coolwarm", "grey", "rainbow"];
 
-/// The name of a map as it is kept.
-pub(super) fn known(name: &str) -> Option<&'static str> {
+/// A map of the field: colours at even steps of its range, from one to the next in a straight line.
+#[derive(Debug, PartialEq)]
+pub(super) struct Named {
+    pub(super) name: &'static str,
+    colours: Vec<Colour>,
+}
+
+impl Named {
+    /// Whether the colours lie to both sides of a middle one.
+    pub(super) fn is_diverging(&self) -> bool {
+        self.name == "coolwarm"
+    }
+
+    /// The colour at a share of the range, 0 to 1.
+    pub(super) fn colour(&self, t: f64) -> Colour {
+        let place = t * (self.colours.len() - 1) as f64;
+        let n = (place as usize).min(self.colours.len() - 2);
+        Space::Rgb.between(self.colours[n], self.colours[n + 1], place - n as f64)
+    }
+}
+
+/// All maps.
+static MAPS: LazyLock<Vec<Named>> =
+    LazyLock::new(|| NAMES.into_iter().map(|name| Named { name, colours: colours(name) }).collect());
+
+/// A map by its name.
+pub(super) fn known(name: &str) -> Option<&'static Named> {
     let name = if name == "gray" { "grey" } else { name };
-    NAMES.into_iter().find(|known| *known == name)
+    MAPS.iter().find(|known| known.name == name)
 }
 
-/// Whether the colours of a map lie to both sides of a middle one.
-pub(super) fn is_diverging(name: &str) -> bool {
-    name == "coolwarm"
-}
-
-/// The colour of a known map at a share of its range, 0 to 1.
-pub(super) fn colour(name: &str, t: f64) -> Colour {
+/// The colours of a known map. Those of the library are of 8 bits, and are taken where its own tables have them: between these
+/// a transform would meet steps.
+fn colours(name: &str) -> Vec<Colour> {
     let gradient = match name {
         "viridis" => colorous::VIRIDIS,
         "plasma" => colorous::PLASMA,
@@ -27,11 +49,12 @@ pub(super) fn colour(name: &str, t: f64) -> Colour {
         "magma" => colorous::MAGMA,
         "cividis" => colorous::CIVIDIS,
         "turbo" => colorous::TURBO,
-        "coolwarm" => return Space::Diverging.between(COOL, WARM, t),
-        "grey" => return [t; 3],
-        _ => return blue_to_red(t),
+        "coolwarm" => return (0..=256).map(|n| Space::Diverging.between(COOL, WARM, f64::from(n) / 256.0)).collect(),
+        "grey" => return vec![[0.0; 3], [1.0; 3]],
+        _ => return BLUE_TO_RED.to_vec(),
     };
-    gradient.eval_continuous(t).as_array().map(|c| f64::from(c) / 255.0)
+    let at = |n: usize| gradient.eval_rational(n, 256).as_array().map(|c| f64::from(c) / 255.0);
+    (0..256).map(at).collect()
 }
 
 /// The ends of Moreland's diverging map, ParaView's default.
@@ -39,12 +62,7 @@ const COOL: Colour = [0.231_373, 0.298_039, 0.752_941];
 const WARM: Colour = [0.705_882, 0.015_686_3, 0.149_02];
 
 /// The paper's map: small values blue, large ones red, by the hues between (240 to 0 degrees).
-fn blue_to_red(t: f64) -> Colour {
-    let sector = 4.0 * (1.0 - t);
-    let channel = |distance: f64| (2.0 - distance.abs()).clamp(0.0, 1.0);
-    let red = if sector < 2.0 { channel(sector) } else { 0.0 };
-    [red, channel(sector - 2.0), channel(sector - 4.0)]
-}
+const BLUE_TO_RED: [Colour; 5] = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
 
 #[cfg(test)]
 mod tests {
@@ -52,10 +70,21 @@ mod tests {
 
     #[test]
     fn the_papers_map_runs_from_blue_over_green_to_red() {
-        assert_eq!(blue_to_red(0.0), [0.0, 0.0, 1.0]);
-        assert_eq!(blue_to_red(0.25), [0.0, 1.0, 1.0]);
-        assert_eq!(blue_to_red(0.5), [0.0, 1.0, 0.0]);
-        assert_eq!(blue_to_red(0.75), [1.0, 1.0, 0.0]);
-        assert_eq!(blue_to_red(1.0), [1.0, 0.0, 0.0]);
+        let rainbow = known("rainbow").expect("the paper's map");
+        assert_eq!(rainbow.colour(0.0), [0.0, 0.0, 1.0]);
+        assert_eq!(rainbow.colour(0.375), [0.0, 1.0, 0.5]);
+        assert_eq!(rainbow.colour(1.0), [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn maps_are_those_of_the_library() {
+        let bytes = |name: &str, t| known(name).expect("a name").colour(t).map(|c| (c * 255.0).round() as u8);
+        for n in 0..256 {
+            let t = n as f64 / 255.0;
+            assert_eq!(bytes("viridis", t), colorous::VIRIDIS.eval_rational(n, 256).as_array());
+            assert_eq!(bytes("turbo", t), colorous::TURBO.eval_rational(n, 256).as_array());
+        }
+        assert_eq!(bytes("coolwarm", 0.5), [221; 3]);
+        assert_eq!(bytes("viridis", 1.0), [253, 231, 37]);
     }
 }

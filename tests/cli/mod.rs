@@ -1,5 +1,6 @@
 //! The programs as programs: arguments, files, pipes, messages and exit codes.
 
+mod along;
 mod ceilings;
 mod channels;
 mod colours;

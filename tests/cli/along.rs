@@ -1,0 +1,93 @@
+//! Composites and largest values as pictures of the program.
+
+use super::render::decode_png;
+use super::{Work, floats, read_npy};
+
+/// The header of an array of singles, and its numbers.
+fn singles(work: &Work, name: &str) -> (String, Vec<f32>) {
+    let (header, bytes) = read_npy(&work.read(name));
+    (header, floats(&bytes))
+}
+
+const SIZE: &str = "--size 48x40";
+
+#[test]
+fn a_composite_is_light_and_opacity_in_an_array_and_colours_in_a_picture() {
+    let work = Work::with_file("--tolerance 1e-4");
+    let shown = "a.wspl --mode composite --transfer-function turbo --frames 2";
+    work.render(&format!("{shown} {SIZE} -o light.npy")).ok();
+    let (header, light) = singles(&work, "light.npy");
+    assert!(header.contains("'<f4'") && header.contains("(1, 40, 48, 4)"), "{header}");
+    let pixels: Vec<[f32; 4]> = light.as_chunks().0.to_vec();
+    assert!(pixels.iter().flatten().all(|v| (0.0..=1.0).contains(v)));
+    assert!(pixels.iter().any(|p| p[3] > 0.5) && pixels[0] == [0.0; 4], "something opaque, and nothing in the corner");
+    let png = |more: &str| decode_png(&work.render(&format!("{shown} {SIZE} -o - {more}")).ok().out);
+    let (dark, white) = (png(""), png("--background ffffff"));
+    for ((pixel, dark), white) in pixels.iter().zip(dark.chunks(3)).zip(white.chunks(3)) {
+        for i in 0..3 {
+            assert!((pixel[i] * 255.0 - f32::from(dark[i])).abs() < 0.6);
+            assert!(((pixel[i] + 1.0 - pixel[3]) * 255.0 - f32::from(white[i])).abs() < 0.6);
+        }
+    }
+    assert!(png("--threads 3") == png("--threads 1"));
+    assert!(png("--opacity 0:0,1:0").iter().all(|v| *v == 0), "nothing is opaque");
+    assert!(png("--range 0,100") != dark && png("--opacity-unit 5") != dark && png("--slabs 3") != dark);
+}
+
+#[test]
+fn frames_and_their_file_have_the_same_composite() {
+    let work = Work::with_file("--tolerance 0");
+    let shown = format!("--mode composite --frames 1:3 --splat-error 1e-4 {SIZE}");
+    work.render(&format!("a.wspl {shown} -o file.npy")).ok();
+    work.render(&format!("a.npy {shown} --method direct -o frames.npy")).ok();
+    let [(header, file), (_, frames)] = ["file.npy", "frames.npy"].map(|name| singles(&work, name));
+    assert!(header.contains("(2, 40, 48, 4)"), "{header}");
+    let off = file.iter().zip(&frames).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off < 1e-5, "{off:e}");
+}
+
+#[test]
+fn the_largest_value_takes_a_colour_map() {
+    let work = Work::with_file("");
+    let json = work.render(&format!("a.wspl --mode mip {SIZE} -o m_%d.png --colormap grey --json")).ok().json();
+    assert!(json["views"][0]["slabs"].as_u64().unwrap() > 3 && json["expected_error"].is_null());
+    work.render(&format!("a.wspl --mode mip {SIZE} -o m.npy")).ok();
+    work.render(&format!("a.wspl {SIZE} -o mean.npy")).ok();
+    let [(header, largest), (_, mean)] = ["m.npy", "mean.npy"].map(|name| singles(&work, name));
+    assert!(header.contains(", 40, 48)"), "{header}");
+    let both = || largest.iter().zip(&mean).filter(|(a, b)| !(a.is_nan() || b.is_nan()));
+    assert!(both().count() > 100 && both().all(|(largest, mean)| *largest > mean - 1e-2));
+}
+
+#[test]
+fn options_that_say_nothing_of_a_mode_are_refused() {
+    let work = Work::with_file("");
+    work.wavesplat("convert a.npy -o c.wspl --transfer-function turbo").ok();
+    for (args, words) in [
+        ("a.wspl --opacity 0:0,1:1", &["--opacity", "--mode composite"][..]),
+        ("a.wspl --opacity-unit 1", &["--opacity-unit", "--mode composite"]),
+        ("a.wspl --slabs 5", &["--slabs", "--mode composite"]),
+        ("a.wspl --transfer-function turbo", &["--transfer-function", "--mode composite", "--colormap"]),
+        ("a.wspl --mode mip --transfer-function turbo", &["--transfer-function", "--colormap"]),
+        ("a.wspl --mode composite --colormap turbo", &["--colormap", "--transfer-function"]),
+        ("a.wspl --mode composite --norm log", &["--norm"]),
+        ("a.wspl --mode composite --tau 1", &["--tau"]),
+        ("a.wspl --mode composite --quantity emission", &["--quantity"]),
+        ("a.wspl --mode composite --error-image e.npy", &["--error-image"]),
+        ("a.wspl --mode composite --slabs 0", &["--slabs", "1 to"]),
+        ("a.wspl --mode composite --opacity-unit 0", &["--opacity-unit", "above 0"]),
+        ("a.wspl --mode composite --opacity 0:0", &["--opacity", "two or more"]),
+        ("a.wspl --mode composite --opacity 1:0,0:1", &["--opacity", "ascend"]),
+        ("a.wspl --mode composite --opacity 0:0,1:2", &["--opacity", "0 to 1"]),
+        ("a.wspl --mode composite --opacity 0,1", &["--opacity", "0:0,0.5:0.1,1:0.8"]),
+        ("a.wspl --mode composite --opacity 0:NaN,1:1", &["--opacity", "0 to 1"]),
+        ("a.wspl --mode composite --transfer-function jet", &["--transfer-function jet", "viridis"]),
+        ("a.wspl --mode composite --range 1,1", &["--range"]),
+        ("a.wspl --mode composite --range 2,1", &["--range"]),
+        ("c.wspl --mode composite", &["--mode", "colours already"]),
+    ] {
+        work.render(&format!("{args} {SIZE} -o out.npy")).fails(2, words);
+    }
+    work.render(&format!("a.wspl --mode composite {SIZE} -o - --format gray16")).fails(2, &["gray16"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "c.wspl"]);
+}
