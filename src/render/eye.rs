@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::footprint::{Footprint, Method};
 use crate::volume::{BlockGrid, Grid, Region};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Means are of voxels of which some are not deeper than this over tau: exponentials lose digits at 708, and vanish.
 const DEEPEST: f64 = 640.0;
@@ -28,7 +29,7 @@ pub(super) struct Eye {
     /// The voxels that are splatted.
     pub(super) clip: Region,
     /// What splats instead of footprints.
-    pub(super) lattice: Option<Lattice>,
+    pub(super) lattice: Option<Arc<Lattice>>,
     /// As what that is reported.
     pub(super) method: Method,
     /// The error of the method, and of voxels left out for their depth.
@@ -64,7 +65,7 @@ impl Eye {
             })
             .flatten();
         let (lattice, instead) = lattice.unzip();
-        let method = instead.unwrap_or(method);
+        let (method, lattice) = (instead.unwrap_or(method), lattice.map(Arc::new));
         let (tau, stated_error) = (config.kernel.tau, method.stated_error);
         let deepest = f64::INFINITY;
         Ok(Self { camera, footprint, tau, grid, blocks, clip, lattice, method, stated_error, deepest, slab: None })
@@ -76,7 +77,7 @@ impl Eye {
 
     /// Pixels a side of a tile.
     pub(super) fn tile(&self) -> usize {
-        self.lattice.as_ref().map_or(TILE, Lattice::tile)
+        self.lattice.as_ref().map_or(TILE, |lattice| lattice.tile())
     }
 
     /// Whether a block is so deep that it may be left out.

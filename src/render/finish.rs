@@ -2,10 +2,11 @@
 
 use super::canvas::{Finished, Pixels};
 use super::certificate::Certificate;
+use super::project::Look;
 use super::scene::{Group, Inverse};
 use super::terms::Layout;
 use super::weights::{PixelWeight, Weights};
-use super::{Look, Quantity, RenderConfig};
+use super::{Quantity, RenderConfig};
 use crate::wavelet::{LANES, Lane};
 
 /// What turns the planes of a group into pixels.

@@ -35,9 +35,10 @@ use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
 use super::expectation::Expectation;
 use super::eye::Eye;
 use super::plan::{self, Budget};
+use super::project::Look;
 use super::scene::{Group, Inverse, Read, Scene};
 use super::terms::Layout;
-use super::{Look, Mode, RenderConfig, RenderReport, lap};
+use super::{Mode, RenderConfig, RenderReport, Rendered, ViewReport, lap};
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::volume::BlockGrid;
@@ -86,6 +87,27 @@ pub(super) fn cut(eye: &Eye, config: &RenderConfig) -> Result<Slabs> {
     Ok(Slabs { eyes, thickness: (to - from) / count as f64 })
 }
 
+/// Renders pictures of slabs, view by view; progress is in rows of pixels of slabs.
+pub(super) fn render(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    eyes: &[Eye],
+    progress: &dyn Progress,
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
+    let views = eyes.iter().map(|eye| cut(eye, config)).collect::<Result<Vec<_>>>()?;
+    let all: usize = views.iter().map(|slabs| slabs.eyes.len()).sum();
+    progress.start(Some((all * config.frames.len() * config.size()[1]) as u64));
+    for (view, slabs) in views.iter().enumerate() {
+        let mut sink = |frame, picture: &[f32]| sink(Rendered { view, frame, picture, error: None });
+        let ViewReport { slabs: count, expected_error, .. } = &mut report.views[view];
+        (*count, *expected_error) = (Some(slabs.eyes.len()), f64::NAN);
+        render_view(scene, config, slabs, progress, report, &mut sink)?;
+    }
+    Ok(())
+}
+
 /// Bytes that telling which tiles of a view's slabs can be seen takes.
 pub(super) fn bytes(eye: &Eye) -> usize {
     let tiles: usize = eye.camera.size.iter().map(|pixels| pixels.div_ceil(eye.tile())).product();
@@ -93,7 +115,7 @@ pub(super) fn bytes(eye: &Eye) -> usize {
 }
 
 /// Renders all frames from a view that is cut into slabs, giving each to `sink`.
-pub(super) fn render_view(
+fn render_view(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     slabs: &Slabs,

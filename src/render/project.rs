@@ -1,0 +1,203 @@
+//! Projections: the planes of a group of frames of every view, and from these its pictures.
+
+use super::amounts::BlockPlanes;
+use super::canvas::{self, Blocks, Canvas};
+use super::expectation::Expectation;
+use super::eye::Eye;
+use super::finish::Finish;
+use super::plan::{self, Budget};
+use super::scene::{Group, Read, Scene};
+use super::weights::Weights;
+use super::{RenderConfig, RenderReport, Rendered, lap};
+use crate::error::Result;
+use crate::progress::Progress;
+use std::borrow::Cow;
+use std::time::Instant;
+
+/// Renders projections, of as many views together as there is memory for.
+pub(super) fn project(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    eyes: &[Eye],
+    progress: &dyn Progress,
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
+    progress.start(Some((eyes.len() * config.frames.len()) as u64));
+    let mut sink = |rendered: Rendered<'_>| {
+        progress.advance(1);
+        sink(rendered)
+    };
+    let mut first = 0;
+    while first < eyes.len() {
+        let budget = Budget::of_most(config, scene, &eyes[first..]);
+        render_views(scene, config, (&budget, first), report, &mut sink)?;
+        first += budget.eyes().len();
+    }
+    Ok(())
+}
+
+/// Renders all frames from views that go together, the first of which is number `first_view`.
+fn render_views(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    (budget, first_view): (&Budget<'_>, usize),
+    report: &mut RenderReport,
+    sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+) -> Result<()> {
+    let mut clock = Instant::now();
+    let looks = budget.eyes().iter().map(|eye| Look::new(eye, config, budget)).collect::<Result<Vec<_>>>()?;
+    let expectations: Vec<_> = looks.iter().map(|look| Expectation::new(look, config)).collect();
+    lap(&mut clock, &mut report.weight_seconds);
+    let (mut rest, count) = (config.frames.as_slice(), scene.channels());
+    while let Some(first) = rest.first() {
+        let most = plan::in_group(scene, *first, rest);
+        let (now, later) = rest.split_at(budget.frames(scene, config, most));
+        let channel = |channel| render_channel(scene, config, (now, channel), (&looks, &expectations), budget, report);
+        let channels = (0..count).map(channel).collect::<Result<Vec<_>>>()?;
+        for (i, view) in (first_view..).take(looks.len()).enumerate() {
+            let expected = channels.iter().map(|views| views[i].1).sum::<f64>() / count as f64;
+            // Frame by frame, so that it is the same however frames are grouped.
+            now.iter().for_each(|_| report.views[view].expected_error += expected);
+            let pictures: Vec<&Pictures> = channels.iter().map(|views| &views[i].0).collect();
+            Pictures::give(&pictures, (view, now), sink)?;
+        }
+        rest = later;
+    }
+    Ok(())
+}
+
+/// Renders a channel of some frames from some views, again where more is found than its layout has room for: of each view the
+/// pictures, and the mean square of the errors that are expected.
+fn render_channel(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    (frames, channel): (&[usize], usize),
+    (looks, expectations): (&[Look<'_>], &[Expectation<'_>]),
+    budget: &Budget<'_>,
+    report: &mut RenderReport,
+) -> Result<Vec<(Pictures, f64)>> {
+    loop {
+        let before = report.clone();
+        let group = scene.group(frames, channel, config, &expectations[0])?;
+        let pictures = render_group(group.as_ref(), looks, config, budget, report)?;
+        let expected = |expectation| group.expected(&looks[0].eye.clip, expectation);
+        let expected = expectations.iter().map(expected).collect::<Result<Vec<_>>>()?;
+        match group.finish()? {
+            Read::AsExpected => return Ok(pictures.into_iter().zip(expected).collect()),
+            Read::Otherwise => *report = before,
+        }
+    }
+}
+
+impl Blocks for &dyn Group {
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        Group::planes(*self, block)
+    }
+}
+
+/// A view, and its sums of weights.
+#[derive(Debug)]
+pub(super) struct Look<'a> {
+    pub(super) eye: &'a Eye,
+    pub(super) weights: Weights,
+}
+
+impl<'a> Look<'a> {
+    fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
+        Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
+    }
+
+    /// Where nothing is weighed.
+    pub(super) fn of_no_weights(eye: &'a Eye) -> Self {
+        Self { eye, weights: Weights::default() }
+    }
+}
+
+/// The pictures of a channel of a group from one view.
+struct Pictures {
+    pixels: usize,
+    /// Those of the frames, and if they are certified, those of their errors.
+    all: Vec<f32>,
+}
+
+impl Pictures {
+    /// Gives the frames of all channels to the sink, the channels of each pixel side by side.
+    fn give(
+        channels: &[&Self],
+        (view, frames): (usize, &[usize]),
+        sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
+    ) -> Result<()> {
+        for (i, frame) in frames.iter().enumerate() {
+            let of = |i: usize| Self::together(channels, i);
+            let (picture, error) = (of(i), of(frames.len() + i));
+            sink(Rendered {
+                view,
+                frame: *frame,
+                picture: picture.as_deref().unwrap_or_default(),
+                error: error.as_deref(),
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The picture of a number, of all channels; none if there are not so many.
+    fn together<'a>(channels: &[&'a Self], i: usize) -> Option<Cow<'a, [f32]>> {
+        let of = |channel: &&'a Self| channel.all.get(i * channel.pixels..(i + 1) * channel.pixels);
+        let [first, others @ ..] = channels else { return None };
+        let first = of(first)?;
+        if others.is_empty() {
+            return Some(first.into());
+        }
+        let others: Vec<&[f32]> = others.iter().filter_map(of).collect();
+        let pixel = |(at, value): (usize, &f32)| std::iter::once(*value).chain(others.iter().map(move |c| c[at]));
+        Some(first.iter().enumerate().flat_map(pixel).collect())
+    }
+}
+
+/// Renders all frames of a group from some views.
+fn render_group(
+    group: &dyn Group,
+    looks: &[Look<'_>],
+    config: &RenderConfig,
+    budget: &Budget<'_>,
+    report: &mut RenderReport,
+) -> Result<Vec<Pictures>> {
+    let layout = group.layout();
+    let blocks = blocks_to_read(group, looks, report)?;
+    let finish: Vec<Finish<'_>> = looks.iter().map(|look| Finish::new(group, look, config)).collect();
+    let empty = |finish: &Finish<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
+    let mut pictures: Vec<Vec<f32>> = finish.iter().map(empty).collect();
+    for rows in budget.bands(&layout) {
+        let mut canvases: Vec<_> = looks.iter().map(|look| Canvas::new(look.eye, rows.clone(), &layout)).collect();
+        canvas::splat(&mut canvases, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
+        let mut clock = Instant::now();
+        for ((canvas, finish), pictures) in canvases.into_iter().zip(&finish).zip(&mut pictures) {
+            canvas.finish(pictures, |tile, pixels| finish.tile(tile, pixels));
+        }
+        lap(&mut clock, &mut report.inverse_seconds);
+    }
+    if config.certify {
+        let of_errors = pictures.iter().flat_map(|all| &all[layout.frames * budget.pixels()..]);
+        let largest = of_errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
+        report.certified_error = Some(largest);
+    }
+    Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
+}
+
+/// The blocks of a group that a pixel sees, and a word in the report on the others.
+fn blocks_to_read(group: &dyn Group, looks: &[Look<'_>], report: &mut RenderReport) -> Result<Vec<usize>> {
+    let eye = looks[0].eye;
+    let all_rows = 0..eye.camera.size[1];
+    let contents = group.blocks(&eye.clip)?;
+    report.add(&contents);
+    let mut blocks = contents.blocks;
+    let held = blocks.len();
+    blocks.retain(|b| looks.iter().any(|look| look.eye.reaches(*b, &all_rows)));
+    let reached = blocks.len();
+    blocks.retain(|b| looks.iter().any(|look| look.eye.sees(*b, &all_rows)));
+    report.blocks += eye.blocks.len() as u64;
+    report.blocks_outside += (held - reached) as u64;
+    report.blocks_dimmed += (reached - blocks.len()) as u64;
+    Ok(blocks)
+}

@@ -1,0 +1,102 @@
+//! What a rendering did.
+
+use super::eye::Eye;
+use super::scene::{Contents, LeftOut};
+use crate::camera::View;
+use serde::Serialize;
+
+/// What a rendering did.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RenderReport {
+    /// Frames rendered, of every view.
+    pub frames: usize,
+    /// How each view was splatted.
+    pub views: Vec<ViewReport>,
+    /// Blocks that the scene holds, over all windows touched and their channels; as what follows up to the parts, each time counted that frames
+    /// are rendered together, from views that are.
+    pub blocks: u64,
+    /// Blocks that were decoded, each time counted.
+    pub blocks_read: u64,
+    /// Blocks left out because they hold nothing in the region.
+    pub blocks_empty: u64,
+    /// Blocks left out because no pixel of any view sees them.
+    pub blocks_outside: u64,
+    /// Blocks left out because they lie so deep that what they add is within the splat error.
+    pub blocks_dimmed: u64,
+    /// Tiles of all slabs, of every group of frames.
+    pub tiles: u64,
+    /// Those among them that are clear whatever their blocks hold.
+    pub tiles_clear: u64,
+    /// Tiles of pictures that became opaque in all frames of a group, so that what is behind was left out.
+    pub tiles_opaque: u64,
+    /// What a looser tolerance left out of the blocks in the region, over all windows touched.
+    pub left_out: LeftOut,
+    /// What of these blocks was not read because it is of frames that were not asked for.
+    pub other_frames: LeftOut,
+    /// No sample that was splatted is further from the source's.
+    pub certified_sample_error: f64,
+    /// Of all views, the root mean square of what each view reports; NaN unless these are projections.
+    pub expected_error: f64,
+    /// The largest error that a pixel may have, if pictures are certified.
+    pub certified_error: Option<f64>,
+    /// Stored bytes that were read of blocks.
+    pub bytes_read: u64,
+    /// Nonzero coefficients splatted, each time counted.
+    pub coefficients: u64,
+    /// Seconds spent on the sums of weights.
+    pub weight_seconds: f64,
+    /// Seconds spent reading and decoding.
+    pub decode_seconds: f64,
+    /// Seconds spent splatting.
+    pub splat_seconds: f64,
+    /// Seconds spent on pixels: from a lattice, by the inverse transform and the division by weights.
+    pub inverse_seconds: f64,
+    /// Seconds from beginning to end, without the sink.
+    pub seconds: f64,
+}
+
+/// How a view was splatted.
+#[derive(Debug, Clone, Serialize)]
+pub struct ViewReport {
+    /// Degrees, as asked for.
+    pub azimuth: f64,
+    /// Degrees, as asked for.
+    pub elevation: f64,
+    /// Pixels per world unit.
+    pub scale: f64,
+    /// The splat method.
+    pub method: &'static str,
+    /// The slabs that the volume is cut into.
+    pub slabs: Option<usize>,
+    /// Its stated error, in the terms of the splat error that was asked for.
+    pub stated_splat_error: f64,
+    /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
+    /// splatting; in the pictures' unit.
+    pub expected_error: f64,
+}
+
+impl RenderReport {
+    /// Adds what a group says of its blocks.
+    pub(super) fn add(&mut self, contents: &Contents) {
+        self.blocks_empty += contents.empty;
+        self.left_out += contents.left_out;
+        self.other_frames += contents.other_frames;
+        self.certified_sample_error = self.certified_sample_error.max(contents.certified);
+    }
+
+    /// Turns sums over the frames of each view into root mean squares, and all these into one.
+    pub(super) fn sum_up_expected_errors(&mut self) {
+        let (frames, views) = (self.frames.max(1) as f64, self.views.len() as f64);
+        self.views.iter_mut().for_each(|view| view.expected_error = (view.expected_error / frames).sqrt());
+        let squares: f64 = self.views.iter().map(|view| view.expected_error * view.expected_error).sum();
+        self.expected_error = (squares / views).sqrt();
+    }
+}
+
+impl ViewReport {
+    pub(super) fn new(view: &View, eye: &Eye) -> Self {
+        let &View { azimuth, elevation, .. } = view;
+        let (scale, method, stated_splat_error) = (eye.camera.scale, eye.method.name, eye.stated_error);
+        Self { azimuth, elevation, scale, method, slabs: None, stated_splat_error, expected_error: 0.0 }
+    }
+}
