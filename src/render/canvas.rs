@@ -152,7 +152,7 @@ impl<'a> Finished<'a> {
     pub(super) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
             OfTile::Tiles(tiles) => {
-                let of_layers = planes.chunks_exact_mut(self.planes);
+                let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // of none there is nothing to load
                 tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
             }
             OfTile::Gather(gather) => gather.load(first, count, planes),
