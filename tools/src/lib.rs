@@ -6,5 +6,6 @@ pub mod eddy;
 pub mod lattice;
 pub mod output;
 pub mod random;
+mod scenes;
 pub mod sheet;
 pub mod synth;

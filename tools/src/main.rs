@@ -10,6 +10,7 @@ use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
 use wavesplat_tools::diff;
+use wavesplat_tools::eddy::Plate;
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
 
@@ -312,11 +313,11 @@ fn say(text: &str) {
 
 fn demo(args: &Demo) -> Result<()> {
     if args.frames_only {
-        return demo::write_frames(&args.output, demo::FRAMES);
+        return demo::write_frames(&args.output, Plate::default(), demo::FRAMES);
     }
-    let files = demo::Files { folder: args.output.clone() };
-    let table = demo::run(&files, &mut |step| say(&format!("{step} ...")))?;
-    let figure = files.figure();
+    let all = demo::Demo::new(args.output.clone());
+    let table = demo::run(&all, &mut |step| say(&format!("{step} ...")))?;
+    let figure = all.figure();
     wavesplat::cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
 }
 

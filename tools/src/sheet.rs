@@ -1,6 +1,6 @@
 //! Pictures next to one another: contact sheets, a colour bar, differences, labels.
 
-use crate::diff::measure::difference;
+use crate::diff::measure::of_pixels;
 use font8x8::legacy::BASIC_LEGACY;
 use std::io::Write;
 use wavesplat::error::{Error, Result};
@@ -10,6 +10,12 @@ pub type Rgb = [u8; 3];
 
 /// Pixels of a letter's side at size 1.
 pub const LETTER: usize = 8;
+/// Pixels between pictures of a sheet, and around a bar.
+pub const GAP: usize = 4;
+/// Pixels from one line of a title to the next.
+const LINE: usize = LETTER + 4;
+/// Pixels: the width of a bar, and its least height.
+const BAR: [usize; 2] = [16, 64];
 
 /// A picture; row 0 is at the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -95,6 +101,40 @@ pub fn colour_bar(width: usize, height: usize, colour: impl Fn(f64) -> Rgb) -> I
     Image::from_fn(width, height, |_, y| colour((last - y) as f64 / last.max(1) as f64))
 }
 
+/// The picture with a text above it, in lines no longer than it is wide.
+pub fn titled(picture: &Image, lines: &[&str], ink: Rgb, paper: Rgb) -> Image {
+    let band = lines.len() * LINE;
+    let mut all = Image::from_fn(picture.width, picture.height + band, |_, _| paper);
+    lines.iter().enumerate().for_each(|(n, line)| all.label(line, 0, n * LINE, 1, ink));
+    all.paste(picture, 0, band);
+    all
+}
+
+/// Pictures one above the other.
+pub fn stacked(pictures: &[Image], paper: Rgb) -> Image {
+    let width = pictures.iter().map(|p| p.width).max().unwrap_or(0);
+    let mut all = Image::from_fn(width, pictures.iter().map(|p| p.height).sum(), |_, _| paper);
+    let mut top = 0;
+    for picture in pictures {
+        all.paste(picture, 0, top);
+        top += picture.height;
+    }
+    all
+}
+
+/// A sheet with a colour bar at its right, and what its top, its middle and its bottom mean.
+pub fn with_bar(sheet: &Image, labels: &[String; 3], ink: Rgb, paper: Rgb, colour: impl Fn(f64) -> Rgb) -> Image {
+    let letters = labels.iter().map(String::len).max().unwrap_or(0);
+    let (left, height) = (sheet.width + GAP, sheet.height.max(BAR[1] + 2 * GAP));
+    let text = left + BAR[0] + GAP;
+    let mut all = Image::from_fn(text + letters * LETTER + GAP, height, |_, _| paper);
+    all.paste(sheet, 0, 0);
+    all.paste(&colour_bar(BAR[0], height - 2 * GAP, colour), left, GAP);
+    let rows = [GAP, (height - LETTER) / 2, height - GAP - LETTER];
+    labels.iter().zip(rows).for_each(|(label, y)| all.label(label, text, y, 1, ink));
+    all
+}
+
 /// Blue for 0 through cyan, green and yellow to red for 1 and more: hue 240 to 0 degrees, full saturation and value.
 pub fn difference_colour(value: f64) -> Rgb {
     let hue = 4.0 * (1.0 - value.clamp(0.0, 1.0)); // in sixths of the circle
@@ -105,20 +145,27 @@ pub fn difference_colour(value: f64) -> Rgb {
     [channel(0.0), channel(2.0), channel(4.0)]
 }
 
-/// |a - b| / scale in [`difference_colour`], as one picture of `width` pixels a row for each `height` rows.
+/// |a - b| / scale in [`difference_colour`], as one picture of `width` pixels a row for each `height` rows. A pixel has
+/// `channels` numbers, of which the one that differs most is shown.
 ///
 /// Where both have the background, NaN, it is black; where only one has it, the difference counts as 1.
 ///
 /// # Panics
 /// If `a` and `b` differ in length or do not consist of whole pictures.
-pub fn difference_images(a: &[f32], b: &[f32], [width, height]: [usize; 2], scale: f64) -> Vec<Image> {
-    assert!(a.len() == b.len() && a.len().is_multiple_of(width * height), "two stacks of whole pictures");
-    let colours: Vec<Rgb> = a.iter().zip(b).map(|(a, b)| heat(difference(*a, *b), scale)).collect();
+pub fn difference_images(
+    a: &[f32],
+    b: &[f32],
+    ([width, height], channels): ([usize; 2], usize),
+    scale: f64,
+) -> Vec<Image> {
+    let of_picture = width * height * channels;
+    assert!(a.len() == b.len() && a.len().is_multiple_of(of_picture), "two stacks of whole pictures");
+    let colours: Vec<Rgb> = of_pixels(a, b, channels).into_iter().map(|found| heat(found, scale)).collect();
     let picture = |pixels: &[Rgb]| Image { width, height, pixels: pixels.to_vec() };
     colours.chunks_exact(width * height).map(picture).collect()
 }
 
-/// A [`difference`] as a share of `scale` in [`difference_colour`]; black for none, where both are background.
+/// A difference as a share of `scale` in [`difference_colour`]; black for none, where both are background.
 pub fn heat(difference: Option<f64>, scale: f64) -> Rgb {
     match difference {
         None => [0; 3],
@@ -176,10 +223,34 @@ mod tests {
     #[test]
     fn differences_know_the_background() {
         let nan = f32::NAN;
-        let images = difference_images(&[1.0, nan, 2.0, nan], &[1.5, nan, 2.0, 0.0], [2, 1], 0.5);
+        let images = difference_images(&[1.0, nan, 2.0, nan], &[1.5, nan, 2.0, 0.0], ([2, 1], 1), 0.5);
         assert_eq!(images.len(), 2);
         assert_eq!(images[0].pixels, [RED, [0; 3]]);
         assert_eq!(images[1].pixels, [BLUE, RED]);
+    }
+
+    #[test]
+    fn a_pixel_shows_the_channel_that_differs_most() {
+        let images = difference_images(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.5, 3.0, 4.0], ([2, 1], 2), 0.5);
+        assert_eq!(images[0].pixels, [RED, BLUE]);
+    }
+
+    #[test]
+    fn a_bar_is_beside_the_smallest_sheet() {
+        let labels = ["1", "x", "0"].map(String::from);
+        let all = with_bar(&Image::from_fn(2, 2, |_, _| [0; 3]), &labels, RED, [7; 3], difference_colour);
+        assert_eq!(pixel(&all, 2 + GAP, GAP), difference_colour(1.0));
+        assert_eq!(pixel(&all, 2 + GAP, all.height - GAP - 1), difference_colour(0.0));
+        assert!(all.pixels.contains(&RED));
+    }
+
+    #[test]
+    fn titles_are_above_and_pictures_below_one_another() {
+        let named = titled(&plain(BLUE), &["I", ""], RED, [7; 3]);
+        assert_eq!((named.height, pixel(&named, 0, 2 * LINE)), (2 * LINE + 3, BLUE));
+        assert!(named.pixels[..LINE * 4].contains(&RED));
+        let stack = stacked(&[plain(RED), named], [9; 3]);
+        assert_eq!((stack.width, stack.height, pixel(&stack, 3, 2)), (4, 2 * LINE + 6, RED));
     }
 
     #[test]

@@ -11,6 +11,17 @@ pub fn difference(a: impl Into<f64>, b: impl Into<f64>) -> Option<f64> {
     }
 }
 
+/// The largest difference of the numbers of each pixel, which has `channels`; none where all are background in both.
+pub fn of_pixels<T: Copy + Into<f64>>(a: &[T], b: &[T], channels: usize) -> Vec<Option<f64>> {
+    let of_pixel = |(a, b): (&[T], &[T])| largest(a.iter().zip(b).map(|(a, b)| difference(*a, *b)));
+    a.chunks_exact(channels).zip(b.chunks_exact(channels)).map(of_pixel).collect()
+}
+
+/// The largest of some differences, unless there is none.
+pub fn largest(differences: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    differences.flatten().reduce(f64::max)
+}
+
 /// Sums over the numbers of two pictures, or of several pairs of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Differences {
@@ -136,6 +147,13 @@ mod tests {
         assert_eq!((found.mean(), found.rms()), (Some(8.0), Some(8.0)));
         let nothing = Differences::of(&[NAN], &[NAN]);
         assert!(nothing.is_identical() && nothing.mean().is_none() && nothing.psnr(1.0).is_none());
+    }
+
+    #[test]
+    fn a_pixel_is_its_channel_that_differs_most() {
+        let found =
+            of_pixels(&[1.0, 2.0, f64::NAN, f64::NAN, f64::NAN, 1.0], &[1.5, 5.0, f64::NAN, f64::NAN, 0.0, 1.0], 2);
+        assert_eq!(found, [Some(3.0), None, Some(f64::INFINITY)]);
     }
 
     #[test]

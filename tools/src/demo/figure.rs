@@ -1,0 +1,73 @@
+//! Figure 5: a row for each method, and a row for what each differs from the first.
+
+use super::{Demo, Run};
+use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, with_bar};
+use wavesplat::colour::{Norm, Scale, TransferFunction};
+use wavesplat::error::Result;
+use wavesplat::output::Output;
+use wavesplat::source::CHANNELS;
+
+/// The frames that are shown.
+const SHOWN: [usize; 4] = [5, 10, 15, 20];
+const PAPER: Rgb = [40; 3];
+const INK: Rgb = [255; 3];
+
+/// Draws the runs of three channels, of which the first is the truth.
+pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Result<()> {
+    let means = Scale::new(colours, (0.0, 1.0), Norm::Linear, [0; 3])?;
+    let bound = runs.iter().map(Run::bound).fold(0.0, f64::max);
+    let [pictures, differences] = bars(colours.range(), bound);
+    let sheets = [
+        with_bar(&methods(demo, runs, &means), &pictures, INK, PAPER, |share| means.colour_at(share)),
+        with_bar(&errors(demo, runs, bound), &differences, INK, PAPER, difference_colour),
+    ];
+    let path = demo.figure();
+    let mut out = Output::create(&path, true)?;
+    stacked(&sheets, PAPER).write_png(&mut out)?;
+    out.commit()
+}
+
+/// What the bars of the pictures and of the differences say, equally wide.
+fn bars((lo, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
+    let shares = ["bound".into(), format!("{bound:.3}"), "0".into()];
+    let labels = [[format!("{hi:.1e}"), "|J|, A/m^2".into(), format!("{lo:.1e}")], shares];
+    labels.map(|bar: [String; 3]| bar.map(|label| format!("{label:<10}")))
+}
+
+/// Rows of what the methods make of the shown frames.
+fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
+    let [width, height] = demo.size;
+    let mut rows = Vec::new();
+    for (letter, run) in ('a'..).zip(runs) {
+        let numbers = shown(run, demo.size);
+        for (frame, picture) in SHOWN.iter().zip(numbers.as_chunks::<3>().0.chunks_exact(width * height)) {
+            let image = Image::from_fn(width, height, |x, y| means.colour_of_channels(picture[y * width + x]));
+            rows.push(labelled(image, &format!("({letter}) {}, frame {frame}", run.name)));
+        }
+    }
+    contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
+}
+
+/// Rows of how far all others are from the first. A pixel is as far off as its channel that differs most.
+fn errors(demo: &Demo, runs: &[Run], bound: f64) -> Image {
+    let truth = shown(&runs[0], demo.size);
+    let mut rows = Vec::new();
+    for (letter, run) in ('a'..).skip(runs.len()).zip(&runs[1..]) {
+        let images = difference_images(&truth, &shown(run, demo.size), (demo.size, CHANNELS.len()), bound);
+        for (frame, image) in SHOWN.iter().zip(images) {
+            rows.push(labelled(image, &format!("({letter}) |{} - (a)|, frame {frame}", run.name)));
+        }
+    }
+    contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
+}
+
+fn labelled(mut image: Image, text: &str) -> Image {
+    image.label(text, 6, 6, 1, INK);
+    image
+}
+
+/// The shown frames out of all pictures.
+fn shown(run: &Run, [width, height]: [usize; 2]) -> Vec<f32> {
+    let numbers = width * height * CHANNELS.len();
+    SHOWN.iter().flat_map(|f| &run.pictures[f * numbers..(f + 1) * numbers]).copied().collect()
+}

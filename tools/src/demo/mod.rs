@@ -1,0 +1,230 @@
+//! The demo: the paper's experiment in small (sections 4.1 and 4.2), from a solver's frames to figure 5 and table 1.
+//!
+//! As in the paper, every sample is turned into red, green and blue before anything else, and all methods splat three
+//! channels. What the same methods take for one channel, which is coloured after it was projected, is printed below.
+
+mod figure;
+mod table;
+
+use crate::diff::measure::Differences;
+use crate::eddy::{Magnet, Plate, eddy_currents};
+use crate::output::{Format, Shape, Target};
+use crate::scenes::{MEMORY, converted, pictures, projection, quietly};
+use std::fs;
+use std::path::{Path, PathBuf};
+use wavesplat::camera::View;
+use wavesplat::cli::transfer_function;
+use wavesplat::colour::TransferFunction;
+use wavesplat::convert::{ConvertConfig, ConvertReport};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::mapped::Access;
+use wavesplat::progress::Silent;
+use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, What};
+use wavesplat::sample::SampleType;
+use wavesplat::source::{self, CHANNELS, FrameSource, OpenOptions};
+use wavesplat::verify::{Comparison, verify};
+use wavesplat::wavelet::Basis;
+
+/// Frames of the experiment.
+pub const FRAMES: usize = 32;
+/// The tolerance of the paper, about 5/256.
+const TOLERANCE: f64 = 0.02;
+/// What splatting may add, for all methods alike.
+const SPLAT_ERROR: f64 = TOLERANCE / 10.0;
+/// The paper's colours: small values blue, large ones red.
+const COLOURS: &str = "rainbow";
+/// Depths, in the plate's thickness, over which attenuation comes to a factor of e: the near face stands out.
+const ATTENUATION: f64 = 1.25;
+
+/// Where the demo's files are, and how much of everything there is.
+#[derive(Debug, Clone)]
+pub struct Demo {
+    /// The folder of all files.
+    pub folder: PathBuf,
+    /// What carries the currents.
+    pub plate: Plate,
+    /// Pixels of a picture.
+    pub size: [usize; 2],
+}
+
+impl Demo {
+    /// As large as the paper's, in a folder.
+    pub fn new(folder: PathBuf) -> Self {
+        Self { folder, plate: Plate::default(), size: [384, 256] }
+    }
+
+    fn frames(&self) -> PathBuf {
+        self.folder.join("frames")
+    }
+
+    /// Figure 5.
+    pub fn figure(&self) -> PathBuf {
+        self.folder.join("figure5.png")
+    }
+}
+
+/// What all methods do alike.
+#[derive(Debug, Clone, Copy)]
+enum Method {
+    Conventional,
+    Wavelets(Basis, usize),
+}
+
+/// In the order of figure 5.
+const METHODS: [(&str, Method); 3] = [
+    ("conventional", Method::Conventional),
+    ("Haar", Method::Wavelets(Basis::Haar, 32)),
+    ("Multi", Method::Wavelets(Basis::Multi, 33)),
+];
+
+/// One method's pictures and what they cost.
+struct Run {
+    name: &'static str,
+    /// All frames, one after another.
+    pictures: Vec<f32>,
+    render: RenderReport,
+    /// Of a method with coefficients: the conversion, and the comparison with the frames.
+    converted: Option<(ConvertReport, Comparison)>,
+}
+
+impl Run {
+    /// Seconds to transform, to splat and to invert; with reading, as far as it is not part of the transform.
+    fn seconds(&self) -> [f64; 3] {
+        let RenderReport { decode_seconds, splat_seconds, inverse_seconds, .. } = &self.render;
+        let transform = self.converted.as_ref().map_or(0.0, |(report, _)| report.seconds);
+        [transform, decode_seconds + splat_seconds, *inverse_seconds]
+    }
+
+    fn total(&self) -> f64 {
+        self.seconds().iter().sum()
+    }
+
+    /// The guaranteed bound; the conventional method needs none.
+    fn bound(&self) -> f64 {
+        self.converted.as_ref().map_or(0.0, |(report, _)| report.delta)
+    }
+
+    /// The largest difference of any pixel and channel from those of another run, as a share of the bound.
+    fn pixel_share(&self, truth: &Self) -> f64 {
+        Differences::of(&self.pictures, &truth.pictures).largest() / self.bound()
+    }
+}
+
+/// Solves, converts, renders and compares; draws figure 5 and returns table 1 as text. `say` hears what is going on.
+///
+/// # Errors
+/// Files that cannot be written or read again.
+pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
+    let [coloured, plain] = demo.experiment(say)?;
+    Ok(table::text(demo, &coloured, &plain))
+}
+
+/// Writes the solver's frames of |J| (A/m^2) as `frame_0000.npy` and so on.
+///
+/// # Errors
+/// A folder or files that cannot be written.
+pub fn write_frames(folder: &Path, plate: Plate, frames: usize) -> Result<()> {
+    let shape = Shape { dims: plate.dims, frames, ty: SampleType::F32 };
+    let mut solution = eddy_currents(plate, Magnet::default(), frames);
+    fs::create_dir_all(folder).map_err(|e| Error::io(folder, "creating", e))?;
+    Target::Directory(folder.into(), Format::Npy).write(&shape, |_, bytes| {
+        let values = solution.next().into_iter().flatten();
+        bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
+    })
+}
+
+impl Demo {
+    fn source(&self) -> Result<Box<dyn FrameSource>> {
+        let spacing = Some([self.plate.spacing; 3]);
+        source::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
+    }
+
+    /// All methods with three channels, of which figure 5 is drawn, and with one.
+    fn experiment(&self, say: &mut dyn FnMut(&str)) -> Result<[Vec<Run>; 2]> {
+        let [x, y, z] = self.plate.dims;
+        say(&format!("solving for eddy currents in a plate under a passing magnet ({x}x{y}x{z}, {FRAMES} frames)"));
+        write_frames(&self.frames(), self.plate, FRAMES)?;
+        let colours = transfer_function(COLOURS, None, (&[], self.source()?.as_mut()), None, &quietly())?;
+        let coloured = self.all_methods(Some(&colours), say)?;
+        figure::draw(self, &coloured, &colours)?;
+        Ok([coloured, self.all_methods(None, say)?])
+    }
+
+    /// In colours three channels, else one.
+    fn all_methods(&self, colours: Option<&TransferFunction>, say: &mut dyn FnMut(&str)) -> Result<Vec<Run>> {
+        let channels = colours.map_or(1, |_| CHANNELS.len());
+        let run = |(name, method): (&'static str, Method)| {
+            say(&format!("{channels} channel(s): {name}"));
+            match method {
+                Method::Conventional => self.conventional(name, colours),
+                Method::Wavelets(basis, window) => self.by_coefficients(name, basis, window, colours),
+            }
+        };
+        METHODS.into_iter().map(run).collect()
+    }
+
+    fn conventional(&self, name: &'static str, colours: Option<&TransferFunction>) -> Result<Run> {
+        let mut scene = match colours {
+            Some(colours) => FrameScene::coloured(self.source()?, None, colours.clone()),
+            None => FrameScene::new(self.source()?, None),
+        };
+        let (pictures, render) = self.pictures(&mut scene)?;
+        Ok(Run { name, pictures, render, converted: None })
+    }
+
+    fn by_coefficients(
+        &self,
+        name: &'static str,
+        basis: Basis,
+        window: usize,
+        colours: Option<&TransferFunction>,
+    ) -> Result<Run> {
+        let ending = colours.map_or("-one-channel.wspl", |_| ".wspl");
+        let path = self.folder.join(name.to_lowercase() + ending);
+        let config =
+            ConvertConfig { colours: colours.cloned(), ..ConvertConfig::new(basis, window, TOLERANCE, MEMORY) };
+        let report = converted(self.source()?.as_mut(), &config, &path)?;
+        let open = || CoefficientFile::open(&path, Access::Map);
+        let compared = verify(&open()?, Some(self.source()?.as_mut()), MEMORY, &Silent)?.against.unwrap_or_default();
+        let (pictures, render) = self.pictures(&mut CoefficientScene::new(open()?, What::Coefficients))?;
+        Ok(Run { name, pictures, render, converted: Some((report, compared)) })
+    }
+
+    /// All frames of a scene, seen obliquely from above.
+    fn pictures(&self, scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
+        let view = View { azimuth: 25.0, elevation: 55.0, roll: 0.0, size: self.size, scale: None, center: None };
+        let thickness = self.plate.spacing * self.plate.dims[2] as f64;
+        let tau = 1.0 / (ATTENUATION * thickness);
+        let config = projection(scene.grid(), view, tau, (0..FRAMES).collect(), SPLAT_ERROR)?;
+        pictures(scene, &config)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_plate_gives_the_figure_and_a_table_within_the_bound() {
+        let folder = tempfile::tempdir().unwrap();
+        let plate = Plate { dims: [38, 38, 11], spacing: 4e-3, ..Plate::default() };
+        let demo = Demo { folder: folder.path().into(), plate, size: [72, 48] };
+        let mut said = 0;
+        let [runs, plain] = demo.experiment(&mut |_| said += 1).unwrap();
+        assert_eq!(said, 7, "the solver, and three methods twice");
+        let table = table::text(&demo, &runs, &plain);
+        assert!(table.contains("399.3") && table.contains("1643.0"), "{table}");
+        let file = std::io::BufReader::new(fs::File::open(demo.figure()).unwrap());
+        let info = png::Decoder::new(file).read_info().unwrap().info().size();
+        assert!(info.0 as usize > 4 * 72 && info.1 as usize > 5 * 48, "{info:?}");
+        assert!(runs.iter().all(|run| run.pictures.len() == FRAMES * 72 * 48 * 3));
+        for run in &runs[1..] {
+            let (report, compared) = run.converted.as_ref().unwrap();
+            assert!((report.delta - TOLERANCE).abs() < 1e-9, "of full brightness: {}", report.delta);
+            assert!(compared.largest_share_of_bound <= 1.0 && compared.series_outside == 0, "{compared:?}");
+            assert!((0.01..1.0).contains(&run.pixel_share(&runs[0])), "{}", run.pixel_share(&runs[0]));
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Table 1 beside the paper's, with what the paper could not say: sizes and errors.
+
+use super::{Demo, FRAMES, Run, TOLERANCE};
+use std::fmt::Write as _;
+
+/// What the paper measured of a method.
+struct Paper {
+    name: &'static str,
+    /// To transform, to splat and to invert, where it tells them apart.
+    seconds: Option<[f64; 3]>,
+    total: f64,
+}
+
+const PAPER: [Paper; 3] = [
+    Paper { name: "Haar", seconds: Some([68.0, 323.3, 8.0]), total: 399.3 },
+    Paper { name: "Multi", seconds: Some([202.8, 341.6, 15.4]), total: 559.8 },
+    Paper { name: "conventional", seconds: None, total: 1643.0 },
+];
+
+/// The tables of runs with three channels and with one, of each of which the first is the conventional method.
+pub(super) fn text(demo: &Demo, coloured: &[Run], plain: &[Run]) -> String {
+    let [width, height] = demo.size;
+    let mut text = format!(
+        "Table 1: {FRAMES} frames of {width}x{height} pixels, coloured before the transform, tolerance {TOLERANCE} (seconds)\n\n\
+         {:14}{:^49}{:^48}\n",
+        "", "here", "in the paper"
+    );
+    let columns = format!("{:>9}{:>11}{:>9}{:>9}{:>8}", "transform", "splatting", "inverse", "total", "ratio");
+    let _ = writeln!(text, "{:14}{columns}   {columns}", "");
+    for paper in &PAPER {
+        if let Some(run) = coloured.iter().find(|run| run.name == paper.name) {
+            let here = cells(Some(run.seconds()), run.total(), coloured[0].total(), 3);
+            let there = cells(paper.seconds, paper.total, PAPER[2].total, 1);
+            let _ = writeln!(text, "{:14}{here}   {there}", run.name);
+        }
+    }
+    text + &sizes(coloured, plain) + NOTES
+}
+
+/// Seconds, and how often they fit into those of the conventional method.
+fn cells(seconds: Option<[f64; 3]>, total: f64, conventional: f64, places: usize) -> String {
+    let cell = |n: usize| seconds.map_or("-".into(), |seconds| format!("{:.places$}", seconds[n]));
+    let ratio = format!("{:.1}", conventional / total);
+    format!("{:>9}{:>11}{:>9}{total:>9.places$}{ratio:>8}", cell(0), cell(1), cell(2))
+}
+
+/// What the files hold and how far off they are; and the same for one channel, with what that takes.
+fn sizes(coloured: &[Run], plain: &[Run]) -> String {
+    let mut text = format!(
+        "\n{:22}{:>12}{:>10}{:>20}\n{:22}{:>12}{:>10}{:>10}{:>10}{:>10}{:>8}\n",
+        "",
+        "coefficients",
+        "file",
+        "largest error/bound",
+        "",
+        "per sample",
+        "bytes",
+        "voxel",
+        "pixel",
+        "seconds",
+        "ratio"
+    );
+    for (channels, runs) in [("3 channels", coloured), ("1 channel", plain)] {
+        for run in runs.iter().skip(1).chain(&runs[..1]) {
+            let (name, [seconds, ratio]) = (run.name, [run.total(), runs[0].total() / run.total()]);
+            let _ = writeln!(
+                text,
+                "{:22}{}{seconds:>10.3}{ratio:>8.1}",
+                format!("{name}, {channels}"),
+                size(run, &runs[0])
+            );
+        }
+    }
+    text
+}
+
+/// The columns of a file; the conventional method has none.
+fn size(run: &Run, truth: &Run) -> String {
+    let Some((report, compared)) = &run.converted else {
+        return format!("{:>12}{:>10}{:>10}{:>10}", "-", "-", "-", "-");
+    };
+    let (voxel, pixel) = (compared.largest_share_of_bound, run.pixel_share(truth));
+    format!("{:>12.4}{:>10}{voxel:>10.4}{pixel:>10.4}", report.coefficients_per_sample, report.output_bytes)
+}
+
+const NOTES: &str = "
+Coefficients of three channels are counted together. One channel is coloured after it was projected, which takes no new
+conversion. A further view costs no transform. Both sides share footprints among frames; the sum of weights is left out.
+";

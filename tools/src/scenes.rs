@@ -1,0 +1,63 @@
+//! What the demo and the gallery have in common: archives to files, and scenes to pictures.
+
+use std::path::Path;
+use wavesplat::camera::View;
+use wavesplat::cli::{CommonArgs, Size};
+use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
+use wavesplat::error::Result;
+use wavesplat::footprint::Kernel;
+use wavesplat::output::Output;
+use wavesplat::progress::Silent;
+use wavesplat::render::{Mode, Quantity, RenderConfig, RenderReport, Scene, render};
+use wavesplat::source::FrameSource;
+use wavesplat::volume::Grid;
+
+/// Bytes that a conversion or a rendering may allocate.
+pub(crate) const MEMORY: usize = 512 << 20;
+
+/// What the programs' functions want of options, where there are none.
+pub(crate) fn quietly() -> CommonArgs {
+    CommonArgs { threads: None, memory: Size(MEMORY), quiet: true, verbose: false, json: false }
+}
+
+/// Converts an archive to the file `path`, which is replaced.
+pub(crate) fn converted(source: &mut dyn FrameSource, config: &ConvertConfig, path: &Path) -> Result<ConvertReport> {
+    let mut out = Output::create(path, true)?;
+    let report = convert(source, config, path, &mut out, &Silent)?;
+    out.commit()?;
+    Ok(report)
+}
+
+/// Projections of some frames: means, attenuated by `tau` per world unit of depth.
+pub(crate) fn projection(
+    grid: &Grid,
+    view: View,
+    tau: f64,
+    frames: Vec<usize>,
+    splat_error: f64,
+) -> Result<RenderConfig> {
+    Ok(RenderConfig {
+        mode: Mode::Projection,
+        views: vec![view],
+        kernel: Kernel::new(None, tau, grid)?,
+        quantity: Quantity::Mean,
+        frames,
+        region: None,
+        splat_error,
+        allowed: None,
+        limited: Default::default(),
+        certify: false,
+        memory: MEMORY,
+        reserved: 0,
+    })
+}
+
+/// All frames, one after another.
+pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<f32>, RenderReport)> {
+    let mut all = Vec::new();
+    let report = render(scene, config, &Silent, &mut |rendered| {
+        all.extend_from_slice(rendered.picture);
+        Ok(())
+    })?;
+    Ok((all, report))
+}
