@@ -1,7 +1,7 @@
 //! Figure 5: a row for each method, and a row for what each differs from the first.
 
 use super::{Demo, Run};
-use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, with_bar};
+use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, titled, with_bar};
 use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::error::Result;
 use wavesplat::output::Output;
@@ -42,7 +42,7 @@ fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
         let numbers = shown(run, demo.size);
         for (frame, picture) in SHOWN.iter().zip(numbers.as_chunks::<3>().0.chunks_exact(width * height)) {
             let image = Image::from_fn(width, height, |x, y| means.colour_of_channels(picture[y * width + x]));
-            rows.push(labelled(image, &format!("({letter}) {}, frame {frame}", run.name)));
+            rows.push(named(&image, &format!("({letter}) {}, frame {frame}", run.name)));
         }
     }
     contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
@@ -55,15 +55,14 @@ fn errors(demo: &Demo, runs: &[Run], bound: f64) -> Image {
     for (letter, run) in ('a'..).skip(runs.len()).zip(&runs[1..]) {
         let images = difference_images(&truth, &shown(run, demo.size), (demo.size, CHANNELS.len()), bound);
         for (frame, image) in SHOWN.iter().zip(images) {
-            rows.push(labelled(image, &format!("({letter}) |{} - (a)|, frame {frame}", run.name)));
+            rows.push(named(&image, &format!("({letter}) |{} - (a)|, frame {frame}", run.name)));
         }
     }
     contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
 }
 
-fn labelled(mut image: Image, text: &str) -> Image {
-    image.label(text, 6, 6, 1, INK);
-    image
+fn named(image: &Image, name: &str) -> Image {
+    titled(image, &[name], INK, PAPER)
 }
 
 /// The shown frames out of all pictures.

@@ -22,7 +22,7 @@ use wavesplat::mapped::Access;
 use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, What};
 use wavesplat::sample::SampleType;
-use wavesplat::source::{self, CHANNELS, FrameSource, OpenOptions};
+use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::verify::{Comparison, verify};
 use wavesplat::wavelet::Basis;
 
@@ -34,8 +34,9 @@ const TOLERANCE: f64 = 0.02;
 const SPLAT_ERROR: f64 = TOLERANCE / 10.0;
 /// The paper's colours: small values blue, large ones red.
 const COLOURS: &str = "rainbow";
-/// Depths, in the plate's thickness, over which attenuation comes to a factor of e: the near face stands out.
-const ATTENUATION: f64 = 1.25;
+/// The share of the plate's thickness over which attenuation comes to a factor of e: currents keep near the face that the
+/// magnet passes, and through the whole plate their mean would leave nothing but the first colours.
+const ATTENUATION: f64 = 0.1;
 
 /// Where the demo's files are, and how much of everything there is.
 #[derive(Debug, Clone)]
@@ -51,7 +52,7 @@ pub struct Demo {
 impl Demo {
     /// As large as the paper's, in a folder.
     pub fn new(folder: PathBuf) -> Self {
-        Self { folder, plate: Plate::default(), size: [384, 256] }
+        Self { folder, plate: Plate::default(), size: [240, 240] }
     }
 
     fn frames(&self) -> PathBuf {
@@ -153,9 +154,9 @@ impl Demo {
 
     /// In colours three channels, else one.
     fn all_methods(&self, colours: Option<&TransferFunction>, say: &mut dyn FnMut(&str)) -> Result<Vec<Run>> {
-        let channels = colours.map_or(1, |_| CHANNELS.len());
+        let channels = colours.map_or("one channel", |_| "three channels");
         let run = |(name, method): (&'static str, Method)| {
-            say(&format!("{channels} channel(s): {name}"));
+            say(&format!("{name}, {channels}"));
             match method {
                 Method::Conventional => self.conventional(name, colours),
                 Method::Wavelets(basis, window) => self.by_coefficients(name, basis, window, colours),
@@ -191,9 +192,9 @@ impl Demo {
         Ok(Run { name, pictures, render, converted: Some((report, compared)) })
     }
 
-    /// All frames of a scene, seen obliquely from above.
+    /// All frames of a scene, seen from above, where the magnet passes.
     fn pictures(&self, scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
-        let view = View { azimuth: 25.0, elevation: 55.0, roll: 0.0, size: self.size, scale: None, center: None };
+        let view = View { azimuth: 0.0, elevation: 90.0, roll: 0.0, size: self.size, scale: None, center: None };
         let thickness = self.plate.spacing * self.plate.dims[2] as f64;
         let tau = 1.0 / (ATTENUATION * thickness);
         let config = projection(scene.grid(), view, tau, (0..FRAMES).collect(), SPLAT_ERROR)?;

@@ -39,7 +39,7 @@ pub(super) fn text(demo: &Demo, coloured: &[Run], plain: &[Run]) -> String {
 
 /// Seconds, and how often they fit into those of the conventional method.
 fn cells(seconds: Option<[f64; 3]>, total: f64, conventional: f64, places: usize) -> String {
-    let cell = |n: usize| seconds.map_or("-".into(), |seconds| format!("{:.places$}", seconds[n]));
+    let cell = |n: usize| seconds.filter(|s| s[n] > 0.0).map_or("-".into(), |s| format!("{:.places$}", s[n]));
     let ratio = format!("{:.1}", conventional / total);
     format!("{:>9}{:>11}{:>9}{total:>9.places$}{ratio:>8}", cell(0), cell(1), cell(2))
 }
