@@ -68,6 +68,16 @@ impl Scale {
         bytes(std::array::from_fn(seen))
     }
 
+    /// The colour of a pixel: of a value, of channels, or of light and its opacity.
+    pub fn colour_of_pixel(&self, numbers: &[f32]) -> Rgb {
+        match *numbers {
+            [value] => self.colour(value),
+            [r, g, b] => self.colour_of_channels([r, g, b]),
+            [r, g, b, opacity] => self.over_background([r, g, b], opacity),
+            _ => self.background,
+        }
+    }
+
     /// The colour at a share of the range, 0 to 1.
     pub fn colour_at(&self, share: f64) -> Rgb {
         let tabled = self.table.get((share * f64::from(SHARES)).round() as usize);

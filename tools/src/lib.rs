@@ -3,6 +3,7 @@ pub mod bench;
 pub mod demo;
 pub mod diff;
 pub mod eddy;
+pub mod gallery;
 pub mod lattice;
 pub mod output;
 pub mod random;

@@ -1,9 +1,10 @@
-//! The program: the demo, synthetic archives, differences of pictures and the benchmark.
+//! The program: the demo, the gallery, synthetic archives, differences of pictures and the benchmark.
 
 use clap::{Args, Parser, Subcommand};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use wavesplat::cli::InputArgs;
 use wavesplat::error::{Error, Result};
 use wavesplat::sample::SampleType;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
@@ -11,6 +12,7 @@ use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
 use wavesplat_tools::diff;
 use wavesplat_tools::eddy::Plate;
+use wavesplat_tools::gallery::{self, Gallery};
 use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
 
@@ -21,6 +23,8 @@ Examples:
   wavesplat-tools synth sparse --dims 256x256x256x500 --dtype u8 -o frames/
   wavesplat-tools synth noise --dims 64x64x64x10 --format raw -o - | wc -c
   wavesplat-tools demo --frames-only -o eddy/
+  wavesplat-tools gallery
+  wavesplat-tools gallery demo mine.npy 'frames/*.vti' --spacing 1,1,2 -o pictures
   wavesplat-tools diff before.png after.png -o difference.png
   wavesplat-tools diff exact.npy lossy.npy --fail-above 1e-3 --json
   wavesplat-tools bench -o bench-output
@@ -43,6 +47,8 @@ struct Cli {
 enum Command {
     /// Eddy currents in an aluminium plate under a passing magnet
     Demo(Demo),
+    /// Pictures of archives in every mode, on one sheet
+    Gallery(Box<GalleryArgs>),
     /// Write a synthetic archive
     Synth(SynthArgs),
     /// Compare two pictures or two stacks of pictures
@@ -65,6 +71,18 @@ struct Demo {
     /// The folder to write to
     #[arg(short, long, value_name = "DIR", default_value = "demo-output")]
     output: PathBuf,
+}
+
+#[derive(Args)]
+struct GalleryArgs {
+    /// demo, a kind of synthetic archive, or frames as wavesplat convert takes them, in one name each
+    #[arg(value_name = "ARCHIVE", default_values = gallery::USUAL)]
+    archives: Vec<String>,
+    /// The folder of gallery.png and the coefficient files
+    #[arg(short, long, value_name = "DIR", default_value = "gallery-output")]
+    output: PathBuf,
+    #[command(flatten)]
+    input: InputArgs,
 }
 
 #[derive(Args)]
@@ -321,6 +339,13 @@ fn demo(args: &Demo) -> Result<()> {
     wavesplat::cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
 }
 
+fn gallery(args: &GalleryArgs) -> Result<()> {
+    let GalleryArgs { archives, output, input } = args;
+    let all = Gallery { archives: archives.clone(), input: input.clone(), folder: output.clone(), side: gallery::SIDE };
+    all.draw(&mut |step| say(&format!("{step} ...")))?;
+    wavesplat::cli::print(&format!("{}\n", all.sheet().display()))
+}
+
 fn synth(args: &SynthArgs) -> Result<()> {
     let [nx, ny, nz, frames] = args.dims;
     let shape = Shape { dims: [nx, ny, nz], frames, ty: args.dtype };
@@ -381,6 +406,7 @@ fn report(error: &Error) -> ExitCode {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo(&args),
+        Command::Gallery(args) => gallery(&args),
         Command::Synth(args) => synth(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Bench(args) => match &args.other {

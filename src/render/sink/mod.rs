@@ -88,19 +88,10 @@ pub struct SinkConfig {
 }
 
 impl SinkConfig {
-    /// The colour of a pixel.
-    fn colour(&self, pixel: &[f32]) -> Rgb {
-        match *pixel {
-            [value] => self.colours.colour(value),
-            [r, g, b] => self.colours.colour_of_channels([r, g, b]),
-            [r, g, b, opacity] => self.colours.over_background([r, g, b], opacity),
-            _ => self.colours.background(),
-        }
-    }
-
     /// A picture in colours, and what is drawn into it.
     fn image(&self, frame: usize, picture: Picture<'_>) -> Vec<Rgb> {
-        let mut image: Vec<Rgb> = picture.chunks_exact(self.pixel.numbers()).map(|pixel| self.colour(pixel)).collect();
+        let mut image: Vec<Rgb> =
+            picture.chunks_exact(self.pixel.numbers()).map(|pixel| self.colours.colour_of_pixel(pixel)).collect();
         if let Some(annotation) = &self.annotation {
             let scale = (self.pixel != Pixel::Channels).then_some(&self.colours);
             annotation.draw(&mut image, self.size[0], frame, self.colours.background(), scale);

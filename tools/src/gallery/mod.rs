@@ -1,0 +1,247 @@
+//! The gallery: what each mode makes of an archive, a row of pictures for each.
+
+mod tiles;
+
+use crate::demo;
+use crate::eddy::Plate;
+use crate::output::{Format, Shape, Target};
+use crate::scenes::{MEMORY, converted, pictures, projection, quietly};
+use crate::sheet::{GAP, Image, LETTER, Rgb, contact_sheet, stacked, titled};
+use crate::synth::{Kind, Synth};
+use clap::ValueEnum;
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tiles::{Look, Tile};
+use wavesplat::camera::View;
+use wavesplat::cli::{InputArgs, Numbers};
+use wavesplat::colour::TransferFunction;
+use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+use wavesplat::footprint::Kernel;
+use wavesplat::mapped::Access;
+use wavesplat::output::Output;
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, What};
+use wavesplat::sample::SampleType;
+use wavesplat::source::FrameSource;
+
+/// What is shown unless archives are given.
+pub const USUAL: [&str; 2] = ["demo", "moving"];
+/// Pixels a side of a picture.
+pub const SIDE: usize = 256;
+/// Of all conversions.
+const TOLERANCE: f64 = 1e-3;
+const WINDOW: usize = 32;
+/// Of synthetic archives.
+const SHAPE: Shape = Shape { dims: [64; 3], frames: 32, ty: SampleType::F32 };
+/// Of pictures: azimuth and elevation.
+const VIEW: [f64; 2] = [30.0, 35.0];
+/// The share of the pixels of the largest values that the colours of samples reach: a few samples may be far larger.
+const REACHED: f64 = 0.95;
+const PAPER: Rgb = [40; 3];
+const INK: Rgb = [255; 3];
+
+/// What is shown, and where it goes.
+#[derive(Debug, Clone)]
+pub struct Gallery {
+    /// `demo`, kinds of synthetic archives, or inputs as `wavesplat convert` takes them.
+    pub archives: Vec<String>,
+    /// How inputs are read.
+    pub input: InputArgs,
+    /// The folder of all files.
+    pub folder: PathBuf,
+    /// Pixels a side of a picture.
+    pub side: usize,
+}
+
+impl Gallery {
+    /// The sheet of all pictures.
+    pub fn sheet(&self) -> PathBuf {
+        self.folder.join("gallery.png")
+    }
+
+    /// Makes, converts and renders all archives. `say` hears what is going on.
+    ///
+    /// # Errors
+    /// Archives that cannot be read, two of one name, or files that cannot be written.
+    pub fn draw(&self, say: &mut dyn FnMut(&str)) -> Result<()> {
+        fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, "creating", e))?;
+        let mut names = HashSet::new();
+        let rows = self.archives.iter().map(|archive| {
+            let name = name(archive);
+            if !names.insert(name.clone()) {
+                return Err(Error::usage(format!("{archive}: there are two archives of the name {name}")));
+            }
+            self.row(archive, &name, say)
+        });
+        let rows = rows.collect::<Result<Vec<_>>>()?;
+        let mut out = Output::create(&self.sheet(), true)?;
+        stacked(&rows, PAPER).write_png(&mut out)?;
+        out.commit()
+    }
+
+    /// The pictures of an archive, with what it is above them.
+    fn row(&self, archive: &str, name: &str, say: &mut dyn FnMut(&str)) -> Result<Image> {
+        let input = self.made(archive, name, say)?;
+        say(&format!("converting {archive}"));
+        let file = self.converted(&input, name, None)?;
+        say(&format!("rendering {archive} in all modes"));
+        let mut scene = CoefficientScene::new(file.clone(), What::Coefficients);
+        let base = self.base(&scene)?;
+        let look = self.look(&mut scene, &base, &file)?;
+        let mut images = Vec::new();
+        for tile in look.tiles()? {
+            images.push(self.shown(&mut scene, &base, &tile)?);
+        }
+        say(&format!("converting {archive} again, in colours, and rendering these"));
+        let tile = look.before_all()?;
+        let file = self.converted(&input, &format!("{name}-colours"), Some(&tile.map))?;
+        images.push(self.shown(&mut CoefficientScene::new(file, What::Coefficients), &base, &tile)?);
+        let columns = images.len();
+        let sheet = contact_sheet(&images, columns, GAP, PAPER);
+        Ok(titled(&sheet, &["", &self.title(name, &scene, &base, look.range)], INK, PAPER))
+    }
+
+    fn title(&self, name: &str, scene: &dyn Scene, base: &RenderConfig, (lo, hi): (f64, f64)) -> String {
+        let ([x, y, z], frames) = (scene.grid().dims, scene.frames().unwrap_or(0));
+        let [azimuth, elevation] = VIEW;
+        let seen = format!("--frames {} --view {azimuth},{elevation}", base.frames[0]);
+        format!(" {name}: {x}x{y}x{z} voxels, {frames} frames; {seen}; samples in colours: --range {lo:.3e},{hi:.3e}")
+    }
+
+    /// Makes an archive that is not given; says where it is, and how it is read.
+    fn made(&self, archive: &str, name: &str, say: &mut dyn FnMut(&str)) -> Result<(PathBuf, InputArgs)> {
+        let plain =
+            InputArgs { spacing: None, origin: None, dims: None, dtype: None, variable: None, ..self.input.clone() };
+        if archive == "demo" {
+            say("solving for eddy currents in a plate under a passing magnet");
+            let (folder, plate) = (self.folder.join(name), Plate::default());
+            demo::write_frames(&folder, plate, demo::FRAMES)?;
+            return Ok((folder, InputArgs { spacing: Some(Numbers([plate.spacing; 3])), ..plain }));
+        }
+        let Ok(kind) = Kind::from_str(archive, false) else { return Ok((archive.into(), self.input.clone())) };
+        say(&format!("making {archive}"));
+        let path = self.folder.join(format!("{name}.npy"));
+        let synth = Synth { kind, shape: SHAPE, seed: 0 };
+        Target::File(path.clone(), Format::Npy).write(&SHAPE, |frame, bytes| synth.fill(frame, bytes))?;
+        Ok((path, plain))
+    }
+
+    /// The file of an archive, in colours if there are some.
+    fn converted(
+        &self,
+        (path, input): &(PathBuf, InputArgs),
+        name: &str,
+        colours: Option<&TransferFunction>,
+    ) -> Result<Arc<CoefficientFile>> {
+        let mut source: Box<dyn FrameSource> = input.open(std::slice::from_ref(path), &quietly())?;
+        let (missing, colours) = (MissingPolicy::Mask, colours.cloned());
+        let config = ConvertConfig { missing, colours, ..ConvertConfig::new(Coding::AUTO, WINDOW, TOLERANCE, MEMORY) };
+        let path = self.folder.join(format!("{name}.wspl"));
+        converted(source.as_mut(), &config, &path)?;
+        CoefficientFile::open(&path, Access::Map).map(Arc::new)
+    }
+
+    /// The middle frame, as all modes see it.
+    fn base(&self, scene: &dyn Scene) -> Result<RenderConfig> {
+        let [azimuth, elevation] = VIEW;
+        let view = View { azimuth, elevation, roll: 0.0, size: [self.side; 2], scale: None, center: None };
+        projection(scene.grid(), view, 0.0, vec![scene.frames().unwrap_or(0) / 2], TOLERANCE / 2.0)
+    }
+
+    /// What suits the samples: colours from the least to what all but a few rays meet at most.
+    fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<Look> {
+        let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
+        let mut largest = pictures(scene, &mip)?.0;
+        largest.retain(|v| v.is_finite());
+        largest.sort_by(f32::total_cmp);
+        let reached = largest.get((largest.len() as f64 * REACHED) as usize).map_or(1.0, |v| f64::from(*v));
+        Ok(Look::new(file.value_range(), reached, scene.grid()))
+    }
+
+    fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {
+        let kernel = Kernel { tau: tile.tau, ..base.kernel };
+        let config = RenderConfig { mode: tile.mode.clone(), kernel, ..base.clone() };
+        let (picture, _) = pictures(scene, &config)?;
+        let lines = lines(&tile.label, self.side / LETTER);
+        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+        Ok(titled(&tile.image(&picture, self.side)?, &lines, INK, PAPER))
+    }
+}
+
+/// What the files of an archive are called.
+fn name(archive: &str) -> String {
+    let path = Path::new(archive.trim_end_matches('/'));
+    path.file_stem().map_or_else(|| "archive".into(), |stem| stem.to_string_lossy().replace(['*', '?'], ""))
+}
+
+/// Lines that every label has room for.
+const LINES: usize = 3;
+
+/// A text in lines of at most so many letters, cut behind spaces and commas where that goes.
+fn lines(text: &str, letters: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_inclusive([' ', ',']) {
+        match lines.last_mut() {
+            Some(line) if line.len() + word.trim_end().len() <= letters => line.push_str(word),
+            _ => lines.push(word.into()),
+        }
+    }
+    lines.resize(LINES, String::new());
+    lines
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn gallery(folder: &Path, archives: Vec<String>) -> Gallery {
+        Gallery { archives, input: plain(), folder: folder.into(), side: 40 }
+    }
+
+    fn plain() -> InputArgs {
+        #[derive(clap::Parser)]
+        struct Only {
+            #[command(flatten)]
+            input: InputArgs,
+        }
+        <Only as clap::Parser>::parse_from(["test"]).input
+    }
+
+    #[test]
+    fn every_archive_has_a_row_of_six_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let shape = Shape { dims: [9, 8, 7], frames: 5, ty: SampleType::F32 };
+        let archive = |kind, name: &str| {
+            let path = folder.path().join(name);
+            let synth = Synth { kind, shape, seed: 1 };
+            Target::File(path.clone(), Format::Npy).write(&shape, |f, bytes| synth.fill(f, bytes)).unwrap();
+            path.to_str().unwrap().to_string()
+        };
+        let archives = vec![archive(Kind::Smooth, "above.npy"), archive(Kind::Oscillating, "signed.npy")];
+        let gallery = gallery(&folder.path().join("out"), archives);
+        let mut said = Vec::new();
+        gallery.draw(&mut |text| said.push(text.to_string())).unwrap();
+        assert_eq!(said.len(), 2 * 3, "{said:?}");
+        let file = std::io::BufReader::new(fs::File::open(gallery.sheet()).unwrap());
+        let (width, height) = png::Decoder::new(file).read_info().unwrap().info().size();
+        assert!(width as usize == GAP + 6 * (40 + GAP) && height > 80, "{width} {height}");
+    }
+
+    #[test]
+    fn files_of_two_archives_are_not_mixed_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let twice = gallery(folder.path(), vec!["a/run.npy".into(), "b/run.npy".into()]);
+        assert!(twice.draw(&mut |_| ()).is_err());
+        assert_eq!([name("frames/"), name("f_*.vti"), name("/")], ["frames", "f_", "archive"]);
+    }
+
+    #[test]
+    fn labels_are_cut_where_they_can_be() {
+        assert_eq!(lines("one two,three", 7), ["one ", "two,", "three"]);
+        assert_eq!(lines("one two", 7), ["one two", "", ""]);
+    }
+}
