@@ -72,6 +72,7 @@ impl Image {
         let mut encoder = png::Encoder::new(to, side(self.width)?, side(self.height)?);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
         let written = encoder.write_header().and_then(|mut writer| {
             writer.write_image_data(self.pixels.as_flattened())?;
             writer.finish()

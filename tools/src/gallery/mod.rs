@@ -13,8 +13,8 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tiles::{Look, Tile};
-use wavesplat::camera::View;
+use tiles::{Look, Tile, short};
+use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
@@ -30,16 +30,14 @@ use wavesplat::source::FrameSource;
 /// What is shown unless archives are given.
 pub const USUAL: [&str; 2] = ["demo", "moving"];
 /// Pixels a side of a picture.
-pub const SIDE: usize = 256;
+pub const SIDE: usize = 224;
 /// Of all conversions.
 const TOLERANCE: f64 = 1e-3;
 const WINDOW: usize = 32;
 /// Of synthetic archives.
 const SHAPE: Shape = Shape { dims: [64; 3], frames: 32, ty: SampleType::F32 };
 /// Of pictures: azimuth and elevation.
-const VIEW: [f64; 2] = [30.0, 35.0];
-/// The share of the pixels of the largest values that the colours of samples reach: a few samples may be far larger.
-const REACHED: f64 = 0.95;
+const VIEW: [f64; 2] = [300.0, 35.0];
 const PAPER: Rgb = [40; 3];
 const INK: Rgb = [255; 3];
 
@@ -67,19 +65,23 @@ impl Gallery {
     /// # Errors
     /// Archives that cannot be read, two of one name, or files that cannot be written.
     pub fn draw(&self, say: &mut dyn FnMut(&str)) -> Result<()> {
+        let names = self.names()?;
         fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, "creating", e))?;
-        let mut names = HashSet::new();
-        let rows = self.archives.iter().map(|archive| {
-            let name = name(archive);
-            if !names.insert(name.clone()) {
-                return Err(Error::usage(format!("{archive}: there are two archives of the name {name}")));
-            }
-            self.row(archive, &name, say)
-        });
+        let rows = self.archives.iter().zip(&names).map(|(archive, name)| self.row(archive, name, say));
         let rows = rows.collect::<Result<Vec<_>>>()?;
         let mut out = Output::create(&self.sheet(), true)?;
         stacked(&rows, PAPER).write_png(&mut out)?;
         out.commit()
+    }
+
+    /// What the files of each archive are called.
+    fn names(&self) -> Result<Vec<String>> {
+        let names: Vec<String> = self.archives.iter().map(|archive| name(archive)).collect();
+        let mut seen = HashSet::new();
+        match names.iter().find(|name| !seen.insert(*name)) {
+            Some(twice) => Err(Error::usage(format!("{twice}: two archives have that name; give one another"))),
+            None => Ok(names),
+        }
     }
 
     /// The pictures of an archive, with what it is above them.
@@ -104,11 +106,12 @@ impl Gallery {
         Ok(titled(&sheet, &["", &self.title(name, &scene, &base, look.range)], INK, PAPER))
     }
 
-    fn title(&self, name: &str, scene: &dyn Scene, base: &RenderConfig, (lo, hi): (f64, f64)) -> String {
+    fn title(&self, name: &str, scene: &dyn Scene, base: &RenderConfig, range: (f64, f64)) -> String {
+        let (lo, hi) = (short(range.0), short(range.1));
         let ([x, y, z], frames) = (scene.grid().dims, scene.frames().unwrap_or(0));
         let [azimuth, elevation] = VIEW;
         let seen = format!("--frames {} --view {azimuth},{elevation}", base.frames[0]);
-        format!(" {name}: {x}x{y}x{z} voxels, {frames} frames; {seen}; samples in colours: --range {lo:.3e},{hi:.3e}")
+        format!(" {name}: {x}x{y}x{z} voxels, {frames} frames; {seen}; samples in colours: --range {lo},{hi}")
     }
 
     /// Makes an archive that is not given; says where it is, and how it is read.
@@ -151,21 +154,19 @@ impl Gallery {
         projection(scene.grid(), view, 0.0, vec![scene.frames().unwrap_or(0) / 2], TOLERANCE / 2.0)
     }
 
-    /// What suits the samples: colours from the least to what all but a few rays meet at most.
+    /// What suits the samples, by the largest ones that rays meet.
     fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<Look> {
         let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
-        let mut largest = pictures(scene, &mip)?.0;
-        largest.retain(|v| v.is_finite());
-        largest.sort_by(f32::total_cmp);
-        let reached = largest.get((largest.len() as f64 * REACHED) as usize).map_or(1.0, |v| f64::from(*v));
-        Ok(Look::new(file.value_range(), reached, scene.grid()))
+        let (largest, _) = pictures(scene, &mip)?;
+        let depth = Camera::new(&base.views[0], scene.grid())?.depth(scene.grid());
+        Ok(Look::new(file.metadata().range(), &largest, scene.grid(), depth))
     }
 
     fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {
         let kernel = Kernel { tau: tile.tau, ..base.kernel };
         let config = RenderConfig { mode: tile.mode.clone(), kernel, ..base.clone() };
         let (picture, _) = pictures(scene, &config)?;
-        let lines = lines(&tile.label, self.side / LETTER);
+        let lines = lines(&tile.label, self.side / LETTER - 1);
         let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
         Ok(titled(&tile.image(&picture, self.side)?, &lines, INK, PAPER))
     }
@@ -178,7 +179,7 @@ fn name(archive: &str) -> String {
 }
 
 /// Lines that every label has room for.
-const LINES: usize = 3;
+const LINES: usize = 5;
 
 /// A text in lines of at most so many letters, cut behind spaces and commas where that goes.
 fn lines(text: &str, letters: usize) -> Vec<String> {
@@ -235,13 +236,13 @@ mod tests {
     fn files_of_two_archives_are_not_mixed_up() {
         let folder = tempfile::tempdir().unwrap();
         let twice = gallery(folder.path(), vec!["a/run.npy".into(), "b/run.npy".into()]);
-        assert!(twice.draw(&mut |_| ()).is_err());
+        assert_eq!(twice.draw(&mut |_| ()).unwrap_err().exit_code(), 2, "before anything is opened");
         assert_eq!([name("frames/"), name("f_*.vti"), name("/")], ["frames", "f_", "archive"]);
     }
 
     #[test]
     fn labels_are_cut_where_they_can_be() {
-        assert_eq!(lines("one two,three", 7), ["one ", "two,", "three"]);
-        assert_eq!(lines("one two", 7), ["one two", "", ""]);
+        assert_eq!(lines("one two,three", 7), ["one ", "two,", "three", "", ""]);
+        assert_eq!(lines("one two", 7), ["one two", "", "", "", ""]);
     }
 }

@@ -8,18 +8,24 @@ use wavesplat::render::Mode;
 use wavesplat::volume::Grid;
 
 const BACKGROUND: Rgb = [0; 3];
-/// A path through this share of the volume's least extent has the opacities that are asked for.
-const OPACITY_UNIT: f64 = 1.0 / 8.0;
-/// Attenuation by a factor of e takes this share of the volume's least extent.
-const ATTENUATION: f64 = 0.5;
-/// A logarithm shows no more than so much below the largest.
-const DECADES: f64 = 1e-4;
+/// Paths through such shares of the volume's least extent have the opacities that are asked for: haze, and shells, which
+/// rays are through sooner.
+const HAZE: f64 = 1.0 / 8.0;
+const SHELL: f64 = 1.0 / 32.0;
+/// So many factors of e does attenuation come to at the far end.
+const ATTENUATION: f64 = 3.0;
+/// The share of rays whose largest sample the colours of samples tell apart, and of pixels that those of pixels do: a few
+/// may be far brighter.
+const OF_RAYS: f64 = 0.95;
+const OF_PIXELS: f64 = 0.99;
+/// A logarithm shows no share of the largest value that is much nearer to what conversions leave undecided.
+const LEAST: f64 = 10.0 * super::TOLERANCE;
 /// Opacities of values of one sign, as they are by default.
 const RAMP: &str = "0:0,1:1";
 /// Opacities of values of one sign: two shells.
-const SHELLS: &str = "0:0,0.2:0,0.25:0.4,0.3:0,0.6:0,0.65:0.8,0.7:0";
-/// Of values of both signs: a shell in the middle of each half, and all beyond another.
-const SHELLS_OF_BOTH: &str = "0.1:0.8,0.15:0,0.3:0,0.35:0.4,0.4:0,0.6:0,0.65:0.4,0.7:0,0.85:0,0.9:0.8";
+const SHELLS: &str = "0.05:0,0.2:0.5,0.35:0,0.5:0,0.7:0.9,0.9:0";
+/// Of values of both signs: a shell on each side of 0 around what is far from it.
+const SHELLS_OF_BOTH: &str = "0:0.9,0.2:0,0.3:0.5,0.4:0,0.6:0,0.7:0.5,0.8:0,1:0.9";
 /// Of values of both signs: what is far from 0 hides what is behind.
 const BOTH_ENDS: &str = "0:1,0.5:0,1:1";
 
@@ -29,8 +35,10 @@ pub(super) struct Look {
     both_signs: bool,
     /// The values of the first and the last colour of samples.
     pub(super) range: (f64, f64),
-    /// World units.
+    /// World units: the volume's least extent.
     thickness: f64,
+    /// World units along the view.
+    depth: f64,
 }
 
 /// A picture of one mode.
@@ -46,13 +54,14 @@ pub(super) struct Tile {
 }
 
 impl Look {
-    /// For samples of a range, of which most rays meet no more than `reached`.
-    pub(super) fn new((lo, hi): (f64, f64), reached: f64, grid: &Grid) -> Self {
+    /// For samples of a range, of which rays meet the `largest`, seen through a volume so deep.
+    pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid, depth: f64) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
-        let top = if lo < reached { reached } else { lo + lo.abs().max(1.0) };
-        let range = if both_signs { (-top.abs(), top.abs()) } else { (lo, top) };
+        let reached = spread(largest, OF_RAYS).1.abs();
+        let top = if lo < reached { reached } else { lo + lo.abs().max(1.0) }; // of one value: the first colour
+        let range = if both_signs { (-top, top) } else { (lo, top) };
         let extent = (0..3).map(|a| grid.spacing[a] * grid.dims[a] as f64);
-        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min) }
+        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min), depth }
     }
 
     /// What suits values of one sign, or of both.
@@ -67,8 +76,8 @@ impl Look {
             Tile::of_values(Mode::Projection, "--colormap", self.either("viridis", "coolwarm"))?,
             if self.both_signs { self.attenuated()? } else { Self::logarithm()? },
             Tile::of_values(mip, "--mode mip --colormap", "inferno")?,
-            self.composite(self.either(RAMP, BOTH_ENDS))?,
-            self.composite(self.either(SHELLS, SHELLS_OF_BOTH))?,
+            self.composite(self.either(RAMP, BOTH_ENDS), HAZE)?,
+            self.composite(self.either(SHELLS, SHELLS_OF_BOTH), SHELL)?,
         ])
     }
 
@@ -80,21 +89,21 @@ impl Look {
     }
 
     fn logarithm() -> Result<Tile> {
-        Ok(Tile { norm: Norm::Log, ..Tile::of_values(Mode::Projection, "--norm log --colormap", "turbo")? })
+        Ok(Tile { norm: Norm::Log, ..Tile::of_values(Mode::Projection, "--norm log --colormap", "plasma")? })
     }
 
     fn attenuated(&self) -> Result<Tile> {
-        let tau = 1.0 / (ATTENUATION * self.thickness);
+        let tau = ATTENUATION / self.depth;
         let options = format!("--tau {} --colormap", short(tau));
         Ok(Tile { tau, ..Tile::of_values(Mode::Projection, &options, "coolwarm")? })
     }
 
-    fn composite(&self, opacity: &str) -> Result<Tile> {
+    fn composite(&self, opacity: &str, share: f64) -> Result<Tile> {
         let name = self.either("viridis", "coolwarm");
         let points: OpacityPoints = opacity.parse().map_err(Error::usage)?;
         let transfer = TransferFunction::open(name)?.over(self.range)?;
         let transfer = transfer.with_opacity(&points.0).map_err(Error::usage)?;
-        let unit = OPACITY_UNIT * self.thickness;
+        let unit = share * self.thickness;
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
         let mode = Mode::Composite { transfer, unit: Some(unit), slabs: None };
         let map = TransferFunction::open(name)?;
@@ -103,9 +112,9 @@ impl Look {
 }
 
 /// A number of three digits.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    rounded.to_string()
+    if rounded == 0.0 || (1e-3..1e4).contains(&rounded.abs()) { rounded.to_string() } else { format!("{rounded:e}") }
 }
 
 impl Tile {
@@ -124,16 +133,68 @@ impl Tile {
         Ok(Image { width: side, height: side, pixels })
     }
 
-    /// The values of the first and the last colour: all that there are, to both sides of 0 alike where colours are.
+    /// The values of the first and the last colour; to both sides of 0 alike where colours are.
     fn range(&self, picture: &[f32]) -> (f64, f64) {
-        let values = || picture.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v));
-        let (lo, hi) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-        match (lo <= hi, self.norm) {
-            (false, _) => (0.5, 1.0), // of a picture of nothing
-            (_, Norm::Log) if hi > 0.0 => (values().filter(|v| *v > 0.0).fold(hi, f64::min).max(hi * DECADES), hi),
-            (_, Norm::Log) => (0.5, 1.0),
-            _ if self.map.is_diverging() => (-hi.max(-lo), hi.max(-lo)),
-            _ => (lo, hi),
+        let (lo, hi) = spread(picture, OF_PIXELS);
+        match self.norm {
+            Norm::Log if hi > 0.0 => (lo.max(hi * LEAST), hi),
+            Norm::Log => (0.5, 1.0), // of a picture of nothing
+            Norm::Linear if self.map.is_diverging() => (-hi.max(-lo), hi.max(-lo)),
+            Norm::Linear => (lo, hi),
         }
+    }
+}
+
+/// The least of some values, and what such a share of them stays within; 0 and 1 if there is none.
+fn spread(values: &[f32], share: f64) -> (f64, f64) {
+    let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f32::total_cmp);
+    let reached = sorted.get((sorted.len() as f64 * share) as usize);
+    sorted.first().zip(reached).map_or((0.0, 1.0), |(lo, hi)| ((*lo).into(), (*hi).into()))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn look(range: (f64, f64), largest: &[f32]) -> Look {
+        Look::new(range, largest, &Grid::unit([9, 8, 4]), 12.0)
+    }
+
+    #[test]
+    fn values_of_both_signs_have_colours_and_opacities_on_both_sides() {
+        let largest: Vec<f32> = (0..100).map(|n| n as f32).collect();
+        assert_eq!(look((2.0, 1e9), &largest).range, (2.0, 95.0));
+        let both = look((-3.0, 1e9), &largest);
+        assert_eq!(both.range, (-95.0, 95.0));
+        let ends = |tile: &Tile| match &tile.mode {
+            Mode::Composite { transfer, .. } => [-95.0, 0.0, 95.0].map(|v| transfer.opacity(v)),
+            _ => panic!("{}", tile.label),
+        };
+        let tiles = both.tiles().unwrap();
+        assert_eq!([ends(&tiles[3]), ends(&tiles[4])], [[1.0, 0.0, 1.0], [0.9, 0.0, 0.9]]);
+        assert!(tiles[1].tau == ATTENUATION / 12.0 && tiles[1].map.is_diverging());
+    }
+
+    #[test]
+    fn what_shows_nothing_has_a_range_all_the_same() {
+        for tile in look((7.0, 7.0), &[7.0, f32::NAN]).tiles().unwrap() {
+            for picture in [[f32::NAN; 4], [7.0; 4], [-1.0; 4], [0.0; 4]] {
+                assert_eq!(tile.image(&picture, 2).unwrap().pixels.len(), 4, "{}", tile.label);
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_pixels_may_be_far_brighter() {
+        let mut values = vec![1.0_f32; 200];
+        (values[3], values[7]) = (100.0, f32::NAN);
+        assert_eq!((spread(&values, OF_PIXELS), spread(&[], OF_PIXELS)), ((1.0, 1.0), (0.0, 1.0)));
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!([0.0, 0.00125, 5.0, -1.7543e6].map(short), ["0", "0.00125", "5", "-1.75e6"]);
     }
 }
