@@ -29,7 +29,7 @@ pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Res
 
 /// What the bars of the pictures and of the differences say, equally wide.
 fn bars((lo, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
-    let shares = ["bound".into(), format!("{bound:.3}"), "0".into()];
+    let shares = [format!("{bound:.2} bound"), "difference".into(), "0".into()];
     let labels = [[format!("{hi:.1e}"), "|J|, A/m^2".into(), format!("{lo:.1e}")], shares];
     labels.map(|bar: [String; 3]| bar.map(|label| format!("{label:<10}")))
 }

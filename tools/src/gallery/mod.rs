@@ -14,13 +14,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tiles::{Look, Tile, short};
-use wavesplat::camera::{Camera, View};
+use wavesplat::camera::View;
 use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Kernel;
 use wavesplat::mapped::Access;
 use wavesplat::output::Output;
 use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, What};
@@ -30,7 +29,7 @@ use wavesplat::source::FrameSource;
 /// What is shown unless archives are given.
 pub const USUAL: [&str; 2] = ["demo", "moving"];
 /// Pixels a side of a picture.
-pub const SIDE: usize = 224;
+pub const SIDE: usize = 216;
 /// Of all conversions.
 const TOLERANCE: f64 = 1e-3;
 const WINDOW: usize = 32;
@@ -158,13 +157,11 @@ impl Gallery {
     fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<Look> {
         let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
         let (largest, _) = pictures(scene, &mip)?;
-        let depth = Camera::new(&base.views[0], scene.grid())?.depth(scene.grid());
-        Ok(Look::new(file.metadata().range(), &largest, scene.grid(), depth))
+        Ok(Look::new(file.metadata().range(), &largest, scene.grid()))
     }
 
     fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {
-        let kernel = Kernel { tau: tile.tau, ..base.kernel };
-        let config = RenderConfig { mode: tile.mode.clone(), kernel, ..base.clone() };
+        let config = RenderConfig { mode: tile.mode.clone(), ..base.clone() };
         let (picture, _) = pictures(scene, &config)?;
         let lines = lines(&tile.label, self.side / LETTER - 1);
         let lines: Vec<&str> = lines.iter().map(String::as_str).collect();

@@ -12,8 +12,6 @@ const BACKGROUND: Rgb = [0; 3];
 /// rays are through sooner.
 const HAZE: f64 = 1.0 / 8.0;
 const SHELL: f64 = 1.0 / 32.0;
-/// So many factors of e does attenuation come to at the far end.
-const ATTENUATION: f64 = 3.0;
 /// The share of rays whose largest sample the colours of samples tell apart, and of pixels that those of pixels do: a few
 /// may be far brighter.
 const OF_RAYS: f64 = 0.95;
@@ -37,8 +35,6 @@ pub(super) struct Look {
     pub(super) range: (f64, f64),
     /// World units: the volume's least extent.
     thickness: f64,
-    /// World units along the view.
-    depth: f64,
 }
 
 /// A picture of one mode.
@@ -46,22 +42,20 @@ pub(super) struct Tile {
     /// The options that give it.
     pub(super) label: String,
     pub(super) mode: Mode,
-    /// Attenuation of a projection.
-    pub(super) tau: f64,
     /// Of pixels that are values; where samples are coloured, what gives them their colours.
     pub(super) map: TransferFunction,
     norm: Norm,
 }
 
 impl Look {
-    /// For samples of a range, of which rays meet the `largest`, seen through a volume so deep.
-    pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid, depth: f64) -> Self {
+    /// For samples of a range, of which rays meet the `largest`.
+    pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
         let reached = spread(largest, OF_RAYS).1.abs();
         let top = if lo < reached { reached } else { lo + lo.abs().max(1.0) }; // of one value: the first colour
         let range = if both_signs { (-top, top) } else { (lo, top) };
         let extent = (0..3).map(|a| grid.spacing[a] * grid.dims[a] as f64);
-        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min), depth }
+        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min) }
     }
 
     /// What suits values of one sign, or of both.
@@ -74,7 +68,7 @@ impl Look {
         let mip = Mode::Mip { slabs: None };
         Ok(vec![
             Tile::of_values(Mode::Projection, "--colormap", self.either("viridis", "coolwarm"))?,
-            if self.both_signs { self.attenuated()? } else { Self::logarithm()? },
+            self.other_colours()?,
             Tile::of_values(mip, "--mode mip --colormap", "inferno")?,
             self.composite(self.either(RAMP, BOTH_ENDS), HAZE)?,
             self.composite(self.either(SHELLS, SHELLS_OF_BOTH), SHELL)?,
@@ -88,14 +82,12 @@ impl Look {
         Ok(Tile { map, ..Tile::of_values(Mode::Projection, "convert --transfer-function", name)? })
     }
 
-    fn logarithm() -> Result<Tile> {
+    /// A logarithm takes values of one sign alone.
+    fn other_colours(&self) -> Result<Tile> {
+        if self.both_signs {
+            return Tile::of_values(Mode::Projection, "--colormap", "turbo");
+        }
         Ok(Tile { norm: Norm::Log, ..Tile::of_values(Mode::Projection, "--norm log --colormap", "plasma")? })
-    }
-
-    fn attenuated(&self) -> Result<Tile> {
-        let tau = ATTENUATION / self.depth;
-        let options = format!("--tau {} --colormap", short(tau));
-        Ok(Tile { tau, ..Tile::of_values(Mode::Projection, &options, "coolwarm")? })
     }
 
     fn composite(&self, opacity: &str, share: f64) -> Result<Tile> {
@@ -107,7 +99,7 @@ impl Look {
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
         let mode = Mode::Composite { transfer, unit: Some(unit), slabs: None };
         let map = TransferFunction::open(name)?;
-        Ok(Tile { label: options, mode, tau: 0.0, map, norm: Norm::Linear })
+        Ok(Tile { label: options, mode, map, norm: Norm::Linear })
     }
 }
 
@@ -121,7 +113,7 @@ impl Tile {
     /// With the colours of a map, whose name ends the options.
     fn of_values(mode: Mode, options: &str, map: &str) -> Result<Self> {
         let label = format!("{options} {map}");
-        Ok(Self { label, mode, tau: 0.0, map: TransferFunction::open(map)?, norm: Norm::Linear })
+        Ok(Self { label, mode, map: TransferFunction::open(map)?, norm: Norm::Linear })
     }
 
     /// The picture in colours: a row has `width` pixels, of as many numbers as they come to.
@@ -159,7 +151,7 @@ mod tests {
     use super::*;
 
     fn look(range: (f64, f64), largest: &[f32]) -> Look {
-        Look::new(range, largest, &Grid::unit([9, 8, 4]), 12.0)
+        Look::new(range, largest, &Grid::unit([9, 8, 4]))
     }
 
     #[test]
@@ -174,7 +166,7 @@ mod tests {
         };
         let tiles = both.tiles().unwrap();
         assert_eq!([ends(&tiles[3]), ends(&tiles[4])], [[1.0, 0.0, 1.0], [0.9, 0.0, 0.9]]);
-        assert!(tiles[1].tau == ATTENUATION / 12.0 && tiles[1].map.is_diverging());
+        assert!(tiles[0].map.is_diverging() && tiles.iter().all(|tile| tile.norm == Norm::Linear));
     }
 
     #[test]
