@@ -1,4 +1,4 @@
-//! wavesplat's own instruments: the demo's physics, synthetic archives, contact sheets, differences of pictures, the benchmark.
+//! wavesplat's own instruments: the demo and its physics, the gallery, synthetic archives, contact sheets, differences of pictures, the benchmark.
 pub mod bench;
 pub mod demo;
 pub mod diff;

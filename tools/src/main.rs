@@ -34,7 +34,7 @@ Examples:
   wavesplat-tools bench layers mine.npy -o layers
   wavesplat-tools bench speed -o speed
 
-wavesplat's own instruments: the demo, synthetic archives, differences of pictures and the benchmark.";
+wavesplat's own instruments: the demo, the gallery, synthetic archives, differences of pictures and the benchmark.";
 
 #[derive(Parser)]
 #[command(version, about = EXAMPLES, long_about = None, subcommand_required = true)]

@@ -51,9 +51,14 @@ impl Look {
     /// For samples of a range, of which rays meet the `largest`.
     pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
-        let reached = spread(largest, OF_RAYS).1.abs();
-        let top = if lo < reached { reached } else { lo + lo.abs().max(1.0) }; // of one value: the first colour
-        let range = if both_signs { (-top, top) } else { (lo, top) };
+        let reached = spread(largest, OF_RAYS).1;
+        let range = match both_signs {
+            true if reached != 0.0 => (-reached.abs(), reached.abs()),
+            true => (lo.min(-hi), hi.max(-lo)),
+            false if lo < reached => (lo, reached),
+            false if lo.is_finite() => (lo, lo + lo.abs().max(1.0)), // of one value: the first colour
+            false => (0.0, 1.0),                                     // of nothing
+        };
         let extent = (0..3).map(|a| grid.spacing[a] * grid.dims[a] as f64);
         Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min) }
     }
@@ -82,9 +87,9 @@ impl Look {
         Ok(Tile { map, ..Tile::of_values(Mode::Projection, "convert --transfer-function", name)? })
     }
 
-    /// A logarithm takes values of one sign alone.
+    /// A logarithm takes values above 0 alone.
     fn other_colours(&self) -> Result<Tile> {
-        if self.both_signs {
+        if self.range.0 < 0.0 {
             return Tile::of_values(Mode::Projection, "--colormap", "turbo");
         }
         Ok(Tile { norm: Norm::Log, ..Tile::of_values(Mode::Projection, "--norm log --colormap", "plasma")? })
@@ -116,7 +121,7 @@ impl Tile {
         Ok(Self { label, mode, map: TransferFunction::open(map)?, norm: Norm::Linear })
     }
 
-    /// The picture in colours: a row has `width` pixels, of as many numbers as they come to.
+    /// The picture in colours: `side` rows of as many pixels, each of as many numbers as they come to.
     pub(super) fn image(&self, picture: &[f32], side: usize) -> Result<Image> {
         let numbers = picture.len() / (side * side);
         let range = if numbers == 1 { self.range(picture) } else { (0.0, 1.0) };
@@ -158,6 +163,9 @@ mod tests {
     fn values_of_both_signs_have_colours_and_opacities_on_both_sides() {
         let largest: Vec<f32> = (0..100).map(|n| n as f32).collect();
         assert_eq!(look((2.0, 1e9), &largest).range, (2.0, 95.0));
+        assert_eq!(look((-9.0, -1.0), &[-9.0, -2.0]).range, (-9.0, -2.0));
+        assert_eq!(look((-9.0, 1.0), &[0.0]).range, (-9.0, 9.0));
+        assert_eq!(look((f64::INFINITY, f64::NEG_INFINITY), &[f32::NAN]).range, (0.0, 1.0));
         let both = look((-3.0, 1e9), &largest);
         assert_eq!(both.range, (-95.0, 95.0));
         let ends = |tile: &Tile| match &tile.mode {
