@@ -21,7 +21,8 @@
 //!    |  amounts of voxels, plane by plane   codec/      the same decoder
 //!    v
 //!  planes of cells, then of tiles           render/lattice/ spread and gather on the sheared lattice of the view; or
-//!    |                                      footprint.rs, render/splat.rs (eq 4 and 9); camera.rs, render/canvas.rs
+//!    |                                      footprint.rs, render/splat.rs (eq 4 and 9); camera.rs, render/canvas.rs;
+//!    |                                      render/slabs/ cuts the volume for what hides and what is largest
 //!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
 //!    v
 //!  pictures, and what is known of errors    render/finish.rs, weights.rs (eq 12), certificate.rs, expectation.rs,

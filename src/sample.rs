@@ -205,6 +205,16 @@ pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
     }
 }
 
+/// How far rounding to a type moves numbers that are no larger than `magnitude`, at most.
+pub fn rounding(ty: SampleType, magnitude: f64) -> f64 {
+    match ty {
+        SampleType::F16 => magnitude * 2f64.powi(-11),
+        SampleType::F32 => magnitude * 2f64.powi(-24),
+        SampleType::F64 => 0.0,
+        _ => 0.5,
+    }
+}
+
 /// The largest absolute value in a range; 0 if it is empty.
 pub fn magnitude((lo, hi): (f64, f64)) -> f64 {
     if lo <= hi { (-lo).max(hi) } else { 0.0 }

@@ -20,20 +20,35 @@ pub fn transfer_function(
     missing_value: Option<f64>,
     common: &CommonArgs,
 ) -> Result<TransferFunction> {
-    let colours = TransferFunction::open(name)?;
-    if let Some(range) = range {
-        let [lo, hi] = range.0;
-        return colours.over((lo, hi));
+    let all = || {
+        if inputs == [Path::new(STANDARD)] {
+            let what = "standard input is read once: give --range LO,HI, the values of the first and the last colour";
+            return Err(Error::usage(format!("--transfer-function {name}: {what}")));
+        }
+        let (lo, hi) = value_range(source, missing_value, &common.progress("frames"))?.unwrap_or((0.0, 1.0));
+        common.detail(format_args!("values from {lo:.4e} to {hi:.4e}; --range sets those of the colours"));
+        Ok((lo, hi))
+    };
+    stretched(open_colours("--transfer-function", name)?, range, all)
+}
+
+/// The colours of a name that an option has.
+pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
+    TransferFunction::open(name).map_err(|error| match error {
+        Error::Usage(what) => Error::usage(format!("{option} {what}")),
+        other => other,
+    })
+}
+
+/// Colours over the range that was asked for, their own, or what suits those of all values.
+pub fn stretched(
+    colours: TransferFunction,
+    range: Option<Pair>,
+    all: impl FnOnce() -> Result<(f64, f64)>,
+) -> Result<TransferFunction> {
+    match range {
+        Some(range) => colours.over(range.0.into()),
+        None if colours.is_of_values() => Ok(colours),
+        None => colours.over(colours.suitable(all()?)),
     }
-    if colours.is_of_values() {
-        return Ok(colours);
-    }
-    if inputs == [Path::new(STANDARD)] {
-        let what = "standard input is read once: give --range LO,HI, the values of the first and the last colour";
-        return Err(Error::usage(format!("--transfer-function {name}: {what}")));
-    }
-    let (lo, hi) = value_range(source, missing_value, &common.progress("frames"))?.unwrap_or((0.0, 1.0));
-    let (lo, hi) = colours.suitable((lo, hi));
-    common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
-    colours.over((lo, hi))
 }

@@ -7,7 +7,7 @@ mod input;
 mod terminal;
 mod values;
 
-pub use colours::transfer_function;
+pub use colours::{open_colours, stretched, transfer_function};
 pub use input::{InputArgs, narrow, remembered, spare_inputs};
 pub use terminal::TerminalProgress;
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole};

@@ -102,9 +102,10 @@ impl TransferFunction {
     pub fn over(&self, range: (f64, f64)) -> Result<Self> {
         check_range(range)?;
         let (from, to) = self.range;
-        let moved = |v: f64| match (v - from) / (to - from) {
-            1.0 => range.1, // and not what rounding makes of it
-            share => range.0 + share * (range.1 - range.0),
+        let within = |v: f64| if (from..=to).contains(&v) { range } else { (f64::MIN, f64::MAX) };
+        let moved = |v: f64| {
+            let (least, most) = within(v); // and not what rounding makes of it
+            (range.0 + (v - from) / (to - from) * (range.1 - range.0)).clamp(least, most)
         };
         let colours = match &self.colours {
             Colours::Named(name) => Colours::Named(name),
@@ -122,6 +123,9 @@ impl TransferFunction {
     /// As [`Self::of_points`], in words that follow a name.
     pub fn with_opacity(&self, at_shares: &[(f64, f64)]) -> std::result::Result<Self, String> {
         check_points("opacities", at_shares.iter().map(|(v, a)| (*v, std::slice::from_ref(a))))?;
+        if let Some((share, _)) = at_shares.iter().find(|(share, _)| !(0.0..=1.0).contains(share)) {
+            return Err(format!("{share} is no share of the range, 0 to 1"));
+        }
         let (lo, hi) = self.range;
         let opacity = at_shares.iter().map(|(share, a)| (lo + share * (hi - lo), *a)).collect();
         Ok(Self { opacity, ..self.clone() })
@@ -239,6 +243,9 @@ fn between<T: Copy>(points: &[(f64, T)], value: f64, mix: impl Fn(&T, &T, f64) -
     }
 }
 
+/// More points than this are more than a map needs, and than the settings of a file hold.
+const MOST_POINTS: usize = 1 << 16;
+
 /// Whether points are two or more, of ascending values, with components of 0 to 1; a step has a value twice.
 fn check_points<'a>(what: &str, points: impl Iterator<Item = (f64, &'a [f64])>) -> std::result::Result<(), String> {
     let (mut count, mut first, mut last) = (0, f64::INFINITY, f64::NEG_INFINITY);
@@ -256,6 +263,7 @@ fn check_points<'a>(what: &str, points: impl Iterator<Item = (f64, &'a [f64])>) 
         (count, first, last) = (n, first.min(value), value);
     }
     match count {
+        _ if count > MOST_POINTS => Err(format!("has {count} points of {what}, where {MOST_POINTS} are the most")),
         2.. if first == last => Err(format!("all of its {what} have the value {last}, where a range is expected")),
         2.. if !(last - first).is_finite() => {
             Err(format!("the values {first} and {last} of its {what} are too far apart"))

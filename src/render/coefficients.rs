@@ -11,7 +11,7 @@ use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::error::Result;
 use crate::file::CoefficientFile;
-use crate::sample::magnitude;
+use crate::sample::{magnitude, rounding};
 use crate::volume::{BlockGrid, Grid, Region};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -307,9 +307,11 @@ impl Group for CoefficientGroup<'_> {
         for entries in self.file.entries(self.window, self.channel, region) {
             for entry in entries? {
                 let BlockStats { min, max, reached, .. } = entry.stats;
-                // What is splatted may be as far from the source's samples as those that were decoded are.
-                let off = reached.max(self.keep(&entry).certified) + reached;
-                ranges.push((entry.id.block as usize, ((min - off).next_down(), (max + off).next_up())));
+                let kept = self.keep(&entry);
+                // With less than all parts, samples are as near to the source's as those of all, and that near again.
+                let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
+                let off = off + rounding(self.codec.sample, magnitude((min, max)));
+                ranges.push((entry.id.block as usize, (min - off, max + off)));
             }
         }
         Ok(ranges)

@@ -43,6 +43,11 @@ impl Mode {
         if matches!(self, Self::Composite { .. }) { Pixel::Light } else { Pixel::Value }
     }
 
+    /// Whether rays are summed up.
+    pub fn is_projection(&self) -> bool {
+        matches!(self, Self::Projection)
+    }
+
     /// How many slabs are asked for.
     pub(super) fn slabs(&self) -> Option<usize> {
         match self {
@@ -109,14 +114,14 @@ impl RenderConfig {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
             return Err(Error::usage("takes one view or more, with pictures of one size"));
         }
-        if self.mode == Mode::Projection {
+        if self.mode.is_projection() {
             return Ok(());
         }
         let refused = [
             (self.kernel.tau != 0.0, "--tau: attenuates projections; what hides what is the transfer function's"),
-            (self.certify, "--error-image: certifies projections alone"),
-            (self.chooses_by_view(), "--error expected: is of projections alone"),
-            (self.quantity != Quantity::Mean, "--quantity: is of projections alone"),
+            (self.certify, "--error-image: certifies projections alone (--mode projection)"),
+            (self.chooses_by_view(), "--error expected: is of projections alone (--mode projection)"),
+            (self.quantity != Quantity::Mean, "--quantity: is of projections alone (--mode projection)"),
         ];
         refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, what)| Err(Error::usage(*what)))
     }

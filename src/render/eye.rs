@@ -93,7 +93,8 @@ impl Eye {
     /// Whether any kernel of a block reaches into the slab that is seen.
     pub(super) fn is_in_slab(&self, block: usize) -> bool {
         let region = || self.blocks.region(block).intersect(&self.clip);
-        self.slab.is_none_or(|slab| slab.is_reached(&region(), &self.grid, &self.camera))
+        let reached = |slab: Slab| !region().is_empty() && slab.is_reached(&region(), &self.grid, &self.camera);
+        self.slab.is_none_or(reached)
     }
 
     /// Whether any voxel of a block can reach these rows of the picture.

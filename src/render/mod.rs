@@ -90,7 +90,7 @@ pub fn render(
         sink_time += writing.elapsed();
         Ok(())
     };
-    if config.mode == Mode::Projection {
+    if config.mode.is_projection() {
         project::project(scene, config, &eyes, progress, &mut report, &mut sink)?;
     } else {
         slabs::render(scene, config, &eyes, progress, &mut report, &mut sink)?;
@@ -109,8 +109,10 @@ pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
 /// All views, for each of which there is memory enough.
 fn eyes(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<Eye>> {
     config.check()?;
-    if scene.channels() > 1 && config.mode != Mode::Projection {
-        return Err(Error::usage("--mode: the samples are colours already, of which only projections are made"));
+    if scene.channels() > 1 && !config.mode.is_projection() {
+        return Err(Error::usage(
+            "--mode: the samples are colours already, of which only projections are made; leave it out, or convert without --transfer-function",
+        ));
     }
     let eye = |view: &View| uncut::without_what_is_dim(Eye::new(scene, config, view)?, config);
     let eyes = config.views.iter().map(eye).collect::<Result<Vec<_>>>()?;

@@ -60,7 +60,7 @@ impl<'a> Budget<'a> {
             Mode::Projection => channels * (1 + usize::from(config.certify)),
             _ => config.mode.pixel().numbers(),
         };
-        let views = if config.mode == Mode::Projection { eyes.len() } else { 1 };
+        let views = if config.mode.is_projection() { eyes.len() } else { 1 };
         let together = if channels > 1 { of_a_view * size_of::<f32>() } else { 0 };
         let (size, pixel_bytes) = (config.size(), views * of_a_view * size_of::<f32>());
         let available = config.memory.saturating_sub(fixed(config, eyes));
@@ -77,7 +77,7 @@ impl<'a> Budget<'a> {
 
     /// For as many slabs of a view as go together: with more than a block is deep, less would be hidden.
     pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [Eye]) -> Self {
-        let deep = slabs.iter().filter(|slab| slab.is_in_slab(0)).count().max(1);
+        let deep = slabs::of_block(slabs, &scene.blocks().region(0)).0.min(slabs.len());
         Self::of_first(config, scene, &slabs[..deep], config.size()[1].min(FEW_ROWS * TILE))
     }
 
@@ -118,7 +118,8 @@ impl<'a> Budget<'a> {
     fn block_bytes(&self, planes: usize) -> usize {
         let footprints = self.eyes.iter().filter(|eye| eye.lattice.is_none()).count();
         let terms = if footprints > 0 { Terms::most_bytes(planes) } else { 0 };
-        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES)
+        let shares = slabs::of_block(self.eyes, &self.block).1;
+        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES + shares)
     }
 
     /// Finished pictures of a group.
@@ -176,14 +177,14 @@ fn fixed(config: &RenderConfig, eyes: &[Eye]) -> usize {
     let [width, height] = config.size();
     let more = match (&config.mode, eyes.first()) {
         (Mode::Projection, _) => eyes.len() * width * height * WEIGHT_BYTES,
-        (_, eye) => eye.map_or(0, slabs::bytes),
+        (_, eye) => eye.map_or(0, |eye| slabs::bytes(eye, config)),
     };
     memory::FIXED + config.reserved + more
 }
 
 /// An upper bound of the planes that some frames of a group need.
 fn most_planes(scene: &dyn Scene, frames: usize, config: &RenderConfig) -> usize {
-    scene.most_planes(frames, config) + usize::from(config.mode != Mode::Projection)
+    scene.most_planes(frames, config) + usize::from(!config.mode.is_projection())
 }
 
 /// The most frames of one group.

@@ -1,7 +1,7 @@
 //! What becomes of what lies along a ray.
 
 use clap::{Args, ValueEnum};
-use wavesplat::cli::OpacityPoints;
+use wavesplat::cli::{OpacityPoints, Pair, open_colours, stretched};
 use wavesplat::colour::TransferFunction;
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
@@ -72,18 +72,9 @@ impl AlongArgs {
     }
 
     /// The colours of a composite of a file over the range that was asked for, their own, or that of all samples.
-    pub(crate) fn of_file(
-        &self,
-        range: Option<(f64, f64)>,
-        file: &CoefficientFile,
-    ) -> Result<Option<TransferFunction>> {
+    pub(crate) fn of_file(&self, range: Option<Pair>, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
         let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite) else { return Ok(None) };
-        let transfer = TransferFunction::open(name).map_err(named)?;
-        match range {
-            None if transfer.is_of_values() => Ok(Some(transfer)),
-            None => transfer.over(transfer.suitable(file.source_range())).map(Some),
-            Some(range) => transfer.over(range).map(Some),
-        }
+        stretched(open_colours("--transfer-function", name)?, range, || Ok(file.source_range())).map(Some)
     }
 
     /// What is to be done with such colours, if there are any.
@@ -99,13 +90,5 @@ impl AlongArgs {
             (ModeName::Mip, _) => Mode::Mip { slabs },
             _ => Mode::Projection,
         })
-    }
-}
-
-/// The error of a name, with the option's.
-fn named(error: Error) -> Error {
-    match error {
-        Error::Usage(what) => Error::usage(format!("--transfer-function {what}")),
-        other => other,
     }
 }

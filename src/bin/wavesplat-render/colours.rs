@@ -1,7 +1,7 @@
 //! Which colours values have.
 
 use clap::{Args, ValueEnum};
-use wavesplat::cli::{CommonArgs, Pair};
+use wavesplat::cli::{CommonArgs, Pair, open_colours};
 use wavesplat::colour::{Norm, Rgb, TransferFunction};
 use wavesplat::error::{Error, Result};
 use wavesplat::progress::Silent;
@@ -77,10 +77,7 @@ impl ColourArgs {
 
     /// The colours, over the range that was asked for.
     pub(crate) fn map(&self) -> Result<TransferFunction> {
-        let map = TransferFunction::open(self.colormap.as_deref().unwrap_or("viridis")).map_err(|e| match e {
-            Error::Usage(what) => Error::usage(format!("--colormap {what}")),
-            other => other,
-        })?;
+        let map = open_colours("--colormap", self.colormap.as_deref().unwrap_or("viridis"))?;
         self.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
     }
 

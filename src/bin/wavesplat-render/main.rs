@@ -3,12 +3,14 @@
 
 mod along;
 mod colours;
+mod sinks;
 mod targets;
 
 use along::{AlongArgs, ModeName};
 use clap::{Parser, ValueEnum};
-use colours::{ColourArgs, Ranges};
+use colours::ColourArgs;
 use serde::Serialize;
+use sinks::{Coloured, of_view};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,16 +21,14 @@ use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{
     self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs, transfer_function,
 };
-use wavesplat::colour::{Norm, Scale, TransferFunction};
+use wavesplat::colour::TransferFunction;
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
 use wavesplat::output::STANDARD;
-use wavesplat::render::annotate::Annotation;
-use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
+use wavesplat::render::sink::{PictureFormat, Sink};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Mode, Pixel, Quantity, RenderConfig, RenderReport, Scene, What, check,
-    default_splat_error, render,
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
 use wavesplat::volume::Grid;
 use wavesplat_format::Metadata;
@@ -195,7 +195,7 @@ impl Cli {
         config.reserved =
             targets.0.memory(&config)? + targets.1.as_ref().map_or(Ok(0), |errors| errors.memory(&config))?;
         let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, (times, colours))?;
-        let progress = self.common.progress(if config.mode == Mode::Projection { "pictures" } else { "rows of slabs" });
+        let progress = self.common.progress(if config.mode.is_projection() { "pictures" } else { "rows of slabs" });
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
             if let (Some(sink), Some(error)) = (of_view(&mut errors, rendered.view), rendered.error) {
                 sink.picture(rendered.frame, error)?;
@@ -204,7 +204,13 @@ impl Cli {
         })?;
         errors.into_iter().chain(pictures).try_for_each(Sink::finish)?;
         self.common.detail(summary(&report));
-        if self.tolerance.is_some() {
+        if self.tolerance.is_some() && !config.mode.is_projection() {
+            let RenderReport { certified_sample_error, left_out, .. } = &report;
+            self.common.note(format_args!(
+                "no sample is off by more than {certified_sample_error:.4e}; {} coefficients left out",
+                left_out.coefficients
+            ));
+        } else if self.tolerance.is_some() {
             let RenderReport { certified_sample_error, expected_error, left_out, .. } = &report;
             self.common.note(format_args!(
                 "no sample is off by more than {certified_sample_error:.4e}; pixels are expected to be by \
@@ -226,90 +232,6 @@ impl Cli {
         let reported = Reported { report: &report, coloured, file_bytes_read, file_bytes };
         self.common.report(&reported, self.output == Path::new(STANDARD))?;
         file.map_or(Ok(()), |file| file.refuse_skipped())
-    }
-
-    /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
-    fn sinks(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        (pictures, errors): (Targets, Option<Targets>),
-        (times, colours): (Vec<f64>, Option<&TransferFunction>),
-    ) -> Result<(Vec<Sink>, Vec<Sink>, Coloured)> {
-        let pixel = self.pixel(scene, config, [Some(&pictures), errors.as_ref()])?;
-        let certify = errors.as_ref().is_some_and(|errors| errors.format != PictureFormat::Npy);
-        let in_colours = pictures.format != PictureFormat::Npy || self.colour.is_asked();
-        let fixed = self.fixed_range(pixel, colours);
-        let needed = in_colours && fixed.is_none() || certify;
-        let looking = RenderConfig { certify, ..config.clone() };
-        if needed {
-            check(scene, config)?; // or small pictures would be made in vain, and what they need be named
-        }
-        let seen = if needed { Ranges::of(scene, looking)? } else { Ranges::default() };
-        let map = if pixel == Pixel::Value {
-            self.colour.map()?
-        } else {
-            colours.map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?
-        };
-        let (range, norm) = match (pixel, fixed) {
-            (Pixel::Value, _) => self.colour.spread(&map, &seen, in_colours, &self.common)?,
-            (_, fixed) => (fixed.unwrap_or(seen.from_nothing()), Norm::Linear),
-        };
-        if needed {
-            self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
-        }
-        if certify {
-            self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
-        }
-        let annotation = self.colour.annotate.then_some(Annotation { times });
-        let open = |targets: Targets, pixel, colours, coloured_array| {
-            let sink = SinkConfig {
-                format: targets.format,
-                size: self.size.0,
-                frames: targets.frames(config),
-                fps: self.fps,
-                pixel,
-                colours,
-                coloured_array,
-                annotation: annotation.clone(),
-                force: self.force,
-            };
-            targets.names.iter().map(|name| Sink::open(name, sink.clone())).collect::<Result<Vec<_>>>()
-        };
-        let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
-        let (of_errors, of_error) =
-            (scale(seen.errors, Norm::Linear)?, if pixel == Pixel::Light { Pixel::Value } else { pixel });
-        let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, of_error, of_errors, false))?;
-        let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
-        Ok((open(pictures, pixel, scale(range, norm)?, self.colour.is_asked())?, errors, coloured))
-    }
-
-    /// What the numbers of a pixel are; an error where options or formats have no use for colours.
-    fn pixel(&self, scene: &dyn Scene, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
-        let pixel = if scene.channels() == 1 { config.mode.pixel() } else { Pixel::Channels };
-        if pixel == Pixel::Value {
-            return Ok(pixel);
-        }
-        if targets.into_iter().flatten().any(|targets| targets.format == PictureFormat::Gray16) {
-            return Err(Error::usage("gray16: holds one number a pixel, and colours are three"));
-        }
-        self.colour.refuse_for_colours()?;
-        Ok(pixel)
-    }
-
-    /// The values of the first and the last colour, where small pictures need not tell. Channels are bright between none and all;
-    /// only their sums along the ray know no end. With a transfer function --range is that of samples.
-    fn fixed_range(&self, pixel: Pixel, colours: Option<&TransferFunction>) -> Option<(f64, f64)> {
-        let bright = (self.quantity == QuantityName::Mean).then_some((0.0, 1.0));
-        match pixel {
-            Pixel::Value => self.range(),
-            Pixel::Channels => self.range().filter(|_| colours.is_none()).or(bright),
-            Pixel::Light => colours.map(TransferFunction::range),
-        }
-    }
-
-    fn range(&self) -> Option<(f64, f64)> {
-        self.colour.range.map(|range| range.0.into())
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -349,7 +271,7 @@ impl Cli {
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            let (times, colours) = (file.metadata().times.clone(), self.along.of_file(self.range(), &file)?);
+            let (times, colours) = (file.metadata().times.clone(), self.along.of_file(self.colour.range, &file)?);
             let scene = Box::new(CoefficientScene::new(file.clone(), what));
             return Ok(Opened { scene, file: Some(file), times, colours });
         }
@@ -477,12 +399,6 @@ struct Opened {
     colours: Option<TransferFunction>,
 }
 
-/// Where the pictures of a view go: all may go to one.
-fn of_view(sinks: &mut [Sink], view: usize) -> Option<&mut Sink> {
-    let place = if sinks.len() == 1 { 0 } else { view };
-    sinks.get_mut(place)
-}
-
 /// What `--json` says.
 #[derive(Serialize)]
 struct Reported<'a> {
@@ -493,13 +409,6 @@ struct Reported<'a> {
     /// Bytes of the coefficient file that were read, directory and all, and those that it has.
     file_bytes_read: Option<u64>,
     file_bytes: Option<u64>,
-}
-
-/// The values of the first and the last colour, of what is in colours.
-#[derive(Serialize)]
-struct Coloured {
-    range: Option<(f64, f64)>,
-    error_range: Option<(f64, f64)>,
 }
 
 fn summary(r: &RenderReport) -> String {

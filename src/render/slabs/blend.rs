@@ -7,6 +7,9 @@ pub(super) trait Blend: Sync {
     /// A pixel so far.
     type Pixel: Copy + Send + Sync;
 
+    /// A slab counts where it is this share of its thickness long.
+    const LEAST: f64;
+
     /// Before the first slab.
     const EMPTY: Self::Pixel;
 
@@ -24,7 +27,11 @@ pub(super) trait Blend: Sync {
 }
 
 /// Emission and absorption: light of each slab through those before it.
-pub(super) struct Composite(pub(super) Medium);
+pub(super) struct Composite {
+    pub(super) medium: Medium,
+    /// World units of a path that has such opacities.
+    pub(super) unit: f64,
+}
 
 /// What comes through of less is not seen: an eighth of a level of an 8-bit picture.
 const CLOSED: f32 = 1.0 / 2048.0;
@@ -33,12 +40,13 @@ impl Blend for Composite {
     /// Red, green and blue of the light, and what comes through.
     type Pixel = [f32; 4];
 
+    const LEAST: f64 = 0.01;
     const EMPTY: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
     fn add(&self, pixel: &mut [f32; 4], value: f64, length: f64) {
-        let [r, g, b, extinction] = self.0.at(value);
+        let (extinction, [r, g, b]) = (self.medium.extinction(value), self.medium.colour(value));
         if extinction > 0.0 && !Self::is_closed(pixel) {
-            let through = pixel[3] * libm::expf(-extinction * length as f32);
+            let through = pixel[3] * libm::expf(-extinction * (length / self.unit) as f32);
             let seen = pixel[3] - through;
             *pixel = [pixel[0] + seen * r, pixel[1] + seen * g, pixel[2] + seen * b, through];
         }
@@ -49,7 +57,7 @@ impl Blend for Composite {
     }
 
     fn shows(&self, range: (f64, f64)) -> bool {
-        !self.0.is_clear(range)
+        !self.medium.is_clear(range)
     }
 
     fn finish(mut pixels: Vec<[f32; 4]>) -> Vec<f32> {
@@ -65,6 +73,7 @@ impl Blend for Largest {
     /// NaN before any.
     type Pixel = f32;
 
+    const LEAST: f64 = 0.01;
     const EMPTY: f32 = f32::NAN;
 
     fn add(&self, pixel: &mut f32, value: f64, _: f64) {

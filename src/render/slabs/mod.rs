@@ -24,69 +24,34 @@
 //! make of the samples. Every mean is off by no more than the file's bound.
 
 mod blend;
+mod lengths;
 mod medium;
 mod slab;
 mod visible;
 
-pub(super) use slab::Slab;
+pub(super) use slab::{Slab, count, cut};
 
-use super::amounts::{Amounts, BlockPlanes, OnesOf, Room};
-use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
+use super::canvas::{self, Canvas, Finished, Pixels};
 use super::expectation::Expectation;
 use super::eye::Eye;
 use super::plan::{self, Budget};
 use super::project::Look;
-use super::scene::{Group, Inverse, Read, Scene};
-use super::terms::Layout;
+use super::scene::{Group, Read, Scene};
 use super::{Mode, RenderConfig, RenderReport, Rendered, ViewReport, lap};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Progress;
-use crate::volume::BlockGrid;
+use crate::volume::{Grid, Region};
 use crate::wavelet::{LANES, Lane};
 use blend::{Blend, Composite, Largest};
+use lengths::WithLengths;
 use medium::Medium;
-use std::collections::HashSet;
+use slab::Slabs;
 use std::ops::Range;
 use std::time::Instant;
 use visible::Visible;
 
-/// More slabs than this are refused.
-pub(super) const MOST_SLABS: usize = 1 << 16;
-/// Standard deviations of the kernel in front of the first voxels and behind the last ones that slabs are cut in, too.
-const TAIL: f64 = 3.0;
 /// Planes of slabs that are gathered together, about: what a pixel's weights cost is shared by as many.
 pub(super) const TOGETHER: usize = 64;
-/// A slab's mean counts where its length is this share of its thickness.
-const LEAST: f64 = 0.01;
-
-/// The slabs of a view.
-#[derive(Debug)]
-pub(super) struct Slabs {
-    /// An eye for each, from front to back.
-    pub(super) eyes: Vec<Eye>,
-    /// World units of each.
-    thickness: f64,
-}
-
-/// Cuts the volume into slabs across the view direction.
-pub(super) fn cut(eye: &Eye, config: &RenderConfig) -> Result<Slabs> {
-    let (sigma, spacing) = (config.kernel.sigma, eye.grid.largest_spacing());
-    let [nearest, farthest] = eye.camera.depths_of(&eye.grid.crop(&eye.clip));
-    let (from, to) = (nearest - TAIL * sigma, farthest + TAIL * sigma);
-    let count = config.mode.slabs().unwrap_or(((to - from) / spacing).ceil().max(1.0) as usize);
-    if !(1..=MOST_SLABS).contains(&count) {
-        return Err(Error::usage(format!("--slabs: takes 1 to {MOST_SLABS}; here it would be {count}")));
-    }
-    let end = |n: usize| match n {
-        0 => f64::NEG_INFINITY,
-        n if n == count => f64::INFINITY,
-        n => from + (to - from) * (n as f64 / count as f64),
-    };
-    let slab = |n: usize| Slab::new([end(n), end(n + 1)], (sigma, eye.method.radius), count);
-    let eyes = (0..count).map(|n| Eye { slab: Some(slab(n)), ..eye.clone() }).collect();
-    Ok(Slabs { eyes, thickness: (to - from) / count as f64 })
-}
-
 /// Renders pictures of slabs, view by view; progress is in rows of pixels of slabs.
 pub(super) fn render(
     scene: &mut dyn Scene,
@@ -96,22 +61,30 @@ pub(super) fn render(
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    let views = eyes.iter().map(|eye| cut(eye, config)).collect::<Result<Vec<_>>>()?;
-    let all: usize = views.iter().map(|slabs| slabs.eyes.len()).sum();
+    let all: usize = eyes.iter().map(|eye| count(eye, config)).sum();
     progress.start(Some((all * config.frames.len() * config.size()[1]) as u64));
-    for (view, slabs) in views.iter().enumerate() {
+    for (view, eye) in eyes.iter().enumerate() {
+        let slabs = cut(eye, config)?;
         let mut sink = |frame, picture: &[f32]| sink(Rendered { view, frame, picture, error: None });
         let ViewReport { slabs: count, expected_error, .. } = &mut report.views[view];
         (*count, *expected_error) = (Some(slabs.eyes.len()), f64::NAN);
-        render_view(scene, config, slabs, progress, report, &mut sink)?;
+        render_view(scene, config, &slabs, progress, report, &mut sink)?;
     }
     Ok(())
 }
 
-/// Bytes that telling which tiles of a view's slabs can be seen takes.
-pub(super) fn bytes(eye: &Eye) -> usize {
+/// Bytes that the slabs of a view take, and to tell which of their tiles can be seen.
+pub(super) fn bytes(eye: &Eye, config: &RenderConfig) -> usize {
     let tiles: usize = eye.camera.size.iter().map(|pixels| pixels.div_ceil(eye.tile())).product();
-    tiles * eye.slab.map_or(0, |slab| slab.count) * Visible::BYTES
+    count(eye, config) * (tiles * Visible::BYTES + size_of::<Eye>()) + eye.blocks.len() * Visible::BLOCK_BYTES
+}
+
+/// Slabs that a block can reach into, and bytes that each of its voxels takes in each of so many.
+pub(super) fn of_block(eyes: &[Eye], block: &Region) -> (usize, usize) {
+    let Some(Eye { slab: Some(slab), camera, grid, .. }) = eyes.first() else { return (1, 0) };
+    let [nearest, farthest] = camera.depths_of(&Grid { dims: block.dims(), ..*grid });
+    let each = slab.reached_by(0.0).min(eyes.len()) * size_of::<f64>();
+    (slab.reached_by(farthest - nearest), each)
 }
 
 /// Renders all frames from a view that is cut into slabs, giving each to `sink`.
@@ -124,14 +97,16 @@ fn render_view(
     sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
 ) -> Result<()> {
     let Slabs { eyes: slabs, thickness } = slabs;
-    let least = LEAST * thickness;
+    let least = |share: f64| share * thickness;
     match &config.mode {
         Mode::Composite { transfer, unit, .. } => {
             let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
-            let blend = Composite(Medium::new(transfer, unit));
-            View { slabs, least, blend, config, progress }.render(scene, report, sink)
+            let blend = Composite { medium: Medium::new(transfer), unit };
+            View { slabs, least: least(Composite::LEAST), blend, config, progress }.render(scene, report, sink)
         }
-        Mode::Mip { .. } => View { slabs, least, blend: Largest, config, progress }.render(scene, report, sink),
+        Mode::Mip { .. } => {
+            View { slabs, least: least(Largest::LEAST), blend: Largest, config, progress }.render(scene, report, sink)
+        }
         Mode::Projection => Ok(()),
     }
 }
@@ -260,104 +235,5 @@ impl<B: Blend> View<'_, B> {
                 self.blend.add(pixel, sum / length, *length);
             }
         }
-    }
-}
-
-/// The blocks of a group, with the weights of all their voxels in a plane of its own.
-struct WithLengths<'a> {
-    group: &'a dyn Group,
-    layout: Layout,
-    blocks: BlockGrid,
-    /// Those that have terms.
-    with_terms: HashSet<usize>,
-}
-
-impl<'a> WithLengths<'a> {
-    fn new(group: &'a dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Self> {
-        let contents = group.blocks(&eye.clip)?;
-        report.blocks += eye.blocks.len() as u64;
-        report.add(&contents);
-        let layout = Layout { lengths: true, ..group.layout() };
-        Ok(Self { group, layout, blocks: eye.blocks, with_terms: contents.blocks.into_iter().collect() })
-    }
-
-    /// Some layers of a tile, of which these planes may have sums.
-    fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
-        let count = self.layout.planes();
-        let layer = |n: usize| {
-            let used: Vec<usize> =
-                used.iter().filter(|plane| **plane / count == n).map(|plane| plane % count).collect();
-            let inverse = (!used.is_empty()).then(|| self.group.inverse(&used));
-            Layer { layout: self.layout, inverse, frames: vec![Lane::default(); self.layout.frames] }
-        };
-        (0..layers).map(layer).collect()
-    }
-}
-
-/// A slab of a tile.
-struct Layer<'a> {
-    layout: Layout,
-    /// None if it holds nothing.
-    inverse: Option<Box<Inverse<'a>>>,
-    frames: Vec<Lane>,
-}
-
-impl Layer<'_> {
-    /// Calls `each(frame, sums, lengths)` for all frames at some pixels; overwrites their planes.
-    fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
-        let Self { layout, inverse: Some(inverse), frames } = self else { return };
-        let lengths = lengths(layout, planes);
-        if lengths.iter().flatten().all(|length| *length <= 0.0) {
-            return;
-        }
-        inverse(planes, frames);
-        frames.iter().zip(&lengths).enumerate().for_each(|(f, (sums, lengths))| each(f, sums, lengths));
-    }
-}
-
-/// Of each frame the lengths of some pixels, less what is missing.
-fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
-    let all = planes[layout.planes() - 1];
-    if !layout.absent {
-        return vec![all; layout.frames];
-    }
-    let in_all = planes[layout.absent_in_all()];
-    let of_frame = |f: usize| {
-        let absent = planes[layout.absent(f)];
-        std::array::from_fn(|l| all[l] - absent[l] - in_all[l])
-    };
-    (0..layout.frames).map(of_frame).collect()
-}
-
-impl Blocks for WithLengths<'_> {
-    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        let planes = self.with_terms.contains(&block).then(|| self.group.planes(block)).transpose()?;
-        let ones = OnesOf(self.blocks.region(block).voxels());
-        Ok(Box::new(BlockWithLengths { planes, ones, last: self.layout.planes() - 1 }))
-    }
-}
-
-/// A block, and a 1 for each of its voxels in the last plane.
-struct BlockWithLengths<'a> {
-    planes: Option<Box<dyn BlockPlanes + 'a>>,
-    ones: OnesOf,
-    last: usize,
-}
-
-impl BlockPlanes for BlockWithLengths<'_> {
-    fn voxels(&self) -> usize {
-        self.ones.voxels()
-    }
-
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
-        match &self.planes {
-            _ if plane == self.last => self.ones.plane(plane, room),
-            Some(planes) => planes.plane(plane, room),
-            None => Ok(Amounts::Nothing),
-        }
-    }
-
-    fn held(&self) -> [u64; 2] {
-        self.planes.as_ref().map_or([0; 2], |planes| planes.held())
     }
 }

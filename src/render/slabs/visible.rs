@@ -34,6 +34,8 @@ struct Reached {
 impl Visible {
     /// What a tile of a slab takes.
     pub(super) const BYTES: usize = size_of::<(f64, f64)>() + size_of::<bool>();
+    /// What a block takes.
+    pub(super) const BLOCK_BYTES: usize = size_of::<Reached>() + size_of::<(usize, (f64, f64))>();
 
     /// Of a group from a view that is cut into slabs: a mean lies between the least and the largest value of all blocks
     /// that reach its tile, so where no such value can be seen nothing of the tile can.
@@ -60,7 +62,10 @@ impl Visible {
 
     /// Whether the tile of a slab that begins at a place can still show anything.
     pub(super) fn is_open(&self, slab: usize, place: &Place) -> bool {
-        let tile = self.tile(place);
+        self.can_show(slab, self.tile(place))
+    }
+
+    fn can_show(&self, slab: usize, tile: usize) -> bool {
         self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed)
     }
 
@@ -76,17 +81,17 @@ impl Visible {
     /// Whether any tile of some rows of a slab can still show anything.
     pub(super) fn any(&self, slab: usize, rows: &Range<usize>) -> bool {
         let tiles = rows.start / self.side * self.columns..rows.end.div_ceil(self.side) * self.columns;
-        tiles.into_iter().any(|tile| self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed))
+        tiles.into_iter().any(|tile| self.can_show(slab, tile))
     }
 
     /// The blocks that reach any such tile of some slabs in some rows.
     pub(super) fn blocks(&self, slabs: &[usize], rows: &Range<usize>) -> Vec<usize> {
-        let open = |slab: usize, tile: usize| self.needed[slab * self.tiles + tile] && !self.closed[tile].load(Relaxed);
         let within = rows.start / self.side..rows.end.div_ceil(self.side);
         let needs = |b: &&Reached| {
             slabs.iter().filter(|slab| b.slabs.contains(slab)).any(|slab| {
                 let rows = b.tiles[1].start.max(within.start)..b.tiles[1].end.min(within.end);
-                rows.into_iter().any(|row| b.tiles[0].clone().any(|column| open(*slab, row * self.columns + column)))
+                rows.into_iter()
+                    .any(|row| b.tiles[0].clone().any(|column| self.can_show(*slab, row * self.columns + column)))
             })
         };
         self.blocks.iter().filter(needs).map(|b| b.block).collect()

@@ -19,7 +19,7 @@ const INK: Rgb = [255; 3];
 ///
 /// # Errors
 /// Frames that cannot be read, a file that cannot be written.
-pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, path: &Path) -> Result<()> {
+pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, (path, force): (&Path, bool)) -> Result<()> {
     let frames = shown(a.shape.frames);
     let step = shrinking(frames.len() * a.shape.width * a.shape.height);
     let picture = |frame: &usize| {
@@ -28,7 +28,7 @@ pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, path: &Path) -> Result<()> 
     };
     let pictures = frames.iter().map(picture).collect::<Result<Vec<_>>>()?;
     let sheet = contact_sheet(&pictures, columns(pictures.len()), GAP, PAPER);
-    let mut out = Output::create(path, true)?;
+    let mut out = Output::create(path, force)?;
     let labels = [format!(">={}", number(scale)), "|A-B|".into(), "0".into()];
     with_bar(&sheet, &labels, INK, PAPER, difference_colour).write_png(&mut out)?;
     out.commit()

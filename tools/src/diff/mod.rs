@@ -14,6 +14,7 @@ use ssim::{Picture, Scope, ssim};
 use std::path::{Path, PathBuf};
 use wavesplat::cli::{self, spare_inputs};
 use wavesplat::error::{Error, Result};
+use wavesplat::output::Output;
 use wavesplat::sample::SampleType;
 
 // Each paragraph is one line, which is broken to fit the terminal.
@@ -50,6 +51,9 @@ pub struct Args {
     /// Draw |A - B| as a picture, blue to red
     #[arg(short, long, value_name = "HEAT.png")]
     pub output: Option<PathBuf>,
+    /// Replace an existing heat map
+    #[arg(long, requires = "output")]
+    pub force: bool,
     /// The difference that is red [default: the largest that is finite]
     #[arg(long, value_name = "MAX", requires = "output", value_parser = above_zero)]
     pub scale: Option<f64>,
@@ -106,11 +110,12 @@ pub fn compare(args: &Args) -> Result<Report> {
     check_alike(args, &a.shape, &b.shape)?;
     if let Some(path) = &args.output {
         check_output(path, &[a.paths(), b.paths()].concat())?;
+        Output::check(path, args.force)?;
     }
     let mut report = measure_all(args, &a, &b)?;
     if let Some(path) = &args.output {
         let scale = args.scale.unwrap_or_else(|| usual_scale(&report));
-        heat::draw(&a, &b, scale, path)?;
+        heat::draw(&a, &b, scale, (path, args.force))?;
         report.heat_map = Some(HeatMap { path: path.clone(), scale });
     }
     Ok(report)

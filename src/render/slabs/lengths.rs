@@ -1,0 +1,111 @@
+//! What a group of frames adds to slabs: its own planes, and the lengths of rays.
+
+use crate::error::Result;
+use crate::render::RenderReport;
+use crate::render::amounts::{Amounts, BlockPlanes, OnesOf, Room};
+use crate::render::canvas::Blocks;
+use crate::render::eye::Eye;
+use crate::render::scene::{Group, Inverse};
+use crate::render::terms::Layout;
+use crate::volume::BlockGrid;
+use crate::wavelet::Lane;
+use std::collections::HashSet;
+
+/// The blocks of a group, with the weights of all their voxels in a plane of its own.
+pub(super) struct WithLengths<'a> {
+    group: &'a dyn Group,
+    pub(super) layout: Layout,
+    blocks: BlockGrid,
+    /// Those that have terms.
+    with_terms: HashSet<usize>,
+}
+
+impl<'a> WithLengths<'a> {
+    pub(super) fn new(group: &'a dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Self> {
+        let contents = group.blocks(&eye.clip)?;
+        report.blocks += eye.blocks.len() as u64;
+        report.add(&contents);
+        let layout = Layout { lengths: true, ..group.layout() };
+        Ok(Self { group, layout, blocks: eye.blocks, with_terms: contents.blocks.into_iter().collect() })
+    }
+
+    /// Some layers of a tile, of which these planes may have sums.
+    pub(super) fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
+        let count = self.layout.planes();
+        let layer = |n: usize| {
+            let used: Vec<usize> =
+                used.iter().filter(|plane| **plane / count == n).map(|plane| plane % count).collect();
+            let inverse = (!used.is_empty()).then(|| self.group.inverse(&used));
+            Layer { layout: self.layout, inverse, frames: vec![Lane::default(); self.layout.frames] }
+        };
+        (0..layers).map(layer).collect()
+    }
+}
+
+/// A slab of a tile.
+pub(super) struct Layer<'a> {
+    layout: Layout,
+    /// None if it holds nothing.
+    inverse: Option<Box<Inverse<'a>>>,
+    frames: Vec<Lane>,
+}
+
+impl Layer<'_> {
+    /// Calls `each(frame, sums, lengths)` for all frames at some pixels; overwrites their planes.
+    pub(super) fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
+        let Self { layout, inverse: Some(inverse), frames } = self else { return };
+        let lengths = lengths(layout, planes);
+        if lengths.iter().flatten().all(|length| *length <= 0.0) {
+            return;
+        }
+        inverse(planes, frames);
+        frames.iter().zip(&lengths).enumerate().for_each(|(f, (sums, lengths))| each(f, sums, lengths));
+    }
+}
+
+/// Of each frame the lengths of some pixels, less what is missing.
+fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
+    let all = planes[layout.planes() - 1];
+    if !layout.absent {
+        return vec![all; layout.frames];
+    }
+    let in_all = planes[layout.absent_in_all()];
+    let of_frame = |f: usize| {
+        let absent = planes[layout.absent(f)];
+        std::array::from_fn(|l| all[l] - absent[l] - in_all[l])
+    };
+    (0..layout.frames).map(of_frame).collect()
+}
+
+impl Blocks for WithLengths<'_> {
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        let planes = self.with_terms.contains(&block).then(|| self.group.planes(block)).transpose()?;
+        let ones = OnesOf(self.blocks.region(block).voxels());
+        Ok(Box::new(BlockWithLengths { planes, ones, last: self.layout.planes() - 1 }))
+    }
+}
+
+/// A block, and a 1 for each of its voxels in the last plane.
+struct BlockWithLengths<'a> {
+    planes: Option<Box<dyn BlockPlanes + 'a>>,
+    ones: OnesOf,
+    last: usize,
+}
+
+impl BlockPlanes for BlockWithLengths<'_> {
+    fn voxels(&self) -> usize {
+        self.ones.voxels()
+    }
+
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+        match &self.planes {
+            _ if plane == self.last => self.ones.plane(plane, room),
+            Some(planes) => planes.plane(plane, room),
+            None => Ok(Amounts::Nothing),
+        }
+    }
+
+    fn held(&self) -> [u64; 2] {
+        self.planes.as_ref().map_or([0; 2], |planes| planes.held())
+    }
+}
