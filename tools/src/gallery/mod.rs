@@ -27,7 +27,7 @@ use wavesplat::sample::SampleType;
 use wavesplat::source::FrameSource;
 
 /// What is shown unless archives are given.
-pub const USUAL: [&str; 2] = ["demo", "moving"];
+pub const USUAL: [&str; 2] = ["demo", "smooth"];
 /// Pixels a side of a picture.
 pub const SIDE: usize = 216;
 /// Of all conversions.
