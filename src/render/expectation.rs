@@ -13,7 +13,7 @@
 //! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
 //! voxels, and what is missing to be there.
 
-use super::project::Look;
+use super::weights::Look;
 use super::{Quantity, RenderConfig};
 use crate::volume::{Grid, Region};
 use std::f64::consts::PI;

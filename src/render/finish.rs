@@ -2,9 +2,9 @@
 
 use super::canvas::{Finished, Pixels};
 use super::certificate::Certificate;
-use super::project::Look;
 use super::scene::{Group, Inverse};
 use super::terms::Layout;
+use super::weights::Look;
 use super::weights::{PixelWeight, Weights};
 use super::{Quantity, RenderConfig};
 use crate::wavelet::{LANES, Lane};

@@ -7,7 +7,7 @@ use super::eye::Eye;
 use super::finish::Finish;
 use super::plan::{self, Budget};
 use super::scene::{Group, Read, Scene};
-use super::weights::Weights;
+use super::weights::Look;
 use super::{RenderConfig, RenderReport, Rendered, lap};
 use crate::error::Result;
 use crate::progress::Progress;
@@ -93,24 +93,6 @@ fn render_channel(
 impl Blocks for &dyn Group {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         Group::planes(*self, block)
-    }
-}
-
-/// A view, and its sums of weights.
-#[derive(Debug)]
-pub(super) struct Look<'a> {
-    pub(super) eye: &'a Eye,
-    pub(super) weights: Weights,
-}
-
-impl<'a> Look<'a> {
-    fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
-        Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
-    }
-
-    /// Where nothing is weighed.
-    pub(super) fn of_no_weights(eye: &'a Eye) -> Self {
-        Self { eye, weights: Weights::default() }
     }
 }
 

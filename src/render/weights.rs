@@ -31,6 +31,24 @@ pub(super) struct Weights {
     threshold: f64,
 }
 
+/// A view, and its sums of weights.
+#[derive(Debug)]
+pub(super) struct Look<'a> {
+    pub(super) eye: &'a Eye,
+    pub(super) weights: Weights,
+}
+
+impl<'a> Look<'a> {
+    pub(super) fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
+        Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
+    }
+
+    /// Where nothing is weighed.
+    pub(super) fn of_no_weights(eye: &'a Eye) -> Self {
+        Self { eye, weights: Weights::default() }
+    }
+}
+
 /// The weights of one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelWeight {

@@ -24,28 +24,29 @@
 //! make of the samples. Every mean is off by no more than the file's bound.
 
 mod blend;
+mod cut;
 mod lengths;
 mod medium;
 mod slab;
 mod visible;
 
-pub(super) use slab::{Slab, count, cut};
+pub(super) use cut::{bytes, cut, of_block};
+pub(super) use slab::Slab;
 
 use super::canvas::{self, Canvas, Finished, Pixels};
 use super::expectation::Expectation;
 use super::eye::Eye;
 use super::plan::{self, Budget};
-use super::project::Look;
 use super::scene::{Group, Read, Scene};
+use super::weights::Look;
 use super::{Mode, RenderConfig, RenderReport, Rendered, ViewReport, lap};
 use crate::error::Result;
 use crate::progress::Progress;
-use crate::volume::{Grid, Region};
 use crate::wavelet::{LANES, Lane};
 use blend::{Blend, Composite, Largest};
+use cut::{Slabs, count};
 use lengths::WithLengths;
 use medium::Medium;
-use slab::Slabs;
 use std::ops::Range;
 use std::time::Instant;
 use visible::Visible;
@@ -71,20 +72,6 @@ pub(super) fn render(
         render_view(scene, config, &slabs, progress, report, &mut sink)?;
     }
     Ok(())
-}
-
-/// Bytes that the slabs of a view take, and to tell which of their tiles can be seen.
-pub(super) fn bytes(eye: &Eye, config: &RenderConfig) -> usize {
-    let tiles: usize = eye.camera.size.iter().map(|pixels| pixels.div_ceil(eye.tile())).product();
-    count(eye, config) * (tiles * Visible::BYTES + size_of::<Eye>()) + eye.blocks.len() * Visible::BLOCK_BYTES
-}
-
-/// Slabs that a block can reach into, and bytes that each of its voxels takes in each of so many.
-pub(super) fn of_block(eyes: &[Eye], block: &Region) -> (usize, usize) {
-    let Some(Eye { slab: Some(slab), camera, grid, .. }) = eyes.first() else { return (1, 0) };
-    let [nearest, farthest] = camera.depths_of(&Grid { dims: block.dims(), ..*grid });
-    let each = slab.reached_by(0.0).min(eyes.len()) * size_of::<f64>();
-    (slab.reached_by(farthest - nearest), each)
 }
 
 /// Renders all frames from a view that is cut into slabs, giving each to `sink`.
