@@ -2,7 +2,6 @@
 
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::colour::TransferFunction;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
@@ -304,34 +303,14 @@ pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
     file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
 }
 
-/// The settings of a file of colours: the transfer function, the type of the source's samples, and if one was declared the
-/// value that means "missing" among these.
-pub const COLOUR_SETTINGS: [&str; 3] = ["colours", "dtype", "missing-value"];
-
-/// What a file of colours remembers of how they were made.
-pub fn remembered_colours(painter: &Painter) -> impl Iterator<Item = (&'static str, String)> {
-    let Painter { colours, sample, missing_value } = painter;
-    let values = [Some(colours.text()), Some(sample.to_string()), missing_value.map(|v| format!("{v:?}"))];
-    COLOUR_SETTINGS.into_iter().zip(values).filter_map(|(name, value)| Some((name, value?)))
-}
-
 /// What made the channels of a file; an error where it has several, and does not say of what.
 fn painter(m: &Metadata) -> std::result::Result<Option<Painter>, wavesplat_format::Error> {
     if m.channels == 1 {
         return Ok(None);
     }
     let coloured = usize::from(m.channels) == CHANNELS.len() && m.sample == Painter::SAMPLE;
-    let painter = if coloured && m.missing_value.is_none() { remembered_painter(m) } else { None };
+    let painter =
+        if coloured && m.missing_value.is_none() { Painter::of_settings(|name| setting(m, name)) } else { None };
     let unsupported = || wavesplat_format::Error::Unsupported(format!("{} channels of no known colours", m.channels));
     painter.map(Some).ok_or_else(unsupported)
-}
-
-/// Of [`remembered_colours`].
-fn remembered_painter(m: &Metadata) -> Option<Painter> {
-    let [colours, sample, missing] = COLOUR_SETTINGS.map(|name| setting(m, name));
-    let missing_value = match missing {
-        Some(value) => Some(value.parse().ok()?),
-        None => None,
-    };
-    Some(Painter { colours: TransferFunction::of_text(colours?)?, sample: sample?.parse().ok()?, missing_value })
 }

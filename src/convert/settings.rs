@@ -3,7 +3,7 @@
 use super::{Coding, ConvertConfig, MissingPolicy, Space};
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
-use crate::file::{COLOUR_SETTINGS, remembered_colours, setting};
+use crate::file::setting;
 use crate::source::Painter;
 use crate::wavelet::Basis;
 use std::str::FromStr;
@@ -18,7 +18,7 @@ pub(super) fn remembered(config: &ConvertConfig, painter: Option<&Painter>) -> V
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
     let more = [("level", level.to_string()), ("missing", missing.into())];
-    let all = given.into_iter().chain(more).chain(range).chain(painter.into_iter().flat_map(remembered_colours));
+    let all = given.into_iter().chain(more).chain(range).chain(painter.into_iter().flat_map(Painter::settings));
     all.map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
 }
 
@@ -72,7 +72,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
-        let ours = OURS.into_iter().chain(["frames", "region"]).chain(COLOUR_SETTINGS);
+        let ours = OURS.into_iter().chain(["frames", "region"]).chain(Painter::SETTINGS.map(|(name, _)| name));
         let settings = ours.map(|name| (option(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
@@ -83,8 +83,8 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
 
 /// What a setting is called in messages.
 fn option(setting: &'static str) -> &'static str {
-    let of_colours = COLOUR_SETTINGS.iter().position(|name| *name == setting);
-    of_colours.map_or(setting, |i| ["--transfer-function", "--dtype", "--missing-value"][i])
+    let of_colours = Painter::SETTINGS.into_iter().find(|(name, _)| *name == setting);
+    of_colours.map_or(setting, |(_, option)| option)
 }
 
 /// As much of a setting as a message has room for: transfer functions may have many points.
@@ -99,7 +99,7 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
 
 /// Whether [`remembered`] adds a setting by itself.
 fn is_ours(name: &str) -> bool {
-    OURS.contains(&name) || COLOUR_SETTINGS.contains(&name)
+    OURS.contains(&name) || Painter::SETTINGS.iter().any(|(ours, _)| *ours == name)
 }
 
 /// The names of what [`remembered`] adds by itself, besides those of colours.

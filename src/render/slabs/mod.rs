@@ -53,6 +53,7 @@ use visible::Visible;
 
 /// Planes of slabs that are gathered together, about: what a pixel's weights cost is shared by as many.
 pub(super) const TOGETHER: usize = 64;
+
 /// Renders pictures of slabs, view by view; progress is in rows of pixels of slabs.
 pub(super) fn render(
     scene: &mut dyn Scene,
