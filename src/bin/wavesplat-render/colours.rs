@@ -159,7 +159,7 @@ impl Ranges {
     }
 
     /// From 0 to the largest.
-    pub(crate) fn from_nothing(&self) -> (f64, f64) {
+    pub(crate) fn up_from_zero(&self) -> (f64, f64) {
         (0.0, self.values.1)
     }
 

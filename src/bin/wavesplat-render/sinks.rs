@@ -37,7 +37,7 @@ impl Cli {
         };
         let (range, norm) = match (pixel, fixed) {
             (Pixel::Value, _) => self.colour.spread(&map, &seen, in_colours, &self.common)?,
-            (_, fixed) => (fixed.unwrap_or(seen.from_nothing()), Norm::Linear),
+            (_, fixed) => (fixed.unwrap_or(seen.up_from_zero()), Norm::Linear),
         };
         if needed {
             self.common.detail(format_args!("colours from {:.4e} to {:.4e}; --range sets them", range.0, range.1));
