@@ -76,6 +76,11 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
     }
 
+    /// The world point so many world units to the right of the one in the middle of the picture.
+    pub fn beside(&self, length: f64) -> [f64; 3] {
+        std::array::from_fn(|axis| self.center[axis] + length * self.right[axis])
+    }
+
     /// The depths of the nearest and of the farthest corner of `grid`, in world units.
     pub fn depths_of(&self, grid: &Grid) -> [f64; 2] {
         [self.nearest_of(grid), corners(grid).map(|p| self.project(p)[2]).fold(f64::NEG_INFINITY, f64::max)]

@@ -118,7 +118,7 @@ impl RenderConfig {
             return Ok(());
         }
         let refused = [
-            (self.kernel.tau != 0.0, "--tau: attenuates projections; what hides what is the transfer function's"),
+            (self.kernel.tau != 0.0, "--tau: is of projections alone (--mode projection)"),
             (self.certify, "--error-image: certifies projections alone (--mode projection)"),
             (self.chooses_by_view(), "--error expected: is of projections alone (--mode projection)"),
             (self.quantity != Quantity::Mean, "--quantity: is of projections alone (--mode projection)"),

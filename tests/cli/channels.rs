@@ -212,10 +212,10 @@ fn options_without_a_use_for_colours_are_refused() {
     };
     refused("a.wspl -o a.png --frames 0 --colormap turbo", &["--colormap", "the colours are fixed"]);
     refused("a.wspl -o a.gray16", &["gray16", "three"]);
-    refused("a.wspl -o b.npy --transfer-function viridis", &["--transfer-function", "--method direct"]);
+    refused("a.wspl -o b.npy --transfer-function viridis", &["--transfer-function", "--mode composite"]);
     refused("a.npy --method direct --transfer-function no-such -o b.npy", &["no-such"]);
     work.wavesplat("convert a.npy -o plain.wspl").ok();
-    refused("plain.wspl -o b.npy --transfer-function viridis", &["--transfer-function", "--method direct"]);
+    refused("plain.wspl -o b.npy --transfer-function viridis", &["--transfer-function", "--mode composite"]);
     refused("a.wspl -o b.npy --size 900x900 --memory 10MiB", &["--memory", "at least"]);
 }
 

@@ -63,6 +63,10 @@ fn automatic_ranges_go_with_the_map_and_the_norm() {
 fn the_time_and_the_colours_are_drawn_into_pictures() {
     let work = Work::with_file("");
     let render = |options: &str| decode_png(&work.render(&format!("a.wspl --frames 2 -o - {options}")).ok().out);
+    let beside = render("--size 200x160 --annotate --colormap grey");
+    let below_the_bar = beside.chunks(600).skip(132).flat_map(|row| &row[3 * 110..]);
+    assert!(below_the_bar.into_iter().all(|v| *v == 0), "the volume is beside the bar");
+    let render = |options: &str| render(&format!("--scale 9 {options}"));
     let differ = |a: &[u8], b: &[u8]| a.chunks(3).zip(b.chunks(3)).map(|(a, b)| a != b).collect::<Vec<_>>();
     let (plain, drawn) = (render("--size 200x160"), render("--size 200x160 --annotate"));
     let changed = differ(&plain, &drawn);

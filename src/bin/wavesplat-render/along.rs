@@ -43,8 +43,8 @@ impl AlongArgs {
     /// An error if an option says nothing of the mode; whether a colour map is given.
     pub(crate) fn check(&self, is_direct: bool, colour_map: bool) -> Result<()> {
         let composite = self.mode == ModeName::Composite;
-        let colours = "colours samples along the ray (--mode composite) or those of frames (--method direct); --colormap \
-                       colours projections, and convert --transfer-function the samples of a file";
+        let colours = "colours samples along the ray (--mode composite); --colormap colours projections, and wavesplat convert \
+                       --transfer-function makes files of colours";
         let wrong = [
             (self.opacity.is_some() && !composite, "--opacity: needs --mode composite"),
             (self.opacity_unit.is_some() && !composite, "--opacity-unit: needs --mode composite"),
@@ -59,7 +59,7 @@ impl AlongArgs {
             return Err(Error::usage(what));
         }
         if self.transfer_function.is_some() && self.mode == ModeName::Projection && !is_direct {
-            return Err(Error::usage(format!("--transfer-function: {colours}")));
+            return Err(Error::usage(format!("--transfer-function: of a coefficient file, {colours}")));
         }
         let positive = self.opacity_unit.is_none_or(|unit| unit.is_finite() && unit > 0.0);
         if positive { Ok(()) } else { Err(Error::usage("--opacity-unit: takes a length above 0")) }
@@ -69,6 +69,14 @@ impl AlongArgs {
     pub(crate) fn colours(&self) -> Option<&str> {
         let of_composite = (self.mode == ModeName::Composite).then_some("viridis");
         self.transfer_function.as_deref().or(of_composite)
+    }
+
+    /// Whether a composite has colours of no values of their own, nor of a range that was asked for.
+    pub(crate) fn is_automatic(&self, range: Option<Pair>) -> Result<bool> {
+        let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite && range.is_none()) else {
+            return Ok(false);
+        };
+        Ok(!TransferFunction::open(name)?.is_of_values())
     }
 
     /// The colours of a composite of a file over the range that was asked for, their own, or that of all samples.

@@ -15,8 +15,8 @@ pub(crate) struct ColourArgs {
     /// maps, FILE#NAME) or .csv with value,red,green,blue [default: viridis]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Colour")]
     colormap: Option<String>,
-    /// Values of the first and the last colour [default: a file's own, or those of small pictures of 16 frames of the archive;
-    /// to both sides of 0 alike with coolwarm]
+    /// Values of the first and the last colour [default: a file's own, or those of small pictures of 16 frames of the archive,
+    /// but for few spots that would take most colours; to both sides of 0 alike with coolwarm]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     pub(crate) range: Option<Pair>,
     /// Spread values over colours evenly, or by their logarithm (no further down than to a ten-thousandth of the largest)
@@ -114,6 +114,20 @@ fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
     Ok([(number >> 16) as u8, (number >> 8) as u8, number as u8])
 }
 
+/// Pixels that a range is judged by, at most.
+const MOST_SEEN: usize = 1 << 20;
+
+/// The range of ascending values, without the outermost ones where a few spots would take most of the colours: at either end
+/// at most one value in 200, and only if those take up two fifths of the range.
+fn without_spots(seen: &[f32]) -> (f64, f64) {
+    let few = seen.len() / 200;
+    let at = |n: usize| f64::from(seen[n]);
+    let (lo, hi, low, high) = (at(0), at(seen.len() - 1), at(few), at(seen.len() - 1 - few));
+    let (spots, nothing) = (0.4 * (hi - lo), 0.05 * (hi - lo));
+    let clipped = |end: f64, inner: f64| if (end - inner).abs() >= spots && high - low > nothing { inner } else { end };
+    (clipped(lo, low), clipped(hi, high))
+}
+
 /// The ranges of the pictures and of their errors.
 pub(crate) struct Ranges {
     values: (f64, f64),
@@ -143,19 +157,28 @@ impl Ranges {
         small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
         small.frames.dedup();
         let mut ranges = Self::default();
-        let (mut lo, mut hi, mut positive) = (f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY);
+        let pixels = small.frames.len() * small.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
+        let (step, mut seen) = (pixels.div_ceil(MOST_SEEN).max(1), Vec::new());
         let report = render(scene, &small, &Silent, &mut |rendered| {
-            (lo, hi) = rendered.picture.iter().fold((lo, hi), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-            let above = rendered.picture.iter().filter(|v| **v > 0.0);
-            positive = above.fold(positive, |least, v| least.min(*v));
+            seen.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
             Ok(())
         })?;
-        if lo <= hi {
-            ranges.values = (lo.into(), hi.into());
-            ranges.positive = positive.is_finite().then_some(positive.into());
+        seen.sort_unstable_by(f32::total_cmp);
+        if !seen.is_empty() {
+            ranges.values = without_spots(&seen);
+            ranges.positive = seen.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
         ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
         Ok(ranges)
+    }
+
+    /// Colours over the range of all values, but for few spots that would take most of them; these are of largest values.
+    pub(crate) fn without_spots(&self, colours: &TransferFunction) -> Result<TransferFunction> {
+        let ((lo, hi), most) = (colours.range(), self.values.1);
+        if !(0.0 < most && most < hi) {
+            return Ok(colours.clone());
+        }
+        colours.over((if lo < 0.0 { lo * most / hi } else { lo.min(0.5 * most) }, most))
     }
 
     /// From 0 to the largest.

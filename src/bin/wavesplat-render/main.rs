@@ -26,6 +26,7 @@ use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
 use wavesplat::output::STANDARD;
+use wavesplat::render::annotate::room;
 use wavesplat::render::sink::{PictureFormat, Sink};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
@@ -189,11 +190,13 @@ impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
         let Opened { mut scene, file, times, colours } = self.scene()?;
-        let colours = colours.as_ref();
-        let mut config = self.config(scene.as_ref(), file.as_ref().map(|file| file.metadata()), colours)?;
+        let metadata = file.as_ref().map(|file| file.metadata());
+        let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
         config.reserved =
             targets.0.memory(&config)? + targets.1.as_ref().map_or(Ok(0), |errors| errors.memory(&config))?;
+        let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
+        let colours = colours.as_ref();
         let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, (times, colours))?;
         let progress = self.common.progress(if config.mode.is_projection() { "pictures" } else { "rows of slabs" });
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
@@ -342,18 +345,27 @@ impl Cli {
         Ok(orbits.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The views of an orbit, all of one scale.
+    /// The views of an orbit, all of one scale; where nobody says it, such that all is beside what is drawn.
     fn orbit(&self, [azimuth, elevation]: [f64; 2], grid: &Grid) -> Result<Vec<View>> {
         let (roll, size, center) = (self.roll, self.size.0, self.center.map(|c| c.0));
         let first = View { azimuth, elevation, roll, size, scale: self.scale, center };
-        if self.orbit == 1 {
+        let fits = self.scale.is_none() && center.is_none() && self.colour.annotate;
+        let room = if fits { room(size) } else { 0 };
+        if self.orbit == 1 && room == 0 {
             return Ok(vec![first]);
         }
         let turned = |n| (azimuth + f64::from(n) * 360.0 / f64::from(self.orbit)).rem_euclid(360.0);
+        let turned = |n| if self.orbit == 1 { azimuth } else { turned(n) };
         let mut views: Vec<View> = (0..self.orbit).map(|n| View { azimuth: turned(n), ..first }).collect();
-        let scales = views.iter().map(|view| Camera::new(view, grid).map(|camera| camera.scale));
-        let scale = scales.collect::<Result<Vec<_>>>()?.into_iter().fold(f64::INFINITY, f64::min);
-        views.iter_mut().for_each(|view| view.scale = Some(scale));
+        let narrow = |view: &View| Camera::new(&View { size: [size[0] - room, size[1]], ..*view }, grid);
+        let cameras = views.iter().map(narrow).collect::<Result<Vec<_>>>()?;
+        let scale = cameras.iter().map(|camera| camera.scale).fold(f64::INFINITY, f64::min);
+        for (view, camera) in views.iter_mut().zip(&cameras) {
+            view.scale = Some(scale);
+            if room > 0 {
+                view.center = Some(camera.beside(room as f64 / 2.0 / scale));
+            }
+        }
         Ok(views)
     }
 

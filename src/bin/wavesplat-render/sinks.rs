@@ -9,7 +9,10 @@ use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::error::{Error, Result};
 use wavesplat::render::annotate::Annotation;
 use wavesplat::render::sink::{PictureFormat, Sink, SinkConfig};
-use wavesplat::render::{Pixel, RenderConfig, Scene, check};
+use wavesplat::render::{Mode, Pixel, RenderConfig, Scene, check};
+
+/// Slabs of small pictures that only a range is judged by.
+const FEW_SLABS: usize = 32;
 
 impl Cli {
     /// Where the pictures of each view go, where those of their errors go, if anywhere, and the values of their colours.
@@ -25,7 +28,8 @@ impl Cli {
         let in_colours = pictures.format != PictureFormat::Npy || self.colour.is_asked();
         let fixed = self.fixed_range(pixel, colours);
         let needed = in_colours && fixed.is_none() || certify;
-        let looking = RenderConfig { certify, ..config.clone() };
+        let mode = if config.mode.is_projection() { Mode::Projection } else { Mode::Mip { slabs: Some(FEW_SLABS) } };
+        let looking = RenderConfig { certify, mode, ..config.clone() };
         if needed {
             check(scene, config)?; // or small pictures would be made in vain, and what they need be named
         }
@@ -66,6 +70,26 @@ impl Cli {
         let errors = errors.map_or(Ok(Vec::new()), |errors| open(errors, of_error, of_errors, false))?;
         let coloured = Coloured { range: in_colours.then_some(range), error_range: certify.then_some(seen.errors) };
         Ok((open(pictures, pixel, scale(range, norm)?, self.colour.is_asked())?, errors, coloured))
+    }
+
+    /// The colours of a composite that nobody gave a range for, by the largest values that small pictures show.
+    pub(crate) fn without_spots(
+        &self,
+        scene: &mut dyn Scene,
+        config: &mut RenderConfig,
+        colours: Option<TransferFunction>,
+    ) -> Result<Option<TransferFunction>> {
+        let Some(all) = colours.as_ref().filter(|_| config.mode.pixel() == Pixel::Light) else { return Ok(colours) };
+        if !self.along.is_automatic(self.colour.range)? {
+            return Ok(colours);
+        }
+        check(scene, config)?;
+        let looking = RenderConfig { mode: Mode::Mip { slabs: Some(FEW_SLABS) }, ..config.clone() };
+        let colours = Ranges::of(scene, looking)?.without_spots(all)?;
+        let (lo, hi) = colours.range();
+        self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        config.mode = self.along.mode(Some(&colours))?;
+        Ok(Some(colours))
     }
 
     /// What the numbers of a pixel are; an error where options or formats have no use for colours.

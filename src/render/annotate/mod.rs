@@ -35,6 +35,13 @@ impl Annotation {
     }
 }
 
+/// Columns at the right edge that a colour bar and its values take of a picture of such a size; none if it has no room.
+pub fn room([width, height]: [usize; 2]) -> usize {
+    const LETTERS: usize = 12;
+    let room = LETTERS * Letters::for_side(width.min(height)).width;
+    if 2 * room <= width { room } else { 0 }
+}
+
 /// A picture to draw on.
 struct Sheet<'a> {
     pixels: &'a mut [Rgb],
