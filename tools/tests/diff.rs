@@ -312,10 +312,11 @@ fn the_heat_map_runs_from_blue_to_red_with_a_bar() {
     let at = |pixels: &[[u8; 3]], x: usize, y: usize| pixels[(gap + band + y) * width as usize + gap + x];
     assert_eq!((at(&pixels, 0, 0), at(&pixels, 1, 0), at(&pixels, 5, 5)), ([0; 3], [255, 0, 0], [0, 0, 255]));
     assert_eq!((at(&pixels, 2, 1), at(&pixels, 3, 1)), ([0, 255, 0], [255, 0, 0]));
-    draw(&["--scale", "1"]);
+    refused(&a, &b, &["-o", heat.to_str().unwrap()], 2, "--force");
+    draw(&["--scale", "1", "--force"]);
     assert_eq!(at(&picture(&heat).1, 3, 1), [0, 255, 0]);
     let one = folder.grey("one.png", &texture(1));
-    assert!(diff(&one, &one, &["-o", heat.to_str().unwrap()]).status.success());
+    assert!(diff(&one, &one, &["-o", heat.to_str().unwrap(), "--force"]).status.success());
     assert_eq!(picture(&heat).1[4 * picture(&heat).0[0] as usize + 4], [0, 0, 255], "a picture has no name above");
 }
 
