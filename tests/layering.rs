@@ -42,8 +42,8 @@ const HOMES: [(&str, &[&str]); 14] = [
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),
-    ("npyz::", &["npy.rs", "source/npy.rs"]),
-    ("quick_xml::", &["source/"]),
+    ("npyz::", &["npy.rs", "source/formats/npy.rs"]),
+    ("quick_xml::", &["source/formats/"]),
     ("half::", &["sample.rs", "bound.rs"]),
 ];
 

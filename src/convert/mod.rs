@@ -31,7 +31,6 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::progress::Progress;
 use crate::report::{PromiseReport, WindowReport};
-use crate::sample::SampleType;
 use crate::source::{Archive, CHANNELS, FrameSource, Painter};
 use crate::volume::BlockGrid;
 use crate::wavelet;
@@ -84,8 +83,6 @@ pub struct ConvertConfig {
     pub level: i32,
     /// Bytes that may be allocated.
     pub memory: usize,
-    /// Bytes of these that the source takes for itself: a stream's window.
-    pub reserved: usize,
     /// What was asked of the input (frames, region, variable), to find the same samples again.
     pub settings: Vec<(String, String)>,
 }
@@ -105,7 +102,6 @@ impl ConvertConfig {
             block: None,
             level: 3,
             memory,
-            reserved: 0,
             settings: Vec::new(),
         }
     }
@@ -265,7 +261,7 @@ impl<'a> Plan<'a> {
         if u32::try_from(blocks.len()).is_err() {
             return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
         }
-        let batch = batch_len(config, blocks, archive.sample, painter)?;
+        let batch = batch_len(config, blocks, archive, painter)?;
         Ok(Self { start: start(config, archive, painter, edge), painter, blocks, batch })
     }
 
@@ -294,7 +290,7 @@ fn start(config: &ConvertConfig, archive: &Archive, painter: Option<&Painter>, e
         tolerance: config.tolerance,
         missing_value: config.missing_value,
         windows: Vec::new(),
-        settings: settings::remembered(config, painter),
+        settings: settings::remembered(config, archive, painter),
         program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
     }
 }
@@ -322,12 +318,8 @@ impl Done {
 
 /// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, a worker's scratch, and what
 /// choosing the next window's scheme takes.
-fn batch_len(
-    config: &ConvertConfig,
-    blocks: BlockGrid,
-    sample: SampleType,
-    painter: Option<&Painter>,
-) -> Result<usize> {
+fn batch_len(config: &ConvertConfig, blocks: BlockGrid, archive: &Archive, painter: Option<&Painter>) -> Result<usize> {
+    let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
     let raw = samples * painter.map_or(sample.size(), |painter| painter.sample.size().max(sample.size()));
@@ -340,9 +332,9 @@ fn batch_len(
     let needs =
         |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
     let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
-    let fits = (1..=enough).rev().find(|batch| needs(batch) + config.reserved <= config.memory);
+    let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
     fits.ok_or_else(|| {
-        let share = config.memory as f64 / config.memory.saturating_sub(config.reserved).max(1) as f64;
+        let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
         let window = config.window;
         Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))

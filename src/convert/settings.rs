@@ -4,13 +4,17 @@ use super::{Coding, ConvertConfig, MissingPolicy, Space};
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::setting;
-use crate::source::Painter;
+use crate::source::{Archive, Painter, Units};
 use crate::wavelet::Basis;
 use std::str::FromStr;
 use wavesplat_format::Metadata;
 
 /// How a conversion is remembered; what is in the metadata anyway is not repeated.
-pub(super) fn remembered(config: &ConvertConfig, painter: Option<&Painter>) -> Vec<(String, String)> {
+pub(super) fn remembered(
+    config: &ConvertConfig,
+    archive: &Archive,
+    painter: Option<&Painter>,
+) -> Vec<(String, String)> {
     let ConvertConfig { coding, window, level, missing, range, .. } = config;
     let basis = BASES.iter().find(|(_, basis)| *basis == coding.basis).map_or("auto", |(name, _)| name);
     let space = SPACES.iter().find(|(_, space)| *space == coding.space).map_or("auto", |(name, _)| name);
@@ -19,7 +23,8 @@ pub(super) fn remembered(config: &ConvertConfig, painter: Option<&Painter>) -> V
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
     let more = [("level", level.to_string()), ("missing", missing.into())];
     let all = given.into_iter().chain(more).chain(range).chain(painter.into_iter().flat_map(Painter::settings));
-    all.map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
+    let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
+    all.chain(units).map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
 }
 
 /// The configuration that made a file, to append to it; none if it does not say.
@@ -51,7 +56,6 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
         memory,
-        reserved: 0,
         settings: file.settings.iter().filter(|(name, _)| !is_ours(name)).cloned().collect(),
     })
 }
@@ -72,7 +76,11 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
-        let ours = OURS.into_iter().chain(["frames", "region"]).chain(Painter::SETTINGS.map(|(name, _)| name));
+        let ours = OURS
+            .into_iter()
+            .chain(Units::SETTINGS)
+            .chain(["frames", "region"])
+            .chain(Painter::SETTINGS.map(|(name, _)| name));
         let settings = ours.map(|name| (option(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
@@ -99,7 +107,7 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
 
 /// Whether [`remembered`] adds a setting by itself.
 fn is_ours(name: &str) -> bool {
-    OURS.contains(&name) || Painter::SETTINGS.iter().any(|(ours, _)| *ours == name)
+    OURS.contains(&name) || Units::SETTINGS.contains(&name) || Painter::SETTINGS.iter().any(|(ours, _)| *ours == name)
 }
 
 /// The names of what [`remembered`] adds by itself, besides those of colours.

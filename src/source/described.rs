@@ -1,11 +1,17 @@
 //! What input files say of themselves, in the same words for every format.
 
+use super::Parsed;
 use super::frames::Shape;
-use super::{Parsed, base64};
+use super::held::Held;
+use super::layout::{Layout, Strides};
+use super::packing::Packing;
 use crate::error::{Error, Result};
 use crate::mapped::{FileBytes, State};
+use crate::sample::SampleType;
 use crate::volume::Grid;
-use std::path::PathBuf;
+use std::fmt::Debug;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// The files of an archive, in order.
 #[derive(Debug, Default)]
@@ -18,7 +24,7 @@ pub(super) struct Files {
     pub(super) notes: Vec<String>,
 }
 
-/// Some frames in one file, one after another.
+/// Some frames in one file.
 #[derive(Debug)]
 pub(super) struct Part {
     /// The file.
@@ -27,19 +33,100 @@ pub(super) struct Part {
     pub(super) state: State,
     /// Number of frames.
     pub(super) frames: usize,
-    /// Whether its samples have their most significant byte first.
-    pub(super) big_endian: bool,
-    /// Where the first frame starts.
+    /// How they are stored, once they are decoded.
+    pub(super) stored: Stored,
+    /// Where they are.
     pub(super) at: At,
 }
 
-/// How a part's samples are stored.
-#[derive(Debug, Clone, Copy)]
+impl Part {
+    /// Frames one after another from a byte of a file, x fastest.
+    pub(super) fn plain(
+        (path, state): (&Path, State),
+        (shape, frames): (&Shape, usize),
+        big_endian: bool,
+        start: u64,
+    ) -> Parsed<Self> {
+        let stored = Stored::plain(shape, frames, big_endian)?;
+        Ok(Self { path: path.into(), state, frames, stored, at: At::Byte(start) })
+    }
+}
+
+/// How the samples of some frames are stored.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stored {
+    /// The type of the stored numbers.
+    pub(super) sample: SampleType,
+    /// Whether these have their most significant byte first.
+    pub(super) big_endian: bool,
+    /// Where they are.
+    pub(super) strides: Strides,
+    /// Bytes of all of them.
+    pub(super) bytes: usize,
+    /// What makes samples of them, if they are not samples themselves.
+    pub(super) packing: Option<Packing>,
+}
+
+impl Stored {
+    /// Samples in the order of an array, as they are.
+    pub(super) fn new(layout: &Layout, sample: SampleType, big_endian: bool) -> Parsed<Self> {
+        let (strides, bytes) = (layout.strides(sample.size())?, layout.bytes(sample.size())?);
+        Ok(Self { sample, big_endian, strides, bytes, packing: None })
+    }
+
+    /// Frames one after another, x fastest.
+    pub(super) fn plain(shape: &Shape, frames: usize, big_endian: bool) -> Parsed<Self> {
+        Self::new(&Layout::plain(shape.dims(), frames), shape.sample(), big_endian)
+    }
+}
+
+/// Where the bytes of a part are.
+#[derive(Debug)]
 pub(super) enum At {
-    /// As they are, from this byte of the file.
+    /// In the file as they are, from this byte.
     Byte(u64),
-    /// As base64 text.
-    Base64(base64::Place),
+    /// In the file, but packed.
+    Decoded(Box<dyn Decode>),
+}
+
+/// Frames that must be decoded before boxes can be read.
+pub(super) trait Decode: Debug + Send {
+    /// Frames whose bytes are packed together, counted from the part's first: they are decoded at once, and
+    /// [`Part::stored`] is how so many lie together.
+    fn together(&self) -> usize {
+        1
+    }
+
+    /// Writes the bytes of `frames` that are packed together.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()>;
+
+    /// Lets go of what decoding the next frames could go on with: an archive may have more files than can be open.
+    fn rest(&mut self) {}
+}
+
+/// What samples, times and places are measured in, where files say so.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Units {
+    /// Unit of the samples.
+    pub samples: Option<String>,
+    /// Unit of times, perhaps since when.
+    pub times: Option<String>,
+    /// Unit of spacing and origin.
+    pub space: Option<String>,
+}
+
+impl Units {
+    /// Names of settings that units are kept under.
+    pub const SETTINGS: [&'static str; 3] = ["units", "time-units", "space-units"];
+
+    /// The units that are known, as settings.
+    pub fn settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let units = [&self.samples, &self.times, &self.space];
+        Self::SETTINGS.into_iter().zip(units).filter_map(|(name, unit)| Some((name, unit.as_deref()?)))
+    }
 }
 
 /// What the header of one input file says.
@@ -55,6 +142,10 @@ pub(super) struct Described {
     pub(super) times: Vec<f64>,
     /// Name of the variable, if the file says so.
     pub(super) variable: Option<String>,
+    /// What its numbers are measured in.
+    pub(super) units: Units,
+    /// What stands for missing samples, if the file says that some may be: NaN, or another value.
+    pub(super) missing: Option<f64>,
     /// What a user should know about how the file is read.
     pub(super) notes: Vec<String>,
     /// Where the frames are.
@@ -65,7 +156,8 @@ impl Described {
     /// Frames of which no more is known than where they are.
     pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
-        Self { shape, spacing, origin, times: Vec::new(), variable: None, notes: Vec::new(), parts }
+        let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
+        Self { shape, spacing, origin, times, variable: None, units, missing: None, notes, parts }
     }
 
     /// The lattice of every frame.

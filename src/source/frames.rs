@@ -2,15 +2,16 @@
 
 use super::FrameWindow;
 use super::Parsed;
+use super::described::Stored;
+use super::held::Held;
 use crate::error::{Error, Result};
 use crate::mapped::FileBytes;
 use crate::output::STANDARD;
 use crate::sample::{SampleType, swap_endian};
 use crate::volume::Region;
-use std::fs::File;
 use std::io;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Reads that lie closer together than this are joined, since the system reads whole pages anyway.
 const SMALL_GAP: usize = 4096;
@@ -68,37 +69,29 @@ impl std::fmt::Display for Shape {
 pub(super) enum Bytes {
     /// In a file as they are.
     File(FileBytes),
-    /// Decoded from a file.
-    Decoded { file: FileBytes, data: Vec<u8> },
-    /// Taken from a stream.
-    Memory(Vec<u8>),
-    /// Taken from a stream and too many to hold: a temporary file without a name.
-    Spool(File),
+    /// Taken from a file or a stream.
+    Held { data: Arc<Held>, file: Option<Arc<FileBytes>> },
 }
 
 impl Bytes {
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         match self {
             Self::File(file) => file.read_at(offset, out),
-            Self::Decoded { data, .. } | Self::Memory(data) => {
-                wavesplat_format::Storage::read_at(data.as_slice(), offset, out)
-            }
-            Self::Spool(file) => file.read_exact_at(out, offset),
+            Self::Held { data, .. } => data.read_at(offset, out),
         }
     }
 
     fn small_reads_are_cheap(&self) -> bool {
         match self {
             Self::File(file) => file.is_mapped(),
-            Self::Decoded { .. } | Self::Memory(_) => true,
-            Self::Spool(_) => false,
+            Self::Held { data, .. } => matches!(**data, Held::Memory(_)),
         }
     }
 
     fn file(&self) -> Option<&FileBytes> {
         match self {
-            Self::File(file) | Self::Decoded { file, .. } => Some(file),
-            Self::Memory(_) | Self::Spool(_) => None,
+            Self::File(file) => Some(file),
+            Self::Held { file, .. } => file.as_deref(),
         }
     }
 }
@@ -108,10 +101,8 @@ impl Bytes {
 pub(super) struct Frame {
     /// Which of the window's bytes hold it.
     pub(super) bytes: usize,
-    /// Where it starts there.
+    /// Where its voxel (0, 0, 0) is there.
     pub(super) offset: u64,
-    /// Whether its samples have their most significant byte first.
-    pub(super) big_endian: bool,
     /// Its name for messages.
     pub(super) name: String,
 }
@@ -121,8 +112,8 @@ pub(super) struct Frame {
 pub(super) struct Frames {
     /// Voxels and sample type of each.
     pub(super) shape: Shape,
-    /// Where their samples are.
-    pub(super) bytes: Vec<Bytes>,
+    /// Where their samples are, and how they are stored there.
+    pub(super) bytes: Vec<(Bytes, Stored)>,
     /// The frames, in order.
     pub(super) frames: Vec<Frame>,
 }
@@ -136,16 +127,13 @@ impl FrameWindow for Frames {
         let Shape { dims, sample, .. } = self.shape;
         assert!(Region { start: [0; 3], end: dims }.contains(region), "{region:?} is not inside {dims:?}");
         assert_eq!(out.len(), region.voxels() * sample.size(), "bytes of {region:?}");
-        let frame = &self.frames[frame];
-        let bytes = &self.bytes[frame.bytes];
-        let rows = Rows::new(dims, region, sample.size());
-        rows.copy(bytes, frame.offset, out).map_err(|e| {
-            let path = bytes.file().map_or(Path::new(STANDARD), FileBytes::path);
-            Error::io(path, format!("reading {}", frame.name), e)
-        })?;
-        if frame.big_endian {
-            swap_endian(sample, out);
-        }
+        let Some(packing) = &self.bytes[self.frames[frame].bytes].1.packing else {
+            return self.read_stored(frame, region, out);
+        };
+        let stored = self.bytes[self.frames[frame].bytes].1.sample;
+        let mut numbers = vec![0; region.voxels() * stored.size()];
+        self.read_stored(frame, region, &mut numbers)?;
+        packing.unpack(stored, &numbers, out);
         Ok(())
     }
 
@@ -154,8 +142,77 @@ impl FrameWindow for Frames {
     }
 
     fn check_unchanged(&self) -> Result<()> {
-        self.bytes.iter().filter_map(Bytes::file).try_for_each(FileBytes::check_unchanged)
+        self.bytes.iter().filter_map(|(bytes, _)| bytes.file()).try_for_each(FileBytes::check_unchanged)
     }
+}
+
+impl Frames {
+    /// Bytes of memory that hold what was decoded.
+    pub(super) fn memory(&self) -> usize {
+        let held = |(bytes, _): &(Bytes, Stored)| match bytes {
+            Bytes::Held { data, .. } => data.memory(),
+            Bytes::File(_) => 0,
+        };
+        self.bytes.iter().map(held).sum()
+    }
+
+    /// The stored numbers of a box, little-endian, x fastest.
+    fn read_stored(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        let frame = &self.frames[frame];
+        let (bytes, stored) = &self.bytes[frame.bytes];
+        let (dims, size) = (self.shape.dims, stored.sample.size());
+        let read = if stored.strides.is_plain(dims, size) {
+            Rows::new(dims, region, size).copy(bytes, frame.offset, out)
+        } else {
+            copy_strided(bytes, frame.offset, &stored.strides.voxel, region, size, out)
+        };
+        read.map_err(|e| {
+            let path = bytes.file().map_or(Path::new(STANDARD), FileBytes::path);
+            Error::io(path, format!("reading {}", frame.name), e)
+        })?;
+        if stored.big_endian {
+            swap_endian(stored.sample, out);
+        }
+        Ok(())
+    }
+}
+
+/// Copies a box from an array in any order: along the axis on which neighbours are nearest, a line at a time.
+fn copy_strided(
+    bytes: &Bytes,
+    frame: u64,
+    strides: &[i64; 3],
+    region: &Region,
+    size: usize,
+    out: &mut [u8],
+) -> io::Result<()> {
+    if out.is_empty() {
+        return Ok(());
+    }
+    let dims = region.dims();
+    let mut axes = [0, 1, 2];
+    axes.sort_by_key(|axis| (dims[*axis] == 1, strides[*axis].unsigned_abs()));
+    let [line, rows, planes] = axes;
+    let out_strides = [size, size * dims[0], size * dims[0] * dims[1]];
+    let place = |axis: usize, index: usize| strides[axis] * (region.start[axis] + index) as i64;
+    let pitch = strides[line].unsigned_abs() as usize;
+    let backwards = strides[line] < 0;
+    let mut span = vec![0; (dims[line] - 1) * pitch + size];
+    for (k, j) in (0..dims[planes]).flat_map(|k| (0..dims[rows]).map(move |j| (k, j))) {
+        let nearest = if backwards { dims[line] - 1 } else { 0 };
+        let from = place(planes, k) + place(rows, j) + place(line, nearest);
+        bytes.read_at(frame.wrapping_add_signed(from), &mut span)?;
+        let to = k * out_strides[planes] + j * out_strides[rows];
+        if pitch == size && line == 0 && !backwards {
+            out[to..][..span.len()].copy_from_slice(&span);
+            continue;
+        }
+        for i in 0..dims[line] {
+            let stored = if backwards { dims[line] - 1 - i } else { i };
+            out[to + i * out_strides[line]..][..size].copy_from_slice(&span[stored * pitch..][..size]);
+        }
+    }
+    Ok(())
 }
 
 /// The bytes of a box as equally long rows, in planes: rows as long as they lie together in the frame.
@@ -229,26 +286,34 @@ fn flattened(dims: [usize; 3], region: &Region) -> ([usize; 3], Region) {
 mod tests {
     use super::super::testing::{DIMS, check_window, payload};
     use super::*;
-    use std::io::Write;
+    use crate::source::layout::{Axis, Counts, Layout, Strides};
+    use crate::source::packing::Packing;
 
     /// Large enough that some boxes are read row by row and some joined.
     const LARGE: [usize; 3] = [300, 40, 20];
 
-    fn spool(bytes: &[u8]) -> Bytes {
-        let mut file = tempfile::tempfile().expect("temporary file");
-        file.write_all(bytes).expect("writing");
-        Bytes::Spool(file)
+    /// The same bytes in a temporary file and in memory.
+    fn both(bytes: &[u8]) -> [Bytes; 2] {
+        [0, bytes.len()].map(|memory| {
+            let mut data = Held::new(bytes.len(), memory, Path::new(STANDARD)).expect("room");
+            data.write_at(0, bytes).expect("writing");
+            Bytes::Held { data: Arc::new(data), file: None }
+        })
+    }
+
+    fn window(shape: Shape, bytes: impl IntoIterator<Item = Bytes>, stored: &Stored, offsets: &[u64]) -> Frames {
+        let bytes: Vec<_> = bytes.into_iter().map(|bytes| (bytes, stored.clone())).collect();
+        let frame = |bytes, offset: &u64| Frame { bytes, offset: *offset, name: "frame 9".into() };
+        let frames = (0..bytes.len()).flat_map(|i| offsets.iter().map(move |o| frame(i, o))).collect();
+        Frames { shape, bytes, frames }
     }
 
     #[test]
     fn joined_reads_copy_the_same_as_single_ones() {
         let shape = Shape::new(LARGE, SampleType::U32).expect("shape");
         let voxels: Vec<u8> = (0..240_000_u32).flat_map(u32::to_le_bytes).collect();
-        let name = || "frame".to_string();
-        let frame = |bytes| Frame { bytes, offset: 3, big_endian: false, name: name() };
-        let stored = [b"abc", voxels.as_slice()].concat();
-        let bytes = vec![spool(&stored), Bytes::Memory(stored)];
-        let frames = Frames { shape, bytes, frames: vec![frame(0), frame(1)] };
+        let plain = Stored::plain(&shape, 1, false).expect("small");
+        let frames = window(shape, both(&[b"abc", voxels.as_slice()].concat()), &plain, &[3]);
         for (start, end) in
             [([0; 3], LARGE), ([5, 3, 2], [7, 40, 20]), ([0, 7, 0], [300, 9, 20]), ([1, 0, 0], [299, 40, 20])]
         {
@@ -268,19 +333,51 @@ mod tests {
         let ty = SampleType::F16;
         let shape = Shape::new(DIMS, ty).expect("shape");
         let stored = payload(ty, 0..2, true);
-        for bytes in [spool(&stored), Bytes::Memory(stored.clone())] {
-            let frame = |offset| Frame { bytes: 0, offset, big_endian: true, name: String::new() };
-            let frames = vec![frame(0), frame(shape.frame_bytes() as u64)];
-            check_window(&Frames { shape, bytes: vec![bytes], frames }, ty, 0);
+        let plain = Stored::plain(&shape, 1, true).expect("small");
+        for bytes in both(&stored) {
+            check_window(&window(shape, [bytes], &plain, &[0, shape.frame_bytes() as u64]), ty, 0);
+        }
+    }
+
+    #[test]
+    fn axes_of_any_order_and_direction_are_read() {
+        let ty = SampleType::U16;
+        let shape = Shape::new(DIMS, ty).expect("shape");
+        let voxels = payload(ty, 0..1, false);
+        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            for turned in 0..8 {
+                let axis =
+                    |of: usize| Axis { backwards: turned >> of & 1 == 1, ..Axis::new(Counts::Voxels(of), DIMS[of]) };
+                let layout = Layout([vec![Axis::new(Counts::Only(1), 2)], order.map(axis).to_vec()].concat());
+                let stored = Stored::new(&layout, ty, false).expect("small");
+                let mut bytes = vec![0; stored.bytes];
+                for (i, [x, y, z]) in (Region { start: [0; 3], end: DIMS }).iter().enumerate() {
+                    let Strides { first, voxel, .. } = stored.strides;
+                    let at = first as i64 + voxel[0] * x as i64 + voxel[1] * y as i64 + voxel[2] * z as i64;
+                    bytes[at as usize..][..2].copy_from_slice(&voxels[2 * i..][..2]);
+                }
+                let first = stored.strides.first;
+                both(&bytes).into_iter().for_each(|b| check_window(&window(shape, [b], &stored, &[first]), ty, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn packed_numbers_are_samples_when_they_are_read() {
+        let shape = Shape::new(DIMS, SampleType::F32).expect("shape");
+        let plain = Stored::plain(&Shape::new(DIMS, SampleType::I16).expect("shape"), 1, true).expect("small");
+        let stored = Stored { packing: Some(Packing::scaled(0.25, -3.0)), ..plain };
+        for bytes in both(&payload(SampleType::I16, 0..1, true)) {
+            check_window(&window(shape, [bytes], &stored, &[0]), SampleType::F32, 0);
         }
     }
 
     #[test]
     fn bytes_that_are_not_there_are_an_error() {
         let shape = Shape::new([2, 2, 2], SampleType::U8).expect("shape");
-        for bytes in [spool(&[0; 7]), Bytes::Memory(vec![0; 7])] {
-            let frame = Frame { bytes: 0, offset: 0, big_endian: false, name: "frame 9".into() };
-            let frames = Frames { shape, bytes: vec![bytes], frames: vec![frame] };
+        let plain = Stored::plain(&shape, 1, false).expect("small");
+        for bytes in both(&[0; 7]) {
+            let frames = window(shape, [bytes], &plain, &[0]);
             let whole = Region { start: [0; 3], end: [2; 3] };
             let error = frames.read_box(0, &whole, &mut [0; 8]).expect_err("too short");
             assert!(error.to_string().contains("reading frame 9"), "{error}");

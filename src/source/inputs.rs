@@ -1,8 +1,8 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
 use super::described::Files;
-use super::format::{self, Format, SUPPORTED};
-use super::{OpenOptions, numbering, pvd};
+use super::formats::{self, Format, SUPPORTED, pvd};
+use super::{OpenOptions, numbering};
 use crate::error::{Error, Result};
 use crate::output::STANDARD;
 use std::collections::HashSet;
@@ -35,7 +35,7 @@ pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
         return if !input.exists() && is_pattern(input) { matching(input) } else { Ok(vec![input.into()]) };
     }
     let mut files = visible_files(input)?;
-    files.retain(|file| format::extension(file) == extension);
+    files.retain(|file| formats::extension(file) == extension);
     if files.is_empty() {
         return Err(Error::usage(format!("{}: has no .{extension} file", input.display())));
     }
@@ -151,8 +151,8 @@ fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
         let what = format!("has no file of frames. Supported are {SUPPORTED} if --dims and --dtype say what it is");
         return Err(Error::usage(format!("{}: {what}", folder.display())));
     };
-    let extension = format::extension(first);
-    if let Some(other) = files.iter().find(|p| format::extension(p) != extension) {
+    let extension = formats::extension(first);
+    if let Some(other) = files.iter().find(|p| formats::extension(p) != extension) {
         let what = format!("mixes formats, for example {} and {}", name(first), name(other));
         return Err(Error::usage(format!("{}: {what}; a pattern such as '*.npy' chooses", folder.display())));
     }

@@ -1,34 +1,29 @@
 //! Frame files in: one source per format behind one trait.
 //!
-//! A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
+//! Whatever the format ([`formats`]), a file comes down to frames at known places or to frames that are decoded, in any
+//! order of axes ([`layout`]). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
-mod base64;
 mod coloured;
 mod described;
-mod format;
+mod formats;
 mod frames;
+mod held;
 mod inputs;
-mod npy;
-mod nrrd;
-mod nrrd_data;
-mod nrrd_header;
+mod layout;
 mod numbering;
-mod pvd;
-mod raw;
+mod packing;
 mod select;
 mod series;
 mod stream;
 #[cfg(test)]
 mod testing;
-mod vti;
-mod vti_header;
-mod xml;
 
 pub(crate) use coloured::Coloured;
 pub use coloured::{CHANNELS, Painter};
+pub use described::Units;
+pub use formats::{ArrayHeader, array_header};
 pub use inputs::files;
-pub use npy::{ArrayHeader, array_header};
 pub use select::{Selection, select};
 
 use crate::error::Result;
@@ -63,7 +58,7 @@ pub struct OpenOptions {
     pub origin: Option<[f64; 3]>,
     /// Whether irregular numbers in the names of frame files are accepted.
     pub allow_gaps: bool,
-    /// Bytes that a stream may hold for one window before it spools to a temporary file.
+    /// Bytes that a stream, or what must be decoded, may take for one window before it spools to a temporary file.
     pub memory: usize,
 }
 
@@ -124,8 +119,27 @@ pub struct Archive {
     pub times: Vec<f64>,
     /// Name of the variable where the files say so.
     pub variable: Option<String>,
+    /// What its numbers are measured in.
+    pub units: Units,
+    /// What stands for missing samples, where the files say that some may be: NaN, or another value.
+    pub missing: Option<f64>,
+    /// Bytes that the source takes for a window, of those that it was opened with.
+    pub memory: usize,
     /// What a user should know about how the files are read.
     pub notes: Vec<String>,
+}
+
+impl Archive {
+    /// Frames of which no more is known.
+    pub fn new(grid: Grid, sample: SampleType, frames: Option<usize>) -> Self {
+        let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
+        Self { grid, sample, frames, times, variable: None, units, missing: None, memory: 0, notes }
+    }
+
+    /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the files.
+    pub fn missing_value(&self, given: Option<f64>) -> Option<f64> {
+        given.or(self.missing.filter(|value| value.is_finite()))
+    }
 }
 
 /// Frames in order, a window at a time.

@@ -1,13 +1,15 @@
-//! Files as one archive: whatever the format, a file comes down to frames one after another at a known place.
+//! Files as one archive: whatever the format, a file comes down to frames at known places, or to frames that are decoded.
 
 use super::described::{At, Described, Files, Part};
 use super::frames::{Bytes, Frame, Frames, Shape};
-use super::{Archive, FrameSource, FrameWindow, OpenOptions, format};
+use super::held::Held;
+use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::volume::Grid;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Files whose frames follow one another.
 #[derive(Debug)]
@@ -15,8 +17,19 @@ pub(super) struct Series {
     archive: Archive,
     shape: Shape,
     access: Access,
+    memory: usize, // that a window may hold of what is decoded
     parts: Vec<Part>,
     starts: Vec<usize>, // the first frame of each part
+    last: Option<Decoded>,
+}
+
+/// What was decoded last, for the window after, where its frames are packed together.
+#[derive(Debug)]
+struct Decoded {
+    part: usize,
+    /// The first of its frames, counted from the part's.
+    first: usize,
+    data: Arc<Held>,
 }
 
 impl Series {
@@ -25,25 +38,24 @@ impl Series {
         let Some((first, rest)) = files.paths.split_first() else {
             return Err(Error::usage("no input was given"));
         };
-        let mut series = Self::of(format::describe(first, options)?, options);
+        let mut series = Self::of(formats::describe(first, options)?, options);
         for path in rest {
-            series.append(format::describe(path, options)?, path, first)?;
+            series.append(formats::describe(path, options)?, path, first)?;
         }
         series.finish(files, options)
     }
 
     fn of(first: Described, options: &OpenOptions) -> Self {
         let mut archive = Archive {
-            grid: first.grid(),
-            sample: first.shape.sample(),
-            frames: Some(0),
-            times: Vec::new(),
             variable: first.variable.clone(),
-            notes: Vec::new(),
+            units: first.units.clone(),
+            missing: first.missing,
+            ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
         override_grid(&mut archive.grid, options);
-        let shape = first.shape;
-        let mut series = Self { archive, shape, access: options.access, parts: Vec::new(), starts: Vec::new() };
+        let (shape, parts, starts) = (first.shape, Vec::new(), Vec::new());
+        let (access, memory) = (options.access, options.memory);
+        let mut series = Self { archive, shape, access, memory, parts, starts, last: None };
         series.take(first);
         series
     }
@@ -56,7 +68,10 @@ impl Series {
         for part in file.parts {
             let frames = self.archive.frames.unwrap_or(0);
             self.starts.push(frames);
-            self.archive.frames = frames.checked_add(part.frames);
+            self.archive.frames = self.archive.frames.and_then(|_| frames.checked_add(part.frames));
+            if matches!(part.at, At::Decoded(_)) {
+                self.archive.memory = self.memory;
+            }
             self.parts.push(part);
         }
     }
@@ -73,6 +88,12 @@ impl Series {
             let what =
                 format!("has the array {its}, but the first frame ({first}) has {theirs}; --variable chooses one");
             return Err(Error::input(path, what));
+        }
+        if file.units != self.archive.units {
+            return Err(Error::input(path, format!("is in other units than the first frame ({first})")));
+        }
+        if file.missing.map(f64::to_bits) != self.archive.missing.map(f64::to_bits) {
+            return Err(Error::input(path, format!("marks missing samples otherwise than the first frame ({first})")));
         }
         self.take(file);
         Ok(())
@@ -95,26 +116,67 @@ impl Series {
         Ok(self)
     }
 
-    /// The bytes of one part, opened for a window that is done with them soon.
-    fn bytes(&self, part: &Part) -> Result<Bytes> {
-        let access = if matches!(part.at, At::Byte(_)) { self.access } else { Access::Read };
-        let file = FileBytes::open(&part.path, access)?;
-        part.state.check(&part.path, &file.state())?;
-        match part.at {
-            At::Byte(_) => Ok(Bytes::File(file)),
-            At::Base64(place) => {
-                let data = place.decode(&file, self.shape.frame_bytes())?;
-                Ok(Bytes::Decoded { file, data })
+    /// Adds some frames of a part to a window.
+    fn add(&mut self, part: usize, wanted: Range<usize>, window: &mut Frames) -> Result<()> {
+        let Part { path, state, at, .. } = &self.parts[part];
+        let access = if matches!(at, At::Byte(_)) { self.access } else { Access::Read };
+        let file = FileBytes::open(path, access)?;
+        state.check(path, &file.state())?;
+        let together = match at {
+            At::Byte(start) => {
+                self.push(part, (0, *start), wanted, Bytes::File(file), window);
+                return Ok(());
             }
+            At::Decoded(decoder) => decoder.together(),
+        };
+        let file = Some(Arc::new(file));
+        let mut next = wanted.start;
+        while next < wanted.end {
+            let first = next - next % together;
+            let end = (first + together).min(wanted.end);
+            let data = self.decoded(part, first, together, window)?;
+            self.push(part, (first, 0), next..end, Bytes::Held { data, file: file.clone() }, window);
+            next = end;
         }
+        Ok(())
     }
 
-    fn frame(&self, part: &Part, index: usize, bytes: usize) -> Frame {
-        let start = if let At::Byte(start) = part.at { start } else { 0 };
-        let offset = start + (index * self.shape.frame_bytes()) as u64;
-        let path = part.path.display();
-        let name = if part.frames == 1 { path.to_string() } else { format!("{path}, frame {index}") };
-        Frame { bytes, offset, big_endian: part.big_endian, name }
+    /// Adds frames that are in some bytes, where the part's frame `first` begins at `start`.
+    fn push(&self, part: usize, (first, start): (usize, u64), frames: Range<usize>, bytes: Bytes, window: &mut Frames) {
+        let Part { path, stored, frames: all, .. } = &self.parts[part];
+        for index in frames {
+            let path = path.display();
+            let name = if *all == 1 { path.to_string() } else { format!("{path}, frame {index}") };
+            let offset = start + stored.strides.first + (index - first) as u64 * stored.strides.frame;
+            window.frames.push(Frame { bytes: window.bytes.len(), offset, name });
+        }
+        window.bytes.push((bytes, stored.clone()));
+    }
+
+    /// The frames of a part from `first` on that are packed together.
+    fn decoded(&mut self, part: usize, first: usize, together: usize, window: &Frames) -> Result<Arc<Held>> {
+        if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
+            return Ok(last.data.clone());
+        }
+        self.last = None;
+        let Part { path, frames, stored, at, .. } = &mut self.parts[part];
+        let At::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
+        let mut data = Held::new(stored.bytes, self.memory.saturating_sub(window.memory()), path)?;
+        decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
+        let data = Arc::new(data);
+        if together > 1 {
+            self.last = Some(Decoded { part, first, data: data.clone() });
+        }
+        Ok(data)
+    }
+
+    /// Lets go of what parts that no frame is taken of next went on with.
+    fn rest(&mut self, parts: Range<usize>) {
+        for part in &mut self.parts[parts] {
+            if let At::Decoded(decoder) = &mut part.at {
+                decoder.rest();
+            }
+        }
     }
 
     /// The parts that hold frames of a range.
@@ -136,11 +198,12 @@ impl FrameSource for Series {
         };
         let mut window = Frames { shape: self.shape, bytes: Vec::new(), frames: Vec::new() };
         let parts = if count == 0 { 0..0 } else { self.parts_of(&(first..end)) };
-        for (part, start) in self.parts[parts.clone()].iter().zip(&self.starts[parts]) {
-            let wanted = first.saturating_sub(*start)..(end - start).min(part.frames);
-            window.frames.extend(wanted.map(|i| self.frame(part, i, window.bytes.len())));
-            window.bytes.push(self.bytes(part)?);
+        for part in parts.clone() {
+            let start = self.starts[part];
+            let wanted = first.saturating_sub(start)..(end - start).min(self.parts[part].frames);
+            self.add(part, wanted, &mut window)?;
         }
+        self.rest(parts.start..parts.end.saturating_sub(1).max(parts.start));
         Ok(Box::new(window))
     }
 }

@@ -1,14 +1,17 @@
 //! Frames from a pipe: forward only, one window held at a time, in memory or in a temporary file.
 
+use super::described::Stored;
+use super::formats::{self, Format, npy, raw};
 use super::frames::{Bytes, Frame, Frames, Shape};
+use super::held::{Held, read_some};
 use super::series::{check_grid, override_grid};
-use super::{Archive, FrameSource, FrameWindow, OpenOptions, npy, raw};
+use super::{Archive, FrameSource, FrameWindow, OpenOptions};
 use crate::error::{Error, Result};
 use crate::output::STANDARD;
 use crate::volume::Grid;
-use std::fs::File;
-use std::io::{self, Chain, Cursor, ErrorKind, Read, Write};
+use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 const CHUNK: usize = 1 << 20; // bytes asked for at a time
 
@@ -16,7 +19,7 @@ const CHUNK: usize = 1 << 20; // bytes asked for at a time
 pub(super) struct Stream<R> {
     archive: Archive,
     shape: Shape,
-    big_endian: bool,
+    stored: Stored, // of one frame
     memory: usize,
     next: usize, // the frame that comes
     ended: bool,
@@ -45,17 +48,18 @@ impl<R: Read> Stream<R> {
         let mut grid = Grid::unit(shape.dims());
         override_grid(&mut grid, options);
         check_grid(&grid, options, Path::new(STANDARD))?;
-        let (times, notes) = (Vec::new(), Vec::new());
-        let archive = Archive { grid, sample: shape.sample(), frames, times, variable: None, notes };
-        let (memory, chunk) = (options.memory, vec![0; CHUNK]);
-        Ok(Self { archive, shape, big_endian, memory, next: 0, ended: false, chunk, reader })
+        let memory = options.memory;
+        let archive = Archive { memory, ..Archive::new(grid, shape.sample(), frames) };
+        let stored = Stored::plain(&shape, 1, big_endian).map_err(|e| Error::input(STANDARD, e))?;
+        Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader })
     }
 
-    /// Moves up to `frames` frames to `sink`, and says how many there were.
-    fn copy(&mut self, frames: usize, sink: &mut dyn Write) -> Result<usize> {
+    /// Moves up to `frames` frames, and says how many there were; nobody holds those that are skipped.
+    fn copy(&mut self, frames: usize, mut held: Option<&mut Held>) -> Result<usize> {
         let left = self.archive.frames.map_or(frames, |all| frames.min(all - self.next));
         for done in 0..left {
-            if self.ended || !self.copy_frame(sink)? {
+            let place = (done * self.shape.frame_bytes()) as u64;
+            if self.ended || !self.copy_frame(held.as_deref_mut(), place)? {
                 return Ok(done);
             }
             self.next += 1;
@@ -63,8 +67,8 @@ impl<R: Read> Stream<R> {
         Ok(left)
     }
 
-    /// Moves one frame; false if the stream ends before it.
-    fn copy_frame(&mut self, sink: &mut dyn Write) -> Result<bool> {
+    /// Moves one frame to its place; false if the stream ends before it.
+    fn copy_frame(&mut self, mut held: Option<&mut Held>, place: u64) -> Result<bool> {
         let (frame, bytes) = (self.next, self.shape.frame_bytes());
         let mut got = 0;
         while got < bytes {
@@ -74,7 +78,8 @@ impl<R: Read> Stream<R> {
             if n == 0 {
                 return self.end(got);
             }
-            sink.write_all(&self.chunk[..n]).map_err(|e| Error::io(STANDARD, format!("holding frame {frame}"), e))?;
+            let kept = held.as_mut().map_or(Ok(()), |held| held.write_at(place + got as u64, &self.chunk[..n]));
+            kept.map_err(|e| Error::io(STANDARD, format!("holding frame {frame}"), e))?;
             got += n;
         }
         if self.archive.frames == Some(frame + 1) {
@@ -117,24 +122,10 @@ impl<R: Read> Stream<R> {
         }
     }
 
-    /// Somewhere to hold so many frames.
-    fn sink(&self, frames: usize) -> Result<Sink> {
-        let bytes = frames.checked_mul(self.shape.frame_bytes()).filter(|n| *n <= self.memory);
-        let Some(bytes) = bytes else {
-            let file =
-                tempfile::tempfile().map_err(|e| Error::io(std::env::temp_dir(), "making a temporary file", e))?;
-            return Ok(Sink::Spool(file));
-        };
-        let mut held = Vec::new();
-        let failed = |_| Error::io(STANDARD, format!("holding {frames} frames"), ErrorKind::OutOfMemory.into());
-        held.try_reserve_exact(bytes).map_err(failed)?;
-        Ok(Sink::Memory(held))
-    }
-
     fn frame(&self, index: usize, first: usize) -> Frame {
         let offset = (index * self.shape.frame_bytes()) as u64;
         let name = format!("standard input, frame {}", first + index);
-        Frame { bytes: 0, offset, big_endian: self.big_endian, name }
+        Frame { bytes: 0, offset, name }
     }
 }
 
@@ -148,12 +139,14 @@ impl<R: Read + Send> FrameSource for Stream<R> {
             let what = format!("frame {first} is over: a stream only goes forward, and frame {} comes next", self.next);
             return Err(Error::usage(what));
         };
-        self.copy(skip, &mut io::sink())?;
+        self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
-        let mut sink = self.sink(count)?;
-        let held = self.copy(count, &mut sink)?;
+        let bytes = count.checked_mul(self.shape.frame_bytes()).unwrap_or(usize::MAX);
+        let mut data = Held::new(bytes, self.memory, Path::new(STANDARD))?;
+        let held = self.copy(count, Some(&mut data))?;
         let frames = (0..held).map(|i| self.frame(i, first)).collect();
-        Ok(Box::new(Frames { shape: self.shape, bytes: vec![sink.into()], frames }))
+        let bytes = vec![(Bytes::Held { data: Arc::new(data), file: None }, self.stored.clone())];
+        Ok(Box::new(Frames { shape: self.shape, bytes, frames }))
     }
 }
 
@@ -167,47 +160,9 @@ fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, O
 }
 
 fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
-    super::format::refuse_options(Path::new(STANDARD), super::format::Format::Npy, options)?;
+    formats::refuse_options(Path::new(STANDARD), Format::Npy, options)?;
     let array = npy::read_header(reader, Path::new(STANDARD))?;
     Ok((array.shape, Some(array.frames), array.big_endian))
-}
-
-/// Some bytes, or none at the end.
-fn read_some(reader: &mut impl Read, out: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match reader.read(out) {
-            Err(e) if e.kind() == ErrorKind::Interrupted => {}
-            result => return result,
-        }
-    }
-}
-
-/// Where a window is held.
-enum Sink {
-    Memory(Vec<u8>),
-    Spool(File),
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Memory(held) => held.write(bytes),
-            Self::Spool(file) => file.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl From<Sink> for Bytes {
-    fn from(sink: Sink) -> Self {
-        match sink {
-            Sink::Memory(held) => Self::Memory(held),
-            Sink::Spool(file) => Self::Spool(file),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -20,8 +20,7 @@ impl<const N: usize, F: Fn(usize, usize) -> [u8; N] + Clone + Send + Sync + 'sta
 impl<const N: usize, F: Sampled<N>> Computed<N, F> {
     pub(crate) fn new(grid: Grid, ty: SampleType, frames: usize, sample: F) -> Self {
         assert_eq!(ty.size(), N);
-        let (times, notes) = (Vec::new(), Vec::new());
-        Self { archive: Archive { grid, sample: ty, frames: Some(frames), times, variable: None, notes }, sample }
+        Self { archive: Archive::new(grid, ty, Some(frames)), sample }
     }
 
     pub(crate) fn at(&self, frame: usize, voxel: usize) -> [u8; N] {

@@ -18,9 +18,7 @@ impl Memory {
     pub(crate) fn new(grid: Grid, sample: SampleType, frames: Vec<u8>) -> Self {
         let count = frames.len() / (grid.whole().voxels() * sample.size());
         assert_eq!(count * grid.whole().voxels() * sample.size(), frames.len());
-        let (times, notes) = (Vec::new(), Vec::new());
-        let archive = Archive { grid, sample, frames: Some(count), times, variable: None, notes };
-        Self { archive, frames: Arc::new(frames) }
+        Self { archive: Archive::new(grid, sample, Some(count)), frames: Arc::new(frames) }
     }
 }
 

@@ -290,18 +290,24 @@ impl Cli {
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
         let times = source.archive().times.clone();
+        let missing_value = source.archive().missing_value(self.missing_value);
         let colours = match self.along.colours() {
             Some(name) => {
                 let inputs = self.inputs.as_slice();
-                let (range, missing_value) = (self.colour.range, self.missing_value);
-                Some(transfer_function(name, range, (inputs, source.as_mut()), missing_value, &self.common)?)
+                Some(transfer_function(
+                    name,
+                    self.colour.range,
+                    (inputs, source.as_mut()),
+                    missing_value,
+                    &self.common,
+                )?)
             }
             None => None,
         };
         let before = colours.clone().filter(|_| self.along.mode == ModeName::Projection);
         let scene = match before {
-            Some(colours) => FrameScene::coloured(source, self.missing_value, colours),
-            None => FrameScene::new(source, self.missing_value),
+            Some(colours) => FrameScene::coloured(source, missing_value, colours),
+            None => FrameScene::new(source, missing_value),
         };
         Ok(Opened { scene: Box::new(scene), file: None, times, colours })
     }

@@ -90,8 +90,6 @@ impl AppendArgs {
 
     fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
         let config = of_file(file.metadata(), self.common.memory.0);
-        let config =
-            config.ok_or_else(|| Error::input(&self.file, "does not say how it was made: nothing to append by"))?;
-        Ok(ConvertConfig { reserved: if self.is_streamed() { self.common.stream_memory() } else { 0 }, ..config })
+        config.ok_or_else(|| Error::input(&self.file, "does not say how it was made: nothing to append by"))
     }
 }

@@ -79,7 +79,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
     range: Option<Pair>,
     /// NaN, infinities and the missing value: refuse them, or keep them as they are
-    /// [default: error; mask with --missing-value]
+    /// [default: error; mask with --missing-value, and where files declare a value for what is missing]
     #[arg(long, value_enum)]
     missing: Option<MissingName>,
     /// A value that means "missing"
@@ -155,7 +155,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let config = args.config()?;
     let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
     spare_inputs(&args.inputs, &args.output)?;
-    let config = ConvertConfig { colours: args.colours(source.as_mut())?, ..config };
+    let config = args.of_archive(config, source.as_mut())?;
     if args.resume && !args.force && args.output.is_file() {
         return args.see_that_it_is_complete(&config, source.archive());
     }
@@ -201,7 +201,6 @@ impl ConvertArgs {
 
     fn config(&self) -> Result<ConvertConfig> {
         let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
-        let streamed = self.inputs == [PathBuf::from(STANDARD)];
         Ok(ConvertConfig {
             coding: self.coding()?,
             window: self.window.unwrap_or(window),
@@ -217,17 +216,24 @@ impl ConvertArgs {
             block: self.block,
             level: self.level,
             memory: self.common.memory.0,
-            reserved: if streamed { self.common.stream_memory() } else { 0 },
             settings: self.settings(),
         })
     }
 
+    /// Completes a configuration by what the archive says, and what may depend on its frames.
+    fn of_archive(&self, config: ConvertConfig, source: &mut dyn FrameSource) -> Result<ConvertConfig> {
+        let declared = source.archive().missing.is_some();
+        let missing_value = source.archive().missing_value(config.missing_value);
+        let missing = if self.missing.is_none() && declared { MissingPolicy::Mask } else { config.missing };
+        Ok(ConvertConfig { colours: self.colours(source, missing_value)?, missing, missing_value, ..config })
+    }
+
     /// The colours that samples are turned into, if they are.
-    fn colours(&self, source: &mut dyn FrameSource) -> Result<Option<TransferFunction>> {
+    fn colours(&self, source: &mut dyn FrameSource, missing_value: Option<f64>) -> Result<Option<TransferFunction>> {
         let Some(name) = &self.transfer_function else { return Ok(None) };
         spare_inputs(&[PathBuf::from(name)], &self.output)?;
         let inputs = (self.inputs.as_slice(), source);
-        transfer_function(name, self.range, inputs, self.missing_value, &self.common).map(Some)
+        transfer_function(name, self.range, inputs, missing_value, &self.common).map(Some)
     }
 
     fn bound(&self) -> Result<Bound> {

@@ -1,13 +1,17 @@
 //! VTK's image data, `.vti`: one array of one piece, uncompressed, raw or base64.
 
-use super::Parsed;
-use super::base64::{Count, Place};
-use super::described::{At, Described, Part, head};
-use super::frames::Shape;
-use super::vti_header::{self, Array, Association, Header};
+mod header;
+
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
+use crate::source::Parsed;
+use crate::source::described::{At, Decode, Described, Part, Stored, head};
+use crate::source::formats::base64::{Count, Place};
+use crate::source::frames::Shape;
+use crate::source::held::Held;
+use header::{Array, Association, Header};
+use std::ops::Range;
 use std::path::Path;
 
 const FIRST_READ: usize = 16 << 10; // bytes; holds the XML of nearly all files with appended arrays
@@ -19,11 +23,12 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let refused = |e| Error::input(path, e);
     let (text, data) = xml(&file)?;
     let text = std::str::from_utf8(&text).map_err(|e| refused(format!("is not UTF-8 text: {e}")))?;
-    let header = vti_header::parse(text).map_err(refused)?;
+    let header = header::parse(text).map_err(refused)?;
     let array = choose(&header.arrays, &header.scalars, variable).map_err(refused)?;
     let shape = shape(&header, array).map_err(refused)?;
     let at = place(&file, &header, array, data, &shape)?;
-    Ok(described(&header, array, shape, &file, at))
+    let stored = Stored::plain(&shape, 1, header.big_endian).map_err(refused)?;
+    Ok(described(&header, array, (shape, stored), &file, at))
 }
 
 /// The text up to the end of the `<AppendedData>` tag or of the file, and the length of that text.
@@ -116,7 +121,21 @@ fn place(file: &FileBytes, header: &Header, array: &Array, data: u64, shape: &Sh
 
 fn base64(file: &FileBytes, place: Place, shape: &Shape, whole: bool) -> Result<At> {
     place.check(file, shape.frame_bytes(), whole)?;
-    Ok(At::Base64(place))
+    Ok(At::Decoded(Box::new(Base64 { place, bytes: shape.frame_bytes() })))
+}
+
+/// The samples of one frame as text.
+#[derive(Debug)]
+struct Base64 {
+    place: Place,
+    bytes: usize,
+}
+
+impl Decode for Base64 {
+    fn decode(&mut self, path: &Path, _frames: Range<usize>, out: &mut Held) -> Result<()> {
+        let samples = self.place.decode(&FileBytes::open(path, Access::Read)?, self.bytes)?;
+        out.write_at(0, &samples).map_err(|e| Error::io(path, "holding its samples", e))
+    }
 }
 
 fn raw(file: &FileBytes, start: u64, count: Count, shape: &Shape) -> Result<At> {
@@ -146,8 +165,9 @@ fn appended(file: &FileBytes, array: &Array, tag_end: u64) -> Result<u64> {
     (tag_end + mark as u64 + 1).checked_add(offset).ok_or_else(|| refused("its array's offset is too large"))
 }
 
-fn described(header: &Header, array: &Array, shape: Shape, file: &FileBytes, at: At) -> Described {
-    let part = Part { path: file.path().into(), state: file.state(), frames: 1, big_endian: header.big_endian, at };
+fn described(header: &Header, array: &Array, (shape, stored): (Shape, Stored), file: &FileBytes, at: At) -> Described {
+    let decoded = matches!(at, At::Decoded(_));
+    let part = Part { path: file.path().into(), state: file.state(), frames: 1, stored, at };
     let mut described = Described::plain(shape, vec![part]);
     let shift = if array.of == Association::Cells { 0.5 } else { 0.0 };
     described.spacing = header.spacing;
@@ -157,7 +177,7 @@ fn described(header: &Header, array: &Array, shape: Shape, file: &FileBytes, at:
     if header.direction != IDENTITY {
         described.notes.push("the Direction of the .vti is not kept: axes are taken as those of the world".into());
     }
-    if matches!(at, At::Base64(_)) {
+    if decoded {
         described.notes.push("base64 arrays are decoded in memory; appended raw arrays read faster".into());
     }
     described

@@ -1,17 +1,27 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
-use super::described::{Described, head};
-use super::{OpenOptions, npy, nrrd, nrrd_header, raw, vti};
+mod base64;
+pub(in crate::source) mod npy;
+mod nrrd;
+pub(in crate::source) mod pvd;
+pub(in crate::source) mod raw;
+mod vti;
+mod xml;
+
+pub use npy::{ArrayHeader, array_header};
+
+use super::OpenOptions;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
+use crate::source::described::{Described, head};
 use std::path::Path;
 
 /// The formats that describe themselves, for messages.
-pub(super) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .vti, .pvd, and headerless data of any name";
+pub(in crate::source) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .vti, .pvd, and headerless data of any name";
 
 /// How a file of frames is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Format {
+pub(in crate::source) enum Format {
     Npy,
     Nrrd,
     Vti,
@@ -23,7 +33,7 @@ pub(super) enum Format {
 
 impl Format {
     /// By extension; none for headerless data and for what is not supported.
-    pub(super) fn by_name(path: &Path) -> Option<Self> {
+    pub(in crate::source) fn by_name(path: &Path) -> Option<Self> {
         match extension(path).as_str() {
             "npy" => Some(Self::Npy),
             "nrrd" | "nhdr" => Some(Self::Nrrd),
@@ -36,18 +46,18 @@ impl Format {
 
     fn by_content(path: &Path) -> Result<Option<Self>> {
         let head = head(&FileBytes::open(path, Access::Read)?, 16)?;
-        let formats = [(npy::MAGIC, Self::Npy), (nrrd_header::MAGIC, Self::Nrrd)];
+        let formats = [(npy::MAGIC, Self::Npy), (nrrd::MAGIC, Self::Nrrd)];
         Ok(formats.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format))
     }
 }
 
 /// The extension in lower case, or nothing.
-pub(super) fn extension(path: &Path) -> String {
+pub(in crate::source) fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
 /// Reads the header of a file of frames and checks its size.
-pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
     let format = match Format::by_name(path) {
         None if options.dims.is_none() => Format::by_content(path)?,
         format => format,
@@ -74,7 +84,7 @@ fn unknown(path: &Path) -> Error {
 }
 
 /// Options that would be ignored are refused, so that nobody thinks they had an effect.
-pub(super) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
+pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
     let given = [
         (options.dims.is_some(), "--dims"),
         (options.sample.is_some(), "--dtype"),

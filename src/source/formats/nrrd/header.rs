@@ -1,11 +1,11 @@
 //! The text of a NRRD header: fields, and the list of data files that may end it.
 
-use super::Parsed;
+use crate::source::Parsed;
 use std::collections::HashMap;
 use std::str::FromStr;
 
 /// How every NRRD starts.
-pub(super) const MAGIC: &[u8] = b"NRRD000";
+pub(in crate::source) const MAGIC: &[u8] = b"NRRD000";
 
 /// The fields of a header, and where it ends.
 #[derive(Debug)]

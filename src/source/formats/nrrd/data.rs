@@ -1,11 +1,11 @@
 //! Where the samples of a NRRD are: after the header, in another file, or in one file for each frame.
 
-use super::Parsed;
-use super::described::{At, Part, check_size};
-use super::frames::Shape;
-use super::nrrd_header::Header;
+use super::header::Header;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
+use crate::source::Parsed;
+use crate::source::described::{Part, check_size};
+use crate::source::frames::Shape;
 use std::path::Path;
 
 const PIECE: usize = 64 << 10; // bytes read at a time when lines are counted
@@ -27,8 +27,8 @@ pub(super) fn parts(
     let refused = |e| Error::input(file.path(), e);
     let skip = skip(header).map_err(refused)?;
     let part = |data: &FileBytes, start, frames| {
-        let at = At::Byte(skip.start(data, start, shape, frames)?);
-        Ok(Part { path: data.path().into(), state: data.state(), frames, big_endian, at })
+        let start = skip.start(data, start, shape, frames)?;
+        Part::plain((data.path(), data.state()), (shape, frames), big_endian, start).map_err(refused)
     };
     let Some(named) = header.get("datafile") else {
         if !header.closed {

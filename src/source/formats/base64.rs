@@ -1,8 +1,8 @@
 //! VTK's base64 arrays: a byte count and the samples, each encoded or both together, perhaps broken by white space.
 
-use super::Parsed;
 use crate::error::{Error, Result};
 use crate::mapped::FileBytes;
+use crate::source::Parsed;
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
 
@@ -10,30 +10,30 @@ const PIECE: usize = 64 << 10; // bytes read at a time
 
 /// Where an encoded array is in its file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(in crate::source) struct Place {
     /// First byte of the text.
-    pub(super) start: u64,
+    pub(in crate::source) start: u64,
     /// How the byte count before the samples is stored.
-    pub(super) count: Count,
+    pub(in crate::source) count: Count,
 }
 
 /// The byte count that VTK puts before the samples of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Count {
+pub(in crate::source) struct Count {
     /// Whether it has 64 bits, not 32.
-    pub(super) wide: bool,
+    pub(in crate::source) wide: bool,
     /// Whether its most significant byte comes first.
-    pub(super) big_endian: bool,
+    pub(in crate::source) big_endian: bool,
 }
 
 impl Count {
     /// Bytes of the count itself.
-    pub(super) fn size(self) -> usize {
+    pub(in crate::source) fn size(self) -> usize {
         if self.wide { 8 } else { 4 }
     }
 
     /// Checks a stored count, whose bytes these are, against what it should be.
-    pub(super) fn check(self, stored: &[u8], expected: usize) -> Parsed<()> {
+    pub(in crate::source) fn check(self, stored: &[u8], expected: usize) -> Parsed<()> {
         let mut bytes = [0; 8];
         bytes[..stored.len()].copy_from_slice(stored);
         if self.big_endian {
@@ -55,7 +55,7 @@ struct Text {
 impl Place {
     /// Checks the count of an array of `expected` bytes, and that the file can hold its text; with `whole`, that it
     /// does.
-    pub(super) fn check(&self, file: &FileBytes, expected: usize, whole: bool) -> Result<()> {
+    pub(in crate::source) fn check(&self, file: &FileBytes, expected: usize, whole: bool) -> Result<()> {
         let text = self.text(file, expected)?;
         if whole {
             return take(file, self.start, text.chars).map(|_| ());
@@ -67,7 +67,7 @@ impl Place {
     }
 
     /// The samples, `expected` bytes.
-    pub(super) fn decode(&self, file: &FileBytes, expected: usize) -> Result<Vec<u8>> {
+    pub(in crate::source) fn decode(&self, file: &FileBytes, expected: usize) -> Result<Vec<u8>> {
         let text = self.text(file, expected)?;
         let mut chars = take(file, self.start, text.chars)?;
         let mut count = self.count.size();

@@ -1,17 +1,17 @@
 //! Headerless samples: the user says what they are.
 
-use super::OpenOptions;
-use super::described::{At, Described, Part, check_size};
-use super::frames::Shape;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
+use crate::source::OpenOptions;
+use crate::source::described::{Described, Part, check_size};
+use crate::source::frames::Shape;
 use std::path::Path;
 
 /// The frames that `--dims` and `--dtype` describe, and how many of them if `--dims` says so.
 ///
 /// # Errors
 /// Usage, if one of them is missing or makes no sense.
-pub(super) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
+pub(in crate::source) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
     let dims = options.dims.as_deref().unwrap_or_default();
     let (dims, frames) = match *dims {
         [x, y, z] => ([x, y, z], None),
@@ -32,14 +32,14 @@ pub(super) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
 }
 
 /// Checks one file against the options.
-pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
     let (shape, frames) = shape(options)?;
     let state = FileBytes::open(path, Access::Read)?.state();
     let count = frames.unwrap_or(1);
     check_size(state.len, options.offset, &shape, count)
         .map_err(|what| Error::input(path, format!("{what}{}", advice(state.len, &shape, options))))?;
-    let at = At::Byte(options.offset);
-    let part = Part { path: path.into(), state, frames: count, big_endian: options.big_endian, at };
+    let part = Part::plain((path, state), (&shape, count), options.big_endian, options.offset)
+        .map_err(|e| Error::usage(format!("--dims: {e}")))?;
     Ok(Described::plain(shape, vec![part]))
 }
 
@@ -56,9 +56,9 @@ fn advice(len: u64, shape: &Shape, options: &OpenOptions) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{DIMS, Folder, check_inputs, payload, refused};
     use super::*;
     use crate::sample::SampleType;
+    use crate::source::testing::{DIMS, Folder, check_inputs, payload, refused};
 
     fn options(frames: Option<usize>, sample: SampleType) -> OpenOptions {
         let dims = DIMS.into_iter().chain(frames).collect();

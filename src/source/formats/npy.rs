@@ -1,33 +1,33 @@
 //! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x).
 
-use super::Parsed;
-use super::described::{At, Described, Part, check_size};
-use super::frames::Shape;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
+use crate::source::Parsed;
+use crate::source::described::{Described, Part, check_size};
+use crate::source::frames::Shape;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 /// How every `.npy` starts.
-pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+pub(in crate::source) const MAGIC: &[u8] = b"\x93NUMPY";
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
 const MAX_NESTING: usize = 8; // brackets within brackets: the parser takes twice as long with each dictionary more
 
 /// What the header of an array says.
 #[derive(Debug)]
-pub(super) struct Array {
+pub(in crate::source) struct Array {
     /// Voxels and sample type of a frame.
-    pub(super) shape: Shape,
+    pub(in crate::source) shape: Shape,
     /// Number of frames.
-    pub(super) frames: usize,
+    pub(in crate::source) frames: usize,
     /// Whether samples have their most significant byte first.
-    pub(super) big_endian: bool,
+    pub(in crate::source) big_endian: bool,
     /// Bytes before the first sample.
-    pub(super) start: u64,
+    pub(in crate::source) start: u64,
 }
 
 /// What the header of an array of any number of dimensions says.
@@ -53,17 +53,17 @@ pub fn array_header(path: &Path) -> Result<ArrayHeader> {
 }
 
 /// Reads the header of one file and checks its size.
-pub(super) fn describe(path: &Path) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path) -> Result<Described> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let Array { shape, frames, big_endian, start } = read_header(&mut BufReader::with_capacity(256, file), path)?;
     check_size(state.len, start, &shape, frames).map_err(|e| Error::input(path, e))?;
-    let part = Part { path: path.into(), state, frames, big_endian, at: At::Byte(start) };
+    let part = Part::plain((path, state), (&shape, frames), big_endian, start).map_err(|e| Error::input(path, e))?;
     Ok(Described::plain(shape, vec![part]))
 }
 
 /// Reads up to the first sample, and not a byte further.
-pub(super) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
+pub(in crate::source) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
     any_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
 }
 
@@ -173,9 +173,9 @@ fn plain_type(ty: &TypeStr) -> Option<SampleType> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::OpenOptions;
-    use super::super::testing::{Folder, check_inputs, payload, refused, survives_damage};
     use super::*;
+    use crate::source::OpenOptions;
+    use crate::source::testing::{Folder, check_inputs, payload, refused, survives_damage};
 
     fn npy(version: u8, dict: &str, payload: &[u8]) -> Vec<u8> {
         let text = format!("{dict}\n");
@@ -258,7 +258,7 @@ mod tests {
         let good = npy(2, &dict("'<f4'", "(2, 2, 4)"), &[0; 64]);
         for len in 0..good.len() {
             let file = folder.write("a.npy", &good[..len]);
-            assert!(super::super::open(&[file], &OpenOptions::default()).is_err(), "{len} bytes");
+            assert!(crate::source::open(&[file], &OpenOptions::default()).is_err(), "{len} bytes");
         }
         let mut huge = good.clone();
         huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());

@@ -1,9 +1,9 @@
 //! ParaView's `.pvd`: a list of files and their times.
 
-use super::Parsed;
-use super::described::Files;
 use super::xml::{attribute, required};
 use crate::error::{Error, Result};
+use crate::source::Parsed;
+use crate::source::described::Files;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;
@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 
 /// Reads the list; its files are found from its own folder.
-pub(super) fn read(path: &Path) -> Result<Files> {
+pub(in crate::source) fn read(path: &Path) -> Result<Files> {
     let bytes = fs::read(path).map_err(|e| Error::io(path, "reading", e))?;
     let text = std::str::from_utf8(&bytes).map_err(|e| Error::input(path, format!("is not UTF-8 text: {e}")))?;
     parse(text, path.parent().unwrap_or(Path::new(""))).map_err(|e| Error::input(path, e))
@@ -70,8 +70,8 @@ fn finish(mut files: Files, sets: usize) -> Parsed<Files> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Folder, refused};
-    use super::super::{OpenOptions, open};
+    use crate::source::testing::{Folder, refused};
+    use crate::source::{OpenOptions, open};
 
     const NPY: &[u8] = b"\x93NUMPY\x01\x00\x3e\x00{'descr':'|u1', 'fortran_order':False, 'shape':(1,1,1,2)}    \nab";
 

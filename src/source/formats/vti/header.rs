@@ -1,7 +1,7 @@
 //! What the XML of a `.vti` says.
 
-use super::Parsed;
-use super::xml::{attribute, numbers, required};
+use crate::source::Parsed;
+use crate::source::formats::xml::{attribute, numbers, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 

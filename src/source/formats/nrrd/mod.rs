@@ -1,13 +1,17 @@
 //! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`): axes x y z or x y z t, raw encoding.
 
-use super::Parsed;
-use super::described::{Described, head};
-use super::frames::Shape;
-use super::nrrd_data;
-use super::nrrd_header::{Header, numbers};
+mod data;
+mod header;
+
+pub(in crate::source) use header::MAGIC;
+
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
+use crate::source::Parsed;
+use crate::source::described::{Described, head};
+use crate::source::frames::Shape;
+use header::{Header, numbers};
 use std::path::Path;
 
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
@@ -21,7 +25,7 @@ pub(super) fn describe(path: &Path) -> Result<Described> {
     let Geometry { shape, frames, big_endian } = geometry(&header).map_err(refused)?;
     let mut notes = Vec::new();
     let (spacing, origin) = grid(&header, &mut notes).map_err(refused)?;
-    let parts = nrrd_data::parts(&file, &header, &shape, frames, big_endian)?;
+    let parts = data::parts(&file, &header, &shape, frames, big_endian)?;
     let times = times(&header, frames).map_err(refused)?;
     Ok(Described { spacing, origin, times, notes, ..Described::plain(shape, parts) })
 }

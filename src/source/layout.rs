@@ -1,0 +1,133 @@
+//! How the samples of some frames lie in an array: axes in any order and direction.
+
+use super::Parsed;
+
+/// What an axis counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Counts {
+    /// Frames.
+    Frames,
+    /// Voxels along x (0), y (1) or z (2).
+    Voxels(usize),
+    /// Something else, of which only this one is meant: a component, a member of an ensemble.
+    Only(usize),
+}
+
+/// An axis of an array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Axis {
+    pub(super) counts: Counts,
+    /// At least 1.
+    pub(super) len: usize,
+    /// Whether voxels are stored from the last to the first.
+    pub(super) backwards: bool,
+}
+
+impl Axis {
+    /// An axis that is stored from its first to its last.
+    pub(super) fn new(counts: Counts, len: usize) -> Self {
+        Self { counts, len, backwards: false }
+    }
+}
+
+/// The axes of an array, the slowest first. Axes that it lacks have a length of 1.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Layout(pub(super) Vec<Axis>);
+
+impl Layout {
+    /// Frames one after another, z slowest and x fastest.
+    pub(super) fn plain([x, y, z]: [usize; 3], frames: usize) -> Self {
+        let axes = [(Counts::Frames, frames), (Counts::Voxels(2), z), (Counts::Voxels(1), y), (Counts::Voxels(0), x)];
+        Self(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec())
+    }
+
+    /// The length of the axis that counts this.
+    pub(super) fn len(&self, counts: Counts) -> usize {
+        self.0.iter().find(|axis| axis.counts == counts).map_or(1, |axis| axis.len)
+    }
+
+    /// Voxels along x, y, z.
+    pub(super) fn dims(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.len(Counts::Voxels(axis)))
+    }
+
+    /// The same array of another number of frames.
+    pub(super) fn with_frames(mut self, frames: usize) -> Self {
+        self.0.iter_mut().filter(|axis| axis.counts == Counts::Frames).for_each(|axis| axis.len = frames);
+        self
+    }
+
+    /// Bytes of the whole array.
+    pub(super) fn bytes(&self, size: usize) -> Parsed<usize> {
+        let bytes = self.0.iter().try_fold(size, |bytes, axis| bytes.checked_mul(axis.len));
+        bytes.filter(|n| isize::try_from(*n).is_ok()).ok_or_else(|| "an array of its size is too large".into())
+    }
+
+    /// Where samples of `size` bytes are.
+    pub(super) fn strides(&self, size: usize) -> Parsed<Strides> {
+        self.bytes(size)?;
+        let mut strides = Strides { first: 0, frame: 0, voxel: [0; 3] };
+        let mut stride = size as i64;
+        for axis in self.0.iter().rev() {
+            let last = stride * (axis.len as i64 - 1);
+            let signed = if axis.backwards { -stride } else { stride };
+            strides.first += if axis.backwards { last as u64 } else { 0 };
+            match axis.counts {
+                Counts::Frames => strides.frame = stride as u64,
+                Counts::Voxels(of) => strides.voxel[of] = signed,
+                Counts::Only(index) => strides.first += stride as u64 * index as u64,
+            }
+            stride *= axis.len as i64;
+        }
+        Ok(strides)
+    }
+}
+
+/// Bytes from one sample of an array to others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Strides {
+    /// From the array's first byte to voxel (0, 0, 0) of its first frame.
+    pub(super) first: u64,
+    /// To the next frame.
+    pub(super) frame: u64,
+    /// To the next voxel along x, y, z.
+    pub(super) voxel: [i64; 3],
+}
+
+impl Strides {
+    /// Whether voxels of a frame of these dimensions lie together in the order in which boxes are asked for.
+    pub(super) fn is_plain(&self, dims: [usize; 3], size: usize) -> bool {
+        self.voxel == [size, size * dims[0], size * dims[0] * dims[1]].map(|n| n as i64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strides_lead_to_every_sample() {
+        let axes = [(Counts::Voxels(0), 3), (Counts::Only(1), 2), (Counts::Frames, 5), (Counts::Voxels(2), 4)];
+        let mut layout = Layout(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec());
+        layout.0[3].backwards = true;
+        let strides = layout.strides(2).expect("small");
+        let index = |x: u64, t: u64, z: u64| ((x * 2 + 1) * 5 + t) * 4 + (3 - z);
+        for (x, t, z) in [(0, 0, 0), (2, 4, 3), (1, 2, 1)] {
+            let at = strides.first + t * strides.frame;
+            let at = at as i64 + x as i64 * strides.voxel[0] + z as i64 * strides.voxel[2];
+            assert_eq!(at as u64, 2 * index(x, t, z));
+        }
+        assert_eq!(layout.dims(), [3, 1, 4]);
+        assert_eq!(layout.bytes(2), Ok(240));
+    }
+
+    #[test]
+    fn only_the_usual_order_is_plain() {
+        let dims = [7, 5, 3];
+        assert!(Layout::plain(dims, 9).strides(4).expect("small").is_plain(dims, 4));
+        let mut other = Layout::plain(dims, 9);
+        other.0.swap(1, 2);
+        assert!(!other.strides(4).expect("small").is_plain(dims, 4));
+        assert!(Layout::plain([usize::MAX, 2, 2], 1).bytes(1).is_err());
+    }
+}

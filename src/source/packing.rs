@@ -1,0 +1,65 @@
+//! Numbers that are stored as others: scaled, and with values that stand for what is missing.
+
+use crate::sample::{self, SampleType};
+
+/// How stored numbers become samples: `stored * scale + offset`, NaN for what is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Packing {
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+    /// Stored numbers that stand for missing samples.
+    pub(super) missing: Vec<f64>,
+    /// The least and the largest stored number that is valid.
+    pub(super) valid: (f64, f64),
+}
+
+impl Packing {
+    /// Numbers as they are.
+    pub(super) const NONE: Self =
+        Self { scale: 1.0, offset: 0.0, missing: Vec::new(), valid: (f64::NEG_INFINITY, f64::INFINITY) };
+
+    /// Numbers that are scaled.
+    pub(super) fn scaled(scale: f64, offset: f64) -> Self {
+        Self { scale, offset, ..Self::NONE }
+    }
+
+    /// The type of the samples: f32 holds what integers of up to 16 bits become as finely as they were.
+    pub(super) fn sample(stored: SampleType) -> SampleType {
+        match stored {
+            SampleType::U32 | SampleType::I32 | SampleType::F64 => SampleType::F64,
+            _ => SampleType::F32,
+        }
+    }
+
+    fn value(&self, stored: f64) -> f64 {
+        let valid = self.valid.0 <= stored && stored <= self.valid.1 && !self.missing.contains(&stored);
+        if valid { stored * self.scale + self.offset } else { f64::NAN }
+    }
+
+    /// Fills `out` with samples (little-endian, of the type that [`Packing::sample`] says) of stored numbers (little-endian).
+    pub(super) fn unpack(&self, stored: SampleType, bytes: &[u8], out: &mut [u8]) {
+        let ty = Self::sample(stored);
+        let mut values = Vec::new();
+        sample::for_each_run(stored, bytes, |first, numbers| {
+            values.clear();
+            values.extend(numbers.iter().map(|number| self.value(*number)));
+            sample::store(ty, &values, &mut out[first * ty.size()..][..values.len() * ty.size()]);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_scaled_and_missing_ones_are_not_a_number() {
+        let packing = Packing { missing: vec![-7.0], valid: (-50.0, 50.0), ..Packing::scaled(0.5, 3.0) };
+        let stored: Vec<u8> = [0_i16, -7, 4, 51, -50].into_iter().flat_map(i16::to_le_bytes).collect();
+        let mut out = vec![0; 20];
+        packing.unpack(SampleType::I16, &stored, &mut out);
+        let mut values = [0.0; 5];
+        sample::load(SampleType::F32, &out, &mut values);
+        assert_eq!(values.map(|v| if v.is_nan() { 99.0 } else { v }), [3.0, 99.0, 5.0, 99.0, -22.0]);
+    }
+}
