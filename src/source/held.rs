@@ -6,8 +6,6 @@ use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-const CHUNK: usize = 1 << 20; // bytes moved at a time
-
 /// A fixed number of bytes, zero at first.
 #[derive(Debug)]
 pub(super) enum Held {
@@ -44,22 +42,6 @@ impl Held {
             Self::Spool(file) => file.write_all_at(bytes, at)?,
         }
         Ok(())
-    }
-
-    /// Moves up to `len` bytes from a reader, and says how many there were.
-    pub(super) fn fill(&mut self, at: u64, len: usize, reader: &mut dyn Read) -> io::Result<usize> {
-        let mut chunk = vec![0; CHUNK.min(len)];
-        let mut got = 0;
-        while got < len {
-            let wanted = chunk.len().min(len - got);
-            let n = read_some(reader, &mut chunk[..wanted])?;
-            if n == 0 {
-                break;
-            }
-            self.write_at(at + got as u64, &chunk[..n])?;
-            got += n;
-        }
-        Ok(got)
     }
 
     /// Copies bytes out.

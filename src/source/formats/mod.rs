@@ -1,6 +1,8 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
 mod base64;
+mod component;
+mod deflated;
 pub(in crate::source) mod npy;
 mod nrrd;
 pub(in crate::source) mod pvd;
