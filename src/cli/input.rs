@@ -39,6 +39,9 @@ pub struct InputArgs {
     /// Which array of the files
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub variable: Option<String>,
+    /// What the axes of an array in HDF5, NetCDF or Zarr count, slowest first: letters of tzyx, c for another
+    #[arg(long, value_name = "LETTERS", help_heading = "Input")]
+    pub axes: Option<String>,
     /// World units between voxels, instead of what the files say: SX,SY,SZ
     #[arg(long, value_name = "SX,SY,SZ", help_heading = "Input")]
     pub spacing: Option<Triple>,
@@ -62,6 +65,7 @@ impl InputArgs {
             (self.endian == Endian::Big, "--endian"),
             (self.offset > 0, "--offset"),
             (self.variable.is_some(), "--variable"),
+            (self.axes.is_some(), "--axes"),
             (self.spacing.is_some(), "--spacing"),
             (self.origin.is_some(), "--origin"),
             (self.allow_gaps, "--allow-gaps"),
@@ -86,6 +90,7 @@ impl InputArgs {
             big_endian: self.endian == Endian::Big,
             offset: self.offset,
             variable: self.variable.clone(),
+            axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
             allow_gaps: self.allow_gaps,
@@ -107,7 +112,9 @@ impl InputArgs {
         common: &CommonArgs,
     ) -> Result<Box<dyn FrameSource>> {
         let mut input = self.clone();
-        input.variable = input.variable.or_else(|| setting(of.metadata(), "variable").map(String::from));
+        let before = |name| setting(of.metadata(), name).map(String::from);
+        input.variable = input.variable.or_else(|| before("variable"));
+        input.axes = input.axes.or_else(|| before("axes"));
         narrow(input.open(inputs, common)?, frames, remembered(of, "region")?)
     }
 }

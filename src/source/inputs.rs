@@ -120,8 +120,8 @@ fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
         _ => {}
     }
     let frames = |p: &&PathBuf| match Format::by_name(p) {
-        Some(Format::Npy | Format::Nrrd | Format::Vti) => options.dims.is_none(),
         Some(Format::Pvd | Format::Coefficients) => false,
+        Some(_) => options.dims.is_none(),
         None => options.dims.is_some(),
     };
     let paths = one_extension(folder, all.iter().filter(frames).cloned().collect())?;

@@ -50,8 +50,10 @@ pub struct OpenOptions {
     pub big_endian: bool,
     /// Bytes before the first sample of each file; for headerless data alone.
     pub offset: u64,
-    /// Which array of a `.vti` is meant.
+    /// Which array of a file is meant.
     pub variable: Option<String>,
+    /// What the axes of an array count, the slowest first: letters of t z y x, or another for an axis beside these.
+    pub axes: Option<String>,
     /// World units between voxels along x, y, z, in place of what the files say.
     pub spacing: Option<[f64; 3]>,
     /// World position of the first voxel, in place of what the files say.
@@ -72,6 +74,7 @@ impl Default for OpenOptions {
             big_endian: false,
             offset: 0,
             variable: None,
+            axes: None,
             spacing: None,
             origin: None,
             allow_gaps: false,

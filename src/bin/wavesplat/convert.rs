@@ -295,7 +295,8 @@ impl ConvertArgs {
         let frames = self.frames.map(|f| ("frames".to_string(), f.to_string()));
         let region = self.region.map(|r| ("region".to_string(), r.to_string()));
         let variable = self.input.variable.clone().map(|v| ("variable".to_string(), v));
-        [frames, region, variable].into_iter().flatten().collect()
+        let axes = self.input.axes.clone().map(|a| ("axes".to_string(), a));
+        [frames, region, variable, axes].into_iter().flatten().collect()
     }
 }
 

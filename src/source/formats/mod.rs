@@ -1,5 +1,6 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
+mod arrays;
 mod base64;
 mod component;
 mod deflated;
@@ -19,7 +20,8 @@ use crate::source::described::{Described, head};
 use std::path::Path;
 
 /// The formats that describe themselves, for messages.
-pub(in crate::source) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .vti, .pvd, and headerless data of any name";
+pub(in crate::source) const SUPPORTED: &str =
+    ".npy, .nrrd, .nhdr, .vti, .pvd, .nc, .h5, and headerless data of any name";
 
 /// How a file of frames is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +29,8 @@ pub(in crate::source) enum Format {
     Npy,
     Nrrd,
     Vti,
+    Hdf5,
+    NetCdf,
     /// A list of files, not frames itself.
     Pvd,
     /// A coefficient file, which is no input.
@@ -40,15 +44,27 @@ impl Format {
             "npy" => Some(Self::Npy),
             "nrrd" | "nhdr" => Some(Self::Nrrd),
             "vti" => Some(Self::Vti),
+            "h5" | "hdf5" | "hdf" | "he5" | "vtkhdf" => Some(Self::Hdf5),
+            "nc" | "nc4" | "nc3" | "cdf" | "netcdf" => Some(Self::NetCdf),
             "pvd" => Some(Self::Pvd),
             "wspl" => Some(Self::Coefficients),
             _ => None,
         }
     }
 
+    /// Whether a file may hold several arrays.
+    fn has_variables(self) -> bool {
+        matches!(self, Self::Vti | Self::Hdf5 | Self::NetCdf)
+    }
+
     fn by_content(path: &Path) -> Result<Option<Self>> {
         let head = head(&FileBytes::open(path, Access::Read)?, 16)?;
-        let formats = [(npy::MAGIC, Self::Npy), (nrrd::MAGIC, Self::Nrrd)];
+        let formats = [
+            (npy::MAGIC, Self::Npy),
+            (nrrd::MAGIC, Self::Nrrd),
+            (b"\x89HDF\r\n\x1a\n", Self::Hdf5),
+            (b"CDF", Self::NetCdf),
+        ];
         Ok(formats.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format))
     }
 }
@@ -71,6 +87,8 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         Some(Format::Npy) => npy::describe(path),
         Some(Format::Nrrd) => nrrd::describe(path),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
+        Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
+        Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
         Some(Format::Pvd) => Err(Error::usage(format!("{}: a .pvd must be the only input", path.display()))),
         Some(Format::Coefficients) => {
             Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
@@ -92,13 +110,18 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
         (options.sample.is_some(), "--dtype"),
         (options.big_endian, "--endian"),
         (options.offset > 0, "--offset"),
-        (options.variable.is_some() && format != Format::Vti, "--variable"),
+        (options.variable.is_some() && !format.has_variables(), "--variable"),
+        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf), "--axes"),
     ];
     match given.into_iter().find(|(given, _)| *given) {
         Some((_, "--variable")) => {
-            Err(Error::usage(format!("{}: --variable is for .vti files; this has one array", path.display())))
+            Err(Error::usage(format!("{}: --variable is for files of several arrays; this has one", path.display())))
         }
-        Some((_, name)) if matches!(format, Format::Npy | Format::Nrrd | Format::Vti) => {
+        Some((_, "--axes")) => {
+            let what = "--axes is for HDF5, NetCDF and Zarr; this file says it itself";
+            Err(Error::usage(format!("{}: {what}", path.display())))
+        }
+        Some((_, name)) if !matches!(format, Format::Pvd | Format::Coefficients) => {
             let what = format!("says itself what it holds; {name} is for headerless data, leave it out");
             Err(Error::usage(format!("{}: {what}", path.display())))
         }

@@ -1,0 +1,142 @@
+//! What the axes of a variable count: by the user's word, by the conventions of CF, by their names, else by their order.
+
+use super::Variable;
+use crate::source::Parsed;
+use crate::source::layout::Counts;
+
+const ORDER: [Counts; 4] = [Counts::Frames, Counts::Voxels(2), Counts::Voxels(1), Counts::Voxels(0)];
+const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];
+
+/// What each axis counts, the slowest first; `index` is that of an axis beside space and time, `letters` what the user says.
+pub(super) fn counts(
+    variable: &Variable,
+    all: &[Variable],
+    index: Option<usize>,
+    letters: Option<&str>,
+) -> Parsed<Vec<Counts>> {
+    let guess = match letters {
+        Some(letters) => by_letters(variable, letters)?,
+        None => by_order(variable, known(variable, all), index.is_some()),
+    };
+    let only = |(axis, counts): (usize, Option<Counts>)| match (counts, variable.lengths[axis], index) {
+        (Some(counts), _, _) => Ok(counts),
+        (None, 1, _) => Ok(Counts::Only(0)),
+        (None, n, Some(index)) if index < n => Ok(Counts::Only(index)),
+        (None, n, Some(index)) => {
+            Err(format!("{}: axis {} has no index {index}", shown(variable), named(variable, axis, n)))
+        }
+        (None, n, None) => Err(too_many(variable, axis, n)),
+    };
+    let counts = guess.into_iter().enumerate().map(only).collect::<Parsed<Vec<_>>>()?;
+    let beside = (0..counts.len()).filter(|i| matches!(counts[*i], Counts::Only(_)) && variable.lengths[*i] > 1);
+    match beside.count() {
+        0 if index.is_some_and(|i| i > 0) => Err(format!("{}: has no axis beside space and time", shown(variable))),
+        n if n > 1 => Err(format!("{}: has {n} axes beside space and time; one is supported", shown(variable))),
+        _ => Ok(counts),
+    }
+}
+
+fn shown(variable: &Variable) -> String {
+    format!(
+        "variable {} of {} axes {:?}",
+        variable.path.trim_start_matches('/'),
+        variable.lengths.len(),
+        variable.lengths
+    )
+}
+
+fn named(variable: &Variable, axis: usize, len: usize) -> String {
+    let dim = &variable.dims[axis];
+    if dim.is_empty() { format!("{axis} of length {len}") } else { format!("{dim} of length {len}") }
+}
+
+fn too_many(variable: &Variable, axis: usize, len: usize) -> String {
+    let name = variable.path.trim_start_matches('/');
+    format!(
+        "{}: axis {} counts neither voxels nor frames; --variable '{name}[0]' takes its first index, --axes with one letter of \
+         t z y x (or c for another) for each axis, slowest first, says it otherwise",
+        shown(variable),
+        named(variable, axis, len)
+    )
+}
+
+/// One letter an axis; none for other letters.
+fn by_letters(variable: &Variable, letters: &str) -> Parsed<Vec<Option<Counts>>> {
+    let of = |c: char| LETTERS.iter().position(|letter| *letter == c).map(|at| ORDER[at]);
+    let counts: Vec<_> = letters.chars().map(of).collect();
+    if counts.len() != variable.lengths.len() {
+        return Err(format!("{}: --axes {letters} names {}", shown(variable), counts.len()));
+    }
+    Ok(counts)
+}
+
+/// What axes say of themselves.
+fn known(variable: &Variable, all: &[Variable]) -> Vec<Option<Counts>> {
+    let of = |axis: usize| {
+        let by_coordinate = variable.coordinate(axis, all).and_then(of_coordinate);
+        by_coordinate.or_else(|| of_name(&variable.dims[axis]))
+    };
+    let mut counts: Vec<_> = (0..variable.lengths.len()).map(of).collect();
+    for which in ORDER {
+        if counts.iter().filter(|c| **c == Some(which)).count() > 1 {
+            counts.iter_mut().filter(|c| **c == Some(which)).for_each(|c| *c = None);
+        }
+    }
+    counts
+}
+
+/// By the attributes that the CF conventions give coordinates.
+pub(super) fn of_coordinate(coordinate: &Variable) -> Option<Counts> {
+    let text = |name| coordinate.text(name).unwrap_or_default().to_lowercase();
+    let (axis, name, unit) = (text("axis"), text("standard_name"), text("units"));
+    let by_axis = axis.chars().next().and_then(|c| LETTERS.iter().position(|letter| *letter == c)).map(|at| ORDER[at]);
+    let by_name = match name.as_str() {
+        "time" => Some(Counts::Frames),
+        "latitude" | "grid_latitude" | "projection_y_coordinate" => Some(Counts::Voxels(1)),
+        "longitude" | "grid_longitude" | "projection_x_coordinate" => Some(Counts::Voxels(0)),
+        "air_pressure" | "altitude" | "depth" | "height" => Some(Counts::Voxels(2)),
+        _ => None,
+    };
+    let by_unit = match unit.as_str() {
+        unit if unit.contains(" since ") => Some(Counts::Frames),
+        unit if unit.starts_with("degree") && unit.ends_with(['n', 'h']) => Some(Counts::Voxels(1)),
+        unit if unit.starts_with("degree") && unit.ends_with(['e', 't']) && unit != "degree" => Some(Counts::Voxels(0)),
+        _ => None,
+    };
+    let vertical = coordinate.text("positive").map(|_| Counts::Voxels(2));
+    by_axis.or(by_name).or(by_unit).or(vertical)
+}
+
+fn of_name(dim: &str) -> Option<Counts> {
+    Some(match dim.to_lowercase().as_str() {
+        "t" | "time" | "times" | "valid_time" | "step" | "steps" | "timestep" | "frame" | "frames" => Counts::Frames,
+        "z" | "lev" | "level" | "levels" | "depth" | "height" | "alt" | "altitude" | "plev" | "pressure" | "layer"
+        | "k" | "nz" | "zc" | "pressure_level" | "bottom_top" => Counts::Voxels(2),
+        "y" | "lat" | "latitude" | "rlat" | "j" | "ny" | "yc" | "south_north" => Counts::Voxels(1),
+        "x" | "lon" | "longitude" | "rlon" | "i" | "nx" | "xc" | "west_east" => Counts::Voxels(0),
+        _ => return None,
+    })
+}
+
+/// Names of axes along which an archive is not continued.
+const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
+
+/// What is still free goes to axes that say nothing, in the usual order t z y x. With an index the last such axis is left out.
+fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool) -> Vec<Option<Counts>> {
+    let beside = |axis: &usize| BESIDE.contains(&variable.dims[*axis].to_lowercase().as_str());
+    let mut free: Vec<usize> = (0..counts.len()).filter(|axis| counts[*axis].is_none() && !beside(axis)).collect();
+    let mut roles: Vec<Counts> = ORDER.into_iter().filter(|role| !counts.contains(&Some(*role))).collect();
+    if indexed && counts.len() - free.len() == counts.iter().flatten().count() {
+        free.pop();
+    }
+    while free.len() > roles.len()
+        && let Some(at) = free.iter().position(|axis| variable.lengths[*axis] == 1)
+    {
+        free.remove(at);
+    }
+    roles.drain(..roles.len().saturating_sub(free.len()));
+    for (axis, role) in free.into_iter().zip(roles) {
+        counts[axis] = Some(role);
+    }
+    counts
+}

@@ -1,0 +1,124 @@
+//! NetCDF files, classic and version 4, as [`super::ArrayFile`].
+
+use super::{ArrayFile, Attribute, Attributes, How, Variable, hdf5};
+use crate::error::{Error, Result};
+use crate::mapped::FileBytes;
+use crate::sample::SampleType;
+use crate::source::Parsed;
+use hdf5_reader::Hdf5File;
+use netcdf_reader::{NcAttrValue, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
+use std::ops::Range;
+use std::path::Path;
+
+/// What the library puts where a float was never written.
+const UNWRITTEN: f64 = 9.969_209_968_386_869e36;
+
+/// Opens a file.
+pub(super) fn open(path: &Path, how: How) -> Result<Box<dyn ArrayFile>> {
+    let storage = hdf5::storage(FileBytes::open(path, how.access)?);
+    let options = NcOpenOptions { chunk_cache_bytes: 0, max_chunk_bytes: how.memory, ..NcOpenOptions::default() };
+    let file = NcFile::from_storage_with_options(storage.clone(), options);
+    let file = file.map_err(|e| Error::input(path, format!("is no NetCDF file that can be read: {e}")))?;
+    let hdf5 = if file.as_classic().is_some() { None } else { Hdf5File::from_storage(storage).ok() };
+    Ok(Box::new(Opened { file, hdf5 }))
+}
+
+struct Opened {
+    file: NcFile,
+    /// The same file, of version 4: it knows of chunks.
+    hdf5: Option<Hdf5File>,
+}
+
+impl ArrayFile for Opened {
+    fn variables(&self) -> Parsed<Vec<Variable>> {
+        let mut all = Vec::new();
+        self.add(self.file.root_group().map_err(|e| e.to_string())?, "", &mut all);
+        Ok(all)
+    }
+
+    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+        let of = |r: &Range<usize>| NcSliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
+        let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };
+        macro_rules! read {
+            ($ty:ty) => {{
+                let numbers = self.file.read_variable_slice_parallel::<$ty>(path, &slice).map_err(|e| e.to_string())?;
+                numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
+            }};
+        }
+        Ok(match sample {
+            SampleType::U8 => read!(u8),
+            SampleType::I8 => read!(i8),
+            SampleType::U16 => read!(u16),
+            SampleType::I16 => read!(i16),
+            SampleType::U32 => read!(u32),
+            SampleType::I32 => read!(i32),
+            SampleType::F32 => read!(f32),
+            SampleType::F64 => read!(f64),
+            SampleType::F16 => return Err("NetCDF has no half floats".into()),
+        })
+    }
+
+    fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
+        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {e}"))?;
+        Ok(numbers.into_iter().collect())
+    }
+}
+
+impl Opened {
+    fn add(&self, group: &NcGroup, path: &str, all: &mut Vec<Variable>) {
+        for variable in &group.variables {
+            all.push(self.variable(variable, format!("{path}{}", variable.name())));
+        }
+        for group in &group.groups {
+            self.add(group, &format!("{path}{}/", group.name), all);
+        }
+    }
+
+    fn variable(&self, found: &NcVariable, path: String) -> Variable {
+        let dims = found.dimensions();
+        let chunk = self.hdf5.as_ref().and_then(|file| file.dataset(&path).ok()?.chunks());
+        let chunk = chunk.filter(|chunk| chunk.len() == dims.len());
+        let mut attributes = attributes(found);
+        let unsigned = attributes.get("_Unsigned") == Some(&Attribute::Text("true".into()));
+        let sample = sample_type(found.dtype(), unsigned);
+        if matches!(sample, Ok(SampleType::F32 | SampleType::F64)) && !attributes.contains_key("_FillValue") {
+            attributes.insert("_FillValue".into(), Attribute::Numbers(vec![UNWRITTEN]));
+        }
+        Variable {
+            sample,
+            lengths: dims.iter().map(|dim| usize::try_from(dim.size).unwrap_or(usize::MAX)).collect(),
+            dims: dims.iter().map(|dim| dim.name.clone()).collect(),
+            chunk: chunk.map(|chunk| chunk.into_iter().map(|n| n as usize).collect()),
+            attributes,
+            path,
+        }
+    }
+}
+
+fn attributes(variable: &NcVariable) -> Attributes {
+    let value = |value: &NcAttrValue| match value.as_string() {
+        Some(text) => Some(Attribute::Text(text)),
+        None => value.as_f64_vec().map(Attribute::Numbers),
+    };
+    variable.attributes().iter().filter_map(|a| Some((a.name.clone(), value(&a.value)?))).collect()
+}
+
+fn sample_type(ty: &NcType, unsigned: bool) -> Parsed<SampleType> {
+    Ok(match ty {
+        NcType::Byte if unsigned => SampleType::U8,
+        NcType::Short if unsigned => SampleType::U16,
+        NcType::Int if unsigned => SampleType::U32,
+        NcType::Byte => SampleType::I8,
+        NcType::UByte => SampleType::U8,
+        NcType::Short => SampleType::I16,
+        NcType::UShort => SampleType::U16,
+        NcType::Int => SampleType::I32,
+        NcType::UInt => SampleType::U32,
+        NcType::Float => SampleType::F32,
+        NcType::Double => SampleType::F64,
+        NcType::Int64 => return Err("int64".into()),
+        NcType::UInt64 => return Err("uint64".into()),
+        NcType::Char | NcType::String => return Err("text".into()),
+        _ => return Err("a type of its own".into()),
+    })
+}
