@@ -26,14 +26,14 @@ def write_format(out: Path, name: str) -> list[dict]:
 
 
 def write_manifest(out: Path, records: list[dict]) -> None:
-    lines = ",\n".join(json.dumps(record) for record in records)
+    lines = ",\n".join(json.dumps(record, separators=(",", ":")) for record in records)
     (out / "manifest.json").write_text(f"[\n{lines}\n]\n")
 
 
 def print_table(records: list[dict]) -> None:
     for r in records:
         what = "refused" if r.get("refused") else f"{r['sample']} x {r['frames']}"
-        print(f"{r['path']:45} {r['variable'] or '':10} {what:10} {r['note']}")
+        print(f"{r['path']:36} {r['variable'] or '':20} {what:8} {r['note']}")
 
 
 def main(out: str, *names: str) -> None:

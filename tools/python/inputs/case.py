@@ -19,6 +19,8 @@ NAME = "density"
 UNITS = "kg m-3"
 MAY = {"may_refuse": True}  # read right, or refused in words that help
 
+# Places, t x y z, of samples that are missing in the cases that have such.
+MISSING = [(0, 0, 0, 0), (1, 6, 4, 2), (3, 3, 2, 1)]
 NUMPY = {"u8": "u1", "i8": "i1", "u16": "u2", "i16": "i2", "u32": "u4", "i32": "i4", "f16": "f2", "f32": "f4", "f64": "f8"}
 
 
@@ -40,6 +42,13 @@ def frame(sample: str = "f32", t: int = 0, order: str = "<", dims=DIMS) -> np.nd
 def frames(sample: str = "f32", order: str = "<", dims=DIMS) -> np.ndarray:
     """Samples of all frames, [t, z, y, x]."""
     return np.stack([frame(sample, t, order, dims) for t in range(FRAMES)])
+
+
+def without(samples: np.ndarray, value: float) -> np.ndarray:
+    """The samples [t, z, y, x] with a value where they are missing."""
+    for t, x, y, z in MISSING:
+        samples[t, z, y, x] = value
+    return samples
 
 
 def axes() -> list[np.ndarray]:

@@ -82,13 +82,13 @@ def packed(folder: Path) -> list:
         found = make(frames(sample))
         found.header.set_slope_inter(0.25, -3.0)
         found.to_filename(folder / f"packed_{sample}.nii")
-    found = make(frames())
+    found = make(frames("u8"))
     found.header.set_slope_inter(1.0, 0.0)
     found.to_filename(folder / "slope_1.nii")
     return [
         Case("packed_i16.nii", NIBABEL, "i16 with scl_slope 0.25 and scl_inter -3", "f32", times=TIMES),
         Case("packed_i32.nii", NIBABEL, "i32 with scl_slope 0.25 and scl_inter -3", "f64", times=TIMES),
-        Case("slope_1.nii", NIBABEL, "scl_slope 1 and scl_inter 0: nothing to unpack", times=TIMES),
+        Case("slope_1.nii", NIBABEL, "scl_slope 1 and scl_inter 0: nothing to unpack", "u8", times=TIMES),
     ]
 
 
@@ -118,7 +118,7 @@ def series(folder: Path) -> Case:
 
 
 def refused(folder: Path) -> list:
-    vector = np.stack([frames(), frames() + 1000, frames() + 2000])
+    vector = np.stack([frames("u8")] * 3)
     make(vector).to_filename(folder / "refused_vector.nii")
     make(frame("i32").astype("c8")).to_filename(folder / "refused_complex.nii")
     turned = affine()

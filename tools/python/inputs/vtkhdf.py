@@ -11,6 +11,7 @@ from .vtk_image import Source, image
 
 FOLDER = "vtkhdf"
 VTK, H5PY = by("vtk"), by("h5py")
+SMALL = ("v110", "v110")  # forms of groups and headers that take less room
 
 
 def write(folder: Path) -> list:
@@ -64,7 +65,7 @@ def temporal(folder: Path) -> Case:
 
 
 def compressed(folder: Path) -> Case:
-    with h5py.File(folder / "temporal_chunked.hdf", "w") as file:
+    with h5py.File(folder / "temporal_chunked.hdf", "w", libver=SMALL) as file:
         root = group(file, version=(2, 2))
         data = {"chunks": (1, *DIMS[::-1]), "maxshape": (None, *DIMS[::-1]), "compression": "gzip"}
         root["PointData"].create_dataset(NAME, data=frames("f64"), **data)
@@ -73,7 +74,7 @@ def compressed(folder: Path) -> Case:
 
 
 def offsets(folder: Path) -> Case:
-    with h5py.File(folder / "temporal_offsets.vtkhdf", "w") as file:
+    with h5py.File(folder / "temporal_offsets.vtkhdf", "w", libver=SMALL) as file:
         root = group(file)
         root["PointData"][NAME] = frames()[::-1]
         steps(root, reversed(range(FRAMES)))
@@ -81,7 +82,7 @@ def offsets(folder: Path) -> Case:
 
 
 def cells(folder: Path) -> Case:
-    with h5py.File(folder / "temporal_cells.vtkhdf", "w") as file:
+    with h5py.File(folder / "temporal_cells.vtkhdf", "w", libver=SMALL) as file:
         root = group(file, cells=True)
         root["CellData"][NAME] = frames("u8")
         steps(root, data="CellData")
@@ -89,7 +90,7 @@ def cells(folder: Path) -> Case:
 
 
 def several(folder: Path) -> Case:
-    with h5py.File(folder / "several.vtkhdf", "w") as file:
+    with h5py.File(folder / "several.vtkhdf", "w", libver=SMALL) as file:
         root = group(file)
         root["PointData"]["other"] = frames() + 1000
         root["PointData"][NAME] = frames()
