@@ -3,6 +3,7 @@
     python fixtures.py OUT_FOLDER [FORMAT...]
 
 Everything is the same small field (inputs/case.py); OUT_FOLDER/manifest.json tells of each archive what must be read.
+Folders of formats are made anew, and the manifest is of those alone that were written.
 fixtures.txt lists the packages, with the versions that wrote tests/golden/inputs.
 """
 

@@ -21,11 +21,8 @@ MAY = {"may_refuse": True}  # read right, or refused in words that help
 
 # Places, t x y z, of samples that are missing in the cases that have such.
 MISSING = [(0, 0, 0, 0), (1, 6, 4, 2), (3, 3, 2, 1)]
-NUMPY = {"u8": "u1", "i8": "i1", "u16": "u2", "i16": "i2", "u32": "u4", "i32": "i4", "f16": "f2", "f32": "f4", "f64": "f8"}
-
-
 def dtype(sample: str, order: str = "<") -> np.dtype:
-    return np.dtype(order + NUMPY[sample])
+    return np.dtype(f"{order}{sample[0]}{int(sample[1:]) // 8}")
 
 
 def numbers(t: int, dims=DIMS) -> np.ndarray:

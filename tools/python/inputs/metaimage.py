@@ -5,7 +5,7 @@ from pathlib import Path
 import SimpleITK as sitk
 import vtk
 
-from .case import DIMS, FRAMES, NAME, ORIGIN, SPACING, STEP, TIMES, Case, Refused, by, frame, frames
+from .case import DIMS, FRAMES, MAY, NAME, ORIGIN, SPACING, STEP, TIMES, Case, Refused, by, frame, frames
 from .vtk_image import image
 
 FOLDER = "metaimage"
@@ -81,7 +81,10 @@ def by_vtk(folder: Path) -> list:
 
 def header(sample: str, data: str, whole: bool = False, extra: str = "") -> bytes:
     """A header without comments; `whole`: with time as the fourth dimension."""
-    join = lambda triple, last: " ".join(str(v) for v in (*triple, last)[: 3 + whole])
+
+    def join(triple: tuple, last: float) -> str:
+        return " ".join(str(v) for v in (*triple, last)[: 3 + whole])
+
     return (
         f"ObjectType = Image\nNDims = {3 + whole}\n{extra}"
         f"DimSize = {join(DIMS, FRAMES)}\nElementSpacing = {join(SPACING, STEP)}\n"
@@ -119,9 +122,9 @@ def lists(folder: Path) -> list:
     (folder / "pattern_of_slices.mhd").write_bytes(header("f32", "parts/slice_%03d.raw 0 2 1"))
     return [
         Case("list_of_volumes.mhd", TEXT, "LIST 3: four dimensions, a file for each three of them", times=TIMES),
-        Case("list_of_slices.mhd", TEXT, "LIST: a file for each slice along z", frames=1),
+        Case("list_of_slices.mhd", TEXT, "LIST: a file for each slice along z", frames=1, more=MAY),
         Case("pattern_of_volumes.mhd", TEXT, "volume_%03d.raw 0 3 1: a file for each frame", times=TIMES),
-        Case("pattern_of_slices.mhd", TEXT, "slice_%03d.raw 0 2 1: a file for each slice along z", frames=1),
+        Case("pattern_of_slices.mhd", TEXT, "slice_%03d.raw 0 2 1: a file for each slice along z", frames=1, more=MAY),
     ]
 
 

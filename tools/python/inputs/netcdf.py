@@ -140,7 +140,10 @@ def packed(folder: Path) -> list:
     note = "scale_factor 0.25 and add_offset -3 ({} bits), _FillValue {}"
     may = {"missing": MISSING, **KNOWN}
     return [
-        *(Case(f"{n}.nc", NETCDF, f"{s}, " + note.format(int(a[1]) * 8, f), v, more=m, **may) for n, s, v, f, a, m in kinds),
+        *(
+            Case(f"{name}.nc", NETCDF, f"{stored}, {note.format(8 * int(kind[1]), fill)}", sample, more=more, **may)
+            for name, stored, sample, fill, kind, more in kinds
+        ),
         unsigned(folder),
     ]
 

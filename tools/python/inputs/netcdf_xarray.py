@@ -35,5 +35,6 @@ def era5(folder: Path) -> Case:
     }
     whole.to_netcdf(folder / "era5.nc", engine="netcdf4", encoding=encoding)
     times = tuple(946684800.0 + 3600 * t for t in range(FRAMES))
-    note = "valid_time in whole seconds since 1970; levels 1000, 850, 500 hPa go up; latitude descends; also number, expver"
-    return Case("era5.nc", XARRAY, note, times=times, units=UNITS, spacing=None, origin=None, more={"flipped": ["y"]})
+    note = "valid_time in seconds since 1970; levels 1000, 850, 500 hPa go up; latitude descends; also number, expver"
+    uneven = {"spacing": None, "origin": None, "more": {"flipped": ["y"]}}
+    return Case("era5.nc", XARRAY, note, times=times, units=UNITS, **uneven)

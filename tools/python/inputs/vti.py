@@ -121,7 +121,7 @@ def lists(folder: Path) -> list:
 def parallel(folder: Path) -> Case:
     settings = {"NumberOfPieces": 2, "EndPiece": 1}
     save(folder / "parallel.pvti", Source(), kind=vtk.vtkXMLPImageDataWriter, **settings)
-    return Case("parallel.pvti", VTK, "two pieces in files of their own, which share a plane of points", frames=1, more=MAY)
+    return Case("parallel.pvti", VTK, "two pieces in two files, which share a plane of points", frames=1, more=MAY)
 
 
 def refused(folder: Path) -> Refused:

@@ -48,7 +48,7 @@ def text(folder: Path) -> Case:
 
 def cells(folder: Path) -> Case:
     save(folder / "cells.vtk", image({NAME: frame()}, cells=True))
-    return Case("cells.vtk", VTK, "CELL_DATA: DIMENSIONS are 8 6 4; origin is that of the first cell's centre", frames=1)
+    return Case("cells.vtk", VTK, "CELL_DATA: DIMENSIONS 8 6 4; origin is that of the first cell's centre", frames=1)
 
 
 def several(folder: Path) -> list:

@@ -45,11 +45,11 @@ def steps(root: h5py.Group, order=range(FRAMES), data: str = "PointData") -> Non
     found = root.create_group("Steps")
     found.attrs["NSteps"] = np.int64(FRAMES)
     found["Values"] = np.array(TIMES)
-    found[f"{data}Offsets/{NAME}"] = np.array(list(order), "i8")
+    found.create_group(f"{data}Offsets")[NAME] = np.array(list(order), "i8")
 
 
 def single(folder: Path) -> Case:
-    with h5py.File(folder / "single.vtkhdf", "w") as file:
+    with h5py.File(folder / "single.vtkhdf", "w", libver=SMALL) as file:
         root = group(file, version=(1, 0))
         root["PointData"][NAME] = frame()
         root["PointData"].attrs["Scalars"] = np.bytes_(NAME)
@@ -78,7 +78,7 @@ def offsets(folder: Path) -> Case:
         root = group(file)
         root["PointData"][NAME] = frames()[::-1]
         steps(root, reversed(range(FRAMES)))
-    return Case("temporal_offsets.vtkhdf", H5PY, "frames are stored last to first; PointDataOffsets says so", times=TIMES)
+    return Case("temporal_offsets.vtkhdf", H5PY, "stored last to first; PointDataOffsets says so", times=TIMES)
 
 
 def cells(folder: Path) -> Case:
@@ -112,7 +112,7 @@ def save(path: Path, data) -> None:
     writer = vtk.vtkHDFWriter()
     writer.SetFileName(str(path))
     writer.SetWriteAllTimeSteps(True)
-    writer.SetChunkSize(64)
+    writer.SetChunkSize(FRAMES)
     if data.IsA("vtkAlgorithm"):
         writer.SetInputConnection(data.GetOutputPort())
     else:
