@@ -240,11 +240,12 @@ def bounds(folder: Path) -> Case:
 
 def in_group(folder: Path) -> Case:
     with netCDF4.Dataset(folder / "group.nc", "w", format="NETCDF4") as file:
-        coordinate(file, "time", TIMES, {"units": SINCE})
+        file.createDimension("time", FRAMES)
         lengths(file)
         variable(file.createGroup("forecast"), frames("u8"))
-    note = "in a group; dimensions and time are outside it"
-    return Case("group.nc", NETCDF, note, "u8", variable=f"forecast/{NAME}", spacing=None, origin=None, **KNOWN)
+    note = "in a group; its dimensions are outside it, and have no coordinates"
+    bare = {"spacing": None, "origin": None, "units": UNITS}
+    return Case("group.nc", NETCDF, note, "u8", variable=f"forecast/{NAME}", **bare)
 
 
 def series(folder: Path) -> Case:

@@ -27,7 +27,7 @@ def write(folder: Path) -> list:
         *types(folder),
         *encodings(folder),
         *whole(folder),
-        time_first(folder),
+        *time_first(folder),
         *placed(folder),
         series(folder),
         *by_text(folder),
@@ -80,17 +80,21 @@ def whole(folder: Path) -> list:
     ]
 
 
-def time_first(folder: Path) -> Case:
-    """Time varies fastest, as in what 3D Slicer writes of sequences."""
+def time_first(folder: Path) -> list:
+    """Frames vary fastest, as in what 3D Slicer writes of sequences."""
     header = {
         "space": "left-posterior-superior",
         "space directions": np.vstack([[np.nan] * 3, DIRECTIONS]),
         "space origin": np.array(ORIGIN),
-        "kinds": ["list"] + ["domain"] * 3,
-        "encoding": "gzip",
     }
-    save(folder / "4d_list_first.nrrd", np.ascontiguousarray(np.moveaxis(frames(), 0, -1)), header)
-    return Case("4d_list_first.nrrd", PYNRRD, "kinds: list domain domain domain; frames vary fastest", more=MAY)
+    samples = np.ascontiguousarray(np.moveaxis(frames("i16"), 0, -1))
+    for kind, encoding in (("list", "gzip"), ("time", "raw")):
+        settings = {"kinds": [kind] + ["domain"] * 3, "encoding": encoding}
+        save(folder / f"4d_{kind}_first.nrrd", samples, header | settings)
+    return [
+        Case("4d_list_first.nrrd", PYNRRD, "kinds: list domain domain domain, gzip", "i16", more=MAY),
+        Case("4d_time_first.nrrd", PYNRRD, "kinds: time domain domain domain, raw", "i16", more=MAY),
+    ]
 
 
 def placed(folder: Path) -> list:
