@@ -18,6 +18,7 @@ mod every_float;
 mod expected;
 mod golden;
 mod images;
+mod inputs;
 mod lattice;
 mod layering;
 mod left_out;

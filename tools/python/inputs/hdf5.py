@@ -22,6 +22,7 @@ STORED = [
 ]
 # The same, in the forms since HDF5 1.10.
 NEWER = [
+    ("scale_offset", "i16", "<", {"chunks": CHUNKS, "scaleoffset": 0}, "the scale-offset filter"),
     ("gzip_alone", "f64", "<", {"chunks": CHUNKS, "compression": "gzip"}, "fixed array of chunks, gzip alone"),
     ("fletcher32", "i16", "<", {"chunks": CHUNKS, "fletcher32": True}, "fixed array of chunks, with checksums"),
     ("all_filters", "u16", "<", {"chunks": CHUNKS, "fletcher32": True} | SHUFFLED, "shuffle, gzip and checksums"),
@@ -35,7 +36,6 @@ NEWER = [
 ]
 REFUSED = [
     ("lzf", "f4", {"chunks": CHUNKS[1:], "compression": "lzf"}, "the lzf filter"),
-    ("scale_offset", "i2", {"chunks": CHUNKS[1:], "scaleoffset": 0}, "the scale-offset filter"),
     ("i64", "i8", {}, "integers of 64 bits"),
     ("complex", "c8", {}, "a compound type: complex numbers"),
 ]

@@ -186,9 +186,11 @@ def flipped(folder: Path) -> list:
         coordinate(file, "lon", x, LON)
         variable(file, frames()[:, ::-1], ("time", "plev", "lat", "lon"))
     pressure = "levels 500, 850, 1000 hPa, positive down, not evenly spaced; z goes up, from 1000 hPa"
+    descends = "lat is stored from 14 down to 10; height is in other units than lon, whose spacing its planes take"
+    apart = {"spacing": (*SPACING[:2], SPACING[0]), "origin": (*ORIGIN[:2], 0.0), "more": {"flipped": ["y"]}}
     uneven = {"spacing": None, "origin": None, "more": {"flipped": ["z"]}}
     return [
-        Case("latitude_descends.nc", NETCDF, "lat is stored from 14 down to 10", more={"flipped": ["y"]}, **KNOWN),
+        Case("latitude_descends.nc", NETCDF, descends, **KNOWN, **apart),
         Case("pressure.nc", NETCDF, pressure, **KNOWN, **uneven),
     ]
 
@@ -200,7 +202,7 @@ def maps(folder: Path) -> Case:
         coordinate(file, "lat", axes()[1], LAT)
         coordinate(file, "lon", axes()[0], LON)
         variable(file, frames(dims=flat)[:, 0], ("time", "lat", "lon"))
-    place = {"spacing": (*SPACING[:2], 1.0), "origin": (*ORIGIN[:2], 0.0), "more": {"may_lack": ["spacing", "origin"]}}
+    place = {"spacing": (*SPACING[:2], SPACING[0]), "origin": (*ORIGIN[:2], 0.0), "more": {"may_lack": ["spacing", "origin"]}}
     return Case("maps.nc", NETCDF, "time, lat, lon: z has one plane", dims=flat, **place, **KNOWN)
 
 

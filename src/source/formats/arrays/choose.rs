@@ -2,60 +2,118 @@
 
 use super::{Variable, component};
 use crate::source::Parsed;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 const MOST_LISTED: usize = 20;
 
-/// The variable of a path, or of a name that only one has; and an index, as of a component.
-pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(&'a Variable, Option<usize>)> {
-    let find = |name: &str| {
-        let is = |v: &&Variable| v.path.trim_start_matches('/') == name.trim_start_matches('/');
-        let mut of_name = all.iter().filter(|v| v.name() == name);
-        all.iter().find(is).or(of_name.next().filter(|_| of_name.next().is_none()))
-    };
-    let (name, index) = component::named(given);
-    if let Some(variable) = find(given) {
-        return Ok((variable, None));
-    }
-    let found = find(name).map(|variable| (variable, index));
-    found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(all)))
+/// What stands for the number of a step in the path of a variable that has one array for each.
+pub(super) const STEP: &str = "%T";
+
+/// A variable: an array, or one for each step.
+#[derive(Debug, Clone)]
+pub(super) struct Choice<'a> {
+    /// Its path, with [`STEP`] where arrays differ.
+    pub(super) path: String,
+    /// Not empty.
+    pub(super) arrays: Vec<&'a Variable>,
+    /// Number of the step of each; none of a single array.
+    pub(super) steps: Vec<u64>,
 }
 
-/// The one variable that can be an archive.
-pub(super) fn only(all: &[Variable]) -> Parsed<&Variable> {
-    let volumes: Vec<_> = all.iter().filter(|v| is_volume(v, all)).collect();
-    let most = volumes.iter().map(|v| v.lengths.len()).max().unwrap_or_default();
-    match volumes[..] {
-        [only] => Ok(only),
-        [] => Err(format!("has no array of numbers with three axes or more; it has{}", listed(all))),
-        _ if most < 3 => Err(format!("has several arrays of two axes: --variable chooses one of{}", listed(all))),
-        _ => {
-            let volumes: Vec<_> = volumes.into_iter().cloned().collect();
-            Err(format!("has several variables: --variable chooses one of{}", listed(&volumes)))
+impl<'a> Choice<'a> {
+    fn single(array: &'a Variable) -> Self {
+        Self { path: array.path.trim_start_matches('/').into(), arrays: vec![array], steps: Vec::new() }
+    }
+
+    fn name(&self) -> &str {
+        self.arrays[0].name()
+    }
+}
+
+/// The variable of a path, or of a name that only one has; and an index, as of a component.
+pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>, Option<usize>)> {
+    let choices = if given.contains(STEP) { choices(all.iter()) } else { all.iter().map(Choice::single).collect() };
+    let find = |name: &str| {
+        let mut of_name = choices.iter().filter(|c| c.name() == name);
+        let by_path = choices.iter().find(|c| c.path == name.trim_start_matches('/'));
+        by_path.or(of_name.next().filter(|_| of_name.next().is_none())).cloned()
+    };
+    let (name, index) = component::named(given);
+    let found = find(given).map(|choice| (choice, None)).or_else(|| Some((find(name)?, index)));
+    found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(&self::choices(all.iter()))))
+}
+
+/// The one variable that can be an archive, or of several the one that is `active`.
+pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Parsed<Choice<'a>> {
+    let mut volumes = choices(all.iter().filter(|v| is_volume(v, all)));
+    if volumes.len() > 1
+        && let Some(at) = volumes.iter().position(|c| active == Some(c.name()))
+    {
+        return Ok(volumes.swap_remove(at));
+    }
+    match volumes.len() {
+        1 => Ok(volumes.remove(0)),
+        0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&choices(all.iter())))),
+        _ => Err(format!("has several variables: --variable chooses one of{}", listed(&volumes))),
+    }
+}
+
+/// Variables, those whose arrays differ in the number of one group as one.
+fn choices<'a>(all: impl Iterator<Item = &'a Variable>) -> Vec<Choice<'a>> {
+    let (mut steps, mut found): (BTreeMap<_, Vec<_>>, _) = (BTreeMap::new(), Vec::new());
+    for array in all {
+        match templated(&array.path) {
+            Some((path, step)) => steps.entry(path).or_default().push((step, array)),
+            None => found.push(Choice::single(array)),
         }
     }
+    for (path, mut arrays) in steps {
+        arrays.sort_by_key(|(step, _)| *step);
+        match &arrays[..] {
+            [(_, only)] => found.push(Choice::single(only)),
+            _ => {
+                let (steps, arrays) = arrays.into_iter().unzip();
+                found.push(Choice { path, arrays, steps });
+            }
+        }
+    }
+    found
+}
+
+/// A path with [`STEP`] for the number at the end of its first group that has one, or of all of its last part.
+fn templated(path: &str) -> Option<(String, u64)> {
+    let path = path.trim_start_matches('/');
+    let parts: Vec<&str> = path.split('/').collect();
+    let stem = |part: &str| part.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let (at, stem) = parts
+        .iter()
+        .map(|part| stem(part))
+        .enumerate()
+        .find(|(i, stem)| *stem < parts[*i].len() && (*i + 1 < parts.len() || *stem == 0))?;
+    let step = parts[at][stem..].parse().ok()?;
+    let part = format!("{}{STEP}", &parts[at][..stem]);
+    let named = parts.iter().enumerate().map(|(i, part_of)| if i == at { part.as_str() } else { part_of });
+    Some((named.collect::<Vec<_>>().join("/"), step))
 }
 
 /// Whether frames can be in it: numbers that have a place, and are not places themselves.
 fn is_volume(variable: &Variable, all: &[Variable]) -> bool {
-    let axes = variable.lengths.len();
-    let bounds =
-        |v: &Variable| v.text("bounds") == Some(variable.name()) || v.text("climatology") == Some(variable.name());
+    let says = |v: &Variable, what| v.text(what) == Some(variable.name());
+    let is_bounds = all.iter().any(|v| says(v, "bounds") || says(v, "climatology") || says(v, "coordinates"));
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
-    variable.sample.is_ok() && axes >= least && !variable.lengths.contains(&0) && !all.iter().any(bounds)
+    variable.sample.is_ok() && variable.lengths.len() >= least && !variable.lengths.contains(&0) && !is_bounds
 }
 
 /// Variables by name and size, for messages.
-fn listed(all: &[Variable]) -> String {
+fn listed(all: &[Choice<'_>]) -> String {
     let mut text = String::new();
-    for variable in all.iter().take(MOST_LISTED) {
-        let of = |(n, dim): (&usize, &String)| match dim.as_str() {
-            "" => n.to_string(),
-            dim => format!("{dim} {n}"),
-        };
-        let axes: Vec<_> = variable.lengths.iter().zip(&variable.dims).map(of).collect();
-        let _ = write!(text, "\n  {} ({})", variable.path.trim_start_matches('/'), axes.join(", "));
-        if let Some(unit) = variable.text("units") {
+    for Choice { path, arrays, .. } in all.iter().take(MOST_LISTED) {
+        let of = |(n, dim): (&usize, &String)| if dim.is_empty() { n.to_string() } else { format!("{dim} {n}") };
+        let axes: Vec<_> = arrays[0].lengths.iter().zip(&arrays[0].dims).map(of).collect();
+        let what = arrays[0].sample.as_ref().map_or_else(Clone::clone, |sample| sample.to_string());
+        let _ = write!(text, "\n  {path}: {what} ({})", axes.join(", "));
+        if let Some(unit) = arrays[0].text("units") {
             let _ = write!(text, " in {unit}");
         }
     }
@@ -63,5 +121,19 @@ fn listed(all: &[Variable]) -> String {
         0 => " none".into(),
         n if n > MOST_LISTED => text + &format!("\n  and {} more", n - MOST_LISTED),
         _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_groups_are_steps() {
+        let found = |path: &str| templated(path).map(|(path, step)| format!("{path} {step}"));
+        assert_eq!(found("/data/10/fields/E1").as_deref(), Some("data/%T/fields/E1 10"));
+        assert_eq!(found("Timestep_007/u2").as_deref(), Some("Timestep_%T/u2 7"));
+        assert_eq!(found("frames/3").as_deref(), Some("frames/%T 3"));
+        assert_eq!((found("u1"), found("fields/u1"), found("")), (None, None, None));
     }
 }

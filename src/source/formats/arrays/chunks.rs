@@ -20,6 +20,8 @@ pub(super) struct Chunks {
     sample: SampleType,
     lengths: Vec<usize>,
     counts: Vec<Counts>,
+    /// Which of the array's frames is which; empty if they are in order.
+    order: Vec<usize>,
     /// Frames that are in the same chunks.
     together: usize,
     /// The axis that is cut, and into pieces of what length, so that one of them is no more than may be held.
@@ -45,6 +47,7 @@ impl Chunks {
     pub(super) fn new(
         variable: &Variable,
         counts: &[Counts],
+        order: Vec<usize>,
         (open, how): (Open, How),
     ) -> std::result::Result<Self, TooLarge> {
         let sample = variable.sample.clone().unwrap_or(SampleType::F64);
@@ -52,6 +55,7 @@ impl Chunks {
         let of_frames = counts.iter().position(|c| *c == Counts::Frames);
         let is_slowest = of_frames.is_none_or(|at| counts[..at].iter().all(|c| matches!(c, Counts::Only(_))));
         let together = match (of_frames, &variable.chunk) {
+            _ if !order.is_empty() => 1,
             (Some(at), Some(_)) => chunk(at),
             (Some(at), None) if !is_slowest => MANY.min(variable.lengths[at]),
             _ => 1,
@@ -70,7 +74,7 @@ impl Chunks {
         }
         let piece = (how.memory / plane.max(1)).next_multiple_of(chunk(axis)).max(chunk(axis));
         let (path, lengths, counts) = (variable.path.clone(), variable.lengths.clone(), counts.to_vec());
-        Ok(Self { path, sample, lengths, counts, together, cut: (axis, piece), open, how, file: None })
+        Ok(Self { path, sample, lengths, counts, order, together, cut: (axis, piece), open, how, file: None })
     }
 
     /// How the frames that are read together are held.
@@ -128,8 +132,9 @@ impl Decode for Chunks {
             None => (self.open)(path, self.how)?,
         };
         let (axis, piece) = self.cut;
+        let stored = self.order.get(frames.start).map_or(frames.clone(), |at| *at..*at + 1);
         for first in (0..self.lengths[axis]).step_by(piece) {
-            let ranges = self.ranges(&frames, &(first..(first + piece).min(self.lengths[axis])));
+            let ranges = self.ranges(&stored, &(first..(first + piece).min(self.lengths[axis])));
             let bytes = file.read(&self.path, self.sample, &ranges);
             let bytes = bytes.map_err(|e| Error::input(path, format!("frames {frames:?} of {}: {e}", self.path)))?;
             let expected = ranges.iter().map(Range::len).product::<usize>() * self.sample.size();

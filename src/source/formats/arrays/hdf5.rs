@@ -73,6 +73,11 @@ impl ArrayFile for Opened {
         let numbers = dataset.read_array::<Number>().map_err(|e| format!("{path}: {e}"))?;
         Ok(numbers.into_iter().map(|number| number.0).collect())
     }
+
+    fn group(&self, path: &str) -> Attributes {
+        let group = self.0.group(path).and_then(|group| group.attributes());
+        group.map(|all| attributes(&all)).unwrap_or_default()
+    }
 }
 
 /// All arrays of a file.
@@ -118,7 +123,10 @@ fn attributes(all: &[hdf5_reader::Attribute]) -> Attributes {
             let numbers = attribute.read_1d::<Number>().or_else(|_| attribute.read_scalar::<Number>().map(|n| vec![n]));
             Some(Attribute::Numbers(numbers.ok()?.into_iter().map(|number| number.0).collect()))
         }
-        Datatype::String { .. } | Datatype::VarLen { .. } => attribute.read_string().ok().map(Attribute::Text),
+        Datatype::String { .. } | Datatype::VarLen { .. } => match attribute.read_strings().ok()? {
+            texts if attribute.shape.is_empty() || texts.len() == 1 => texts.into_iter().next().map(Attribute::Text),
+            texts => Some(Attribute::Texts(texts)),
+        },
         _ => None,
     };
     all.iter().filter_map(|a| Some((a.name.clone(), value(a)?))).collect()

@@ -8,21 +8,26 @@ mod choose;
 mod chunks;
 mod hdf5;
 mod netcdf;
+mod openpmd;
 mod places;
 mod values;
+mod vtkhdf;
 
 use super::component;
 use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
+use crate::mapped::{Access, FileBytes, State};
 use crate::sample::SampleType;
 use crate::source::described::{At, Described, Part, Stored, Units};
 use crate::source::frames::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
-use crate::source::{OpenOptions, Parsed};
+use crate::source::{OpenOptions, Parsed, numbering};
+use choose::Choice;
 use chunks::Chunks;
+use places::Places;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use values::Values;
 
 /// An array, and what is said of it.
 #[derive(Debug, Clone)]
@@ -46,6 +51,7 @@ type Attributes = BTreeMap<String, Attribute>;
 #[derive(Debug, Clone, PartialEq)]
 enum Attribute {
     Text(String),
+    Texts(Vec<String>),
     Numbers(Vec<f64>),
 }
 
@@ -53,7 +59,7 @@ impl Variable {
     fn text(&self, attribute: &str) -> Option<&str> {
         match self.attributes.get(attribute)? {
             Attribute::Text(text) => Some(text.trim()),
-            Attribute::Numbers(_) => None,
+            Attribute::Texts(_) | Attribute::Numbers(_) => None,
         }
     }
 
@@ -93,6 +99,12 @@ trait ArrayFile: Send {
 
     /// All numbers of an array with one axis or none, which may be of any type.
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>>;
+
+    /// What is said of a group; nothing if there is none.
+    fn group(&self, path: &str) -> Attributes {
+        let _ = path;
+        Attributes::new()
+    }
 }
 
 /// Opens a file of arrays.
@@ -121,64 +133,136 @@ fn describe(path: &Path, open: Open, options: &OpenOptions) -> Result<Described>
     let how = How { access: options.access, memory: options.memory / SHARE };
     let file = open(path, how)?;
     let refused = |e| Error::input(path, e);
-    let all = file.variables().map_err(refused)?;
-    let (variable, index) = match options.variable.as_deref() {
-        Some(name) => choose::named(&all, name).map_err(refused)?,
-        None => (choose::only(&all).map_err(refused)?, None),
-    };
-    let found = Found::of(file.as_ref(), &all, variable, (index, options.axes.as_deref())).map_err(refused)?;
-    let chunks = Chunks::new(variable, &found.counts, (open, how)).map_err(|e| e.of(path))?;
-    let stored = Stored { packing: found.values.packing.clone(), ..chunks.stored(&found.layout).map_err(refused)? };
-    let frames = found.layout.len(Counts::Frames);
-    let part = Part { path: path.into(), state, frames, stored, at: At::Decoded(Box::new(chunks)) };
-    found.described(part).map_err(refused)
+    let mut all = file.variables().map_err(refused)?;
+    let image = vtkhdf::Image::of(file.as_ref(), &all).map_err(refused)?;
+    if let Some(image) = &image {
+        all.clone_from(&image.variables);
+    }
+    let (choice, index) = match options.variable.as_deref() {
+        Some(name) => choose::named(&all, name),
+        None => choose::only(&all, image.as_ref().and_then(|i| i.active.as_deref())).map(|choice| (choice, None)),
+    }
+    .map_err(refused)?;
+    check_steps(path, &choice, options)?;
+    let context = Context { file: file.as_ref(), all: &all, image, index, axes: options.axes.as_deref() };
+    let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
+    let mut parts = Vec::new();
+    for found in &found {
+        let chunks =
+            Chunks::new(&found.variable, &found.counts, found.order.clone(), (open, how)).map_err(|e| e.of(path))?;
+        parts.push(found.part((path, state), chunks).map_err(refused)?);
+    }
+    let mut described = joined(found, parts).map_err(refused)?;
+    let times = openpmd::times(file.as_ref(), &choice);
+    if !times.is_empty() {
+        (described.times, described.units.times) = (times, Some("s".into()));
+    }
+    Ok(described)
+}
+
+/// An error if steps are not numbered regularly.
+fn check_steps(path: &Path, choice: &Choice<'_>, options: &OpenOptions) -> Result<()> {
+    let names: Vec<PathBuf> = choice.steps.iter().map(|step| format!("step {step}").into()).collect();
+    if options.allow_gaps {
+        return Ok(());
+    }
+    numbering::check(&names).map_err(|e| Error::input(path, format!("{}: {e}", choice.path)))
+}
+
+/// One archive of the arrays of all steps.
+fn joined(mut found: Vec<Found>, parts: Vec<Part>) -> Parsed<Described> {
+    let first = found.swap_remove(0);
+    if let Some(other) = found.iter().find(|other| other.layout.dims() != first.layout.dims()) {
+        let (a, b) = (&first.variable, &other.variable);
+        return Err(format!("{} has {:?} samples, but {} has {:?}", b.path, b.lengths, a.path, a.lengths));
+    }
+    if let Some(other) = found.iter().find(|other| other.values.sample != first.values.sample) {
+        return Err(format!("{} and {} have samples of different types", first.variable.path, other.variable.path));
+    }
+    first.described(parts)
 }
 
 /// Of what a window may take, chunks as they are decoded have this part.
 const SHARE: usize = 4;
 
-/// What a variable is.
+/// What variables are found in.
+struct Context<'a> {
+    file: &'a dyn ArrayFile,
+    all: &'a [Variable],
+    image: Option<vtkhdf::Image>,
+    /// Of an axis beside space and time.
+    index: Option<usize>,
+    /// What axes count, by the user's word.
+    axes: Option<&'a str>,
+}
+
+/// What an array is.
 struct Found {
+    variable: Variable,
     name: String,
     counts: Vec<Counts>,
     /// Of all axes but those of which only one index is meant.
     layout: Layout,
-    places: places::Places,
-    values: values::Values,
+    /// Which of the array's frames is which; empty if they are in order.
+    order: Vec<usize>,
+    places: Places,
+    values: Values,
 }
 
-impl Found {
-    fn of(
-        file: &dyn ArrayFile,
-        all: &[Variable],
-        variable: &Variable,
-        (index, letters): (Option<usize>, Option<&str>),
-    ) -> Parsed<Self> {
+impl Context<'_> {
+    fn found(&self, variable: &Variable) -> Parsed<Found> {
+        let mesh = openpmd::Mesh::of(self.file, variable);
+        let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
-            format!(
-                "{} has numbers of type {ty}, which is not supported; integers up to 32 bits and floats are",
-                variable.path
-            )
+            let path = variable.path.trim_start_matches('/');
+            format!("{path} is of type {ty}, which is not supported; integers up to 32 bits and floats are")
         })?;
-        let counts = axes::counts(variable, all, index, letters)?;
-        let places = places::Places::of(file, all, variable, &counts)?;
+        let counts = axes::counts(&variable, self.all, self.index, self.axes)?;
+        let mut places = Places::of(self.file, self.all, &variable, &counts)?;
         let axis = |(i, counts): (usize, &Counts)| match *counts {
             Counts::Only(_) => None,
             counts => Some(Axis { counts, len: variable.lengths[i], backwards: places.is_backwards(counts) }),
         };
         let layout = Layout(counts.iter().enumerate().filter_map(axis).collect());
-        let name = match index {
+        if let Some(mesh) = mesh {
+            (places.spacing, places.origin) = mesh.lattice();
+            places.space_unit = Some("m".into());
+        }
+        let order = self.of_image(&variable, &layout, &mut places)?;
+        let name = match self.index {
             Some(index) => format!("{}[{index}]", variable.name()),
             None => variable.name().to_string(),
         };
-        Ok(Self { name, counts, layout, places, values: values::Values::of(variable, sample) })
+        let values = Values::of(&variable, sample);
+        Ok(Found { name, counts, layout, order, places, values, variable })
     }
 
-    fn described(self, part: Part) -> Parsed<Described> {
+    /// What VTKHDF says of places, and the order of frames.
+    fn of_image(&self, variable: &Variable, layout: &Layout, places: &mut Places) -> Parsed<Vec<usize>> {
+        let Some(image) = &self.image else { return Ok(Vec::new()) };
+        image.check(layout.dims(), variable)?;
+        (places.spacing, places.origin) = image.lattice(variable);
+        places.times.clone_from(&image.times);
+        if image.is_turned {
+            places.notes.push("the Direction of the VTKHDF is not kept: axes are taken as those of the world".into());
+        }
+        image.offsets(self.file, variable, layout.len(Counts::Frames))
+    }
+}
+
+impl Found {
+    /// The frames of this array.
+    fn part(&self, (path, state): (&Path, State), chunks: Chunks) -> Parsed<Part> {
+        let stored = Stored { packing: self.values.packing.clone(), ..chunks.stored(&self.layout)? };
+        let frames = if self.order.is_empty() { self.layout.len(Counts::Frames) } else { self.order.len() };
+        Ok(Part { path: path.into(), state, frames, stored, at: At::Decoded(Box::new(chunks)) })
+    }
+
+    fn described(self, parts: Vec<Part>) -> Parsed<Described> {
         let shape = Shape::new(self.layout.dims(), self.values.sample)?;
-        let places::Places { spacing, origin, times, space_unit, time_unit, notes, .. } = self.places;
+        let Places { spacing, origin, times, space_unit, time_unit, notes, .. } = self.places;
         let units = Units { samples: self.values.unit, times: time_unit, space: space_unit };
         let (variable, missing) = (Some(self.name), self.values.missing);
-        Ok(Described { spacing, origin, times, variable, units, missing, notes, ..Described::plain(shape, vec![part]) })
+        Ok(Described { spacing, origin, times, variable, units, missing, notes, ..Described::plain(shape, parts) })
     }
 }

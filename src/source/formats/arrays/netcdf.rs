@@ -36,7 +36,9 @@ impl ArrayFile for Opened {
         Ok(all)
     }
 
-    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+    fn read(&self, path: &str, _: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+        // The stored type, whose bytes are those of the samples even where these are said to be unsigned.
+        let stored = sample_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype(), false)?;
         let of = |r: &Range<usize>| NcSliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
         let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };
         macro_rules! read {
@@ -45,7 +47,7 @@ impl ArrayFile for Opened {
                 numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
             }};
         }
-        Ok(match sample {
+        Ok(match stored {
             SampleType::U8 => read!(u8),
             SampleType::I8 => read!(i8),
             SampleType::U16 => read!(u16),

@@ -1,0 +1,75 @@
+//! Meshes of openPMD: arrays of an HDF5 file with a lattice of their own, and a time for each iteration.
+
+use super::choose::{Choice, STEP};
+use super::{ArrayFile, Attribute, Attributes, Variable};
+
+/// What a mesh says of its lattice, in the order of the array's axes.
+pub(super) struct Mesh {
+    labels: Vec<String>,
+    spacing: Vec<f64>,
+    origin: Vec<f64>,
+    unit: f64,
+}
+
+impl Mesh {
+    /// None if nothing like that is said of an array, nor of the group of its components.
+    pub(super) fn of(file: &dyn ArrayFile, variable: &Variable) -> Option<Self> {
+        let parent = variable.path.rsplit_once('/').map_or("", |(parent, _)| parent);
+        let says = |attributes: &Attributes| attributes.contains_key("axisLabels");
+        let attributes =
+            Some(variable.attributes.clone()).filter(says).or_else(|| Some(file.group(parent)).filter(says))?;
+        let Some(Attribute::Texts(labels)) = attributes.get("axisLabels") else { return None };
+        let numbers = |name: &str| match attributes.get(name) {
+            Some(Attribute::Numbers(numbers)) => numbers.clone(),
+            _ => Vec::new(),
+        };
+        let (mut labels, mut spacing, mut first) =
+            (labels.clone(), numbers("gridSpacing"), numbers("gridGlobalOffset"));
+        if attributes.get("dataOrder") == Some(&Attribute::Text("F".into())) {
+            labels.reverse();
+            spacing.reverse();
+            first.reverse();
+        }
+        let fits =
+            labels.len() == variable.lengths.len() && spacing.len() == labels.len() && first.len() == labels.len();
+        let position = variable.numbers("position");
+        let inside = |i: usize| position.get(i).copied().unwrap_or(0.0) * spacing[i];
+        let unit = numbers("gridUnitSI").first().copied().unwrap_or(1.0);
+        let origin = fits.then(|| (0..labels.len()).map(|i| first[i] + inside(i)).collect())?;
+        Some(Self { labels, spacing, origin, unit })
+    }
+
+    /// A variable with the names of its axes.
+    pub(super) fn named(&self, variable: &Variable) -> Variable {
+        Variable { dims: self.labels.clone(), ..variable.clone() }
+    }
+
+    /// Spacing and origin along x, y, z in metres; 1 and 0 along axes that it lacks.
+    pub(super) fn lattice(&self) -> ([f64; 3], [f64; 3]) {
+        let along = |axis: usize, of: &[f64], none: f64| {
+            let at = self.labels.iter().position(|label| *label == ["x", "y", "z"][axis]);
+            at.map_or(none, |at| of[at] * self.unit)
+        };
+        (
+            std::array::from_fn(|axis| along(axis, &self.spacing, 1.0)),
+            std::array::from_fn(|axis| along(axis, &self.origin, 0.0)),
+        )
+    }
+}
+
+/// The time of each step in seconds, where the groups of all say it.
+pub(super) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Vec<f64> {
+    let Some((before, _)) = choice.path.split_once(STEP) else { return Vec::new() };
+    let group = |variable: &&Variable| {
+        let rest = variable.path.trim_start_matches('/')[before.len()..].find('/').unwrap_or_default();
+        file.group(&variable.path.trim_start_matches('/')[..before.len() + rest])
+    };
+    let time = |attributes: Attributes| {
+        let number = |name: &str| match attributes.get(name) {
+            Some(Attribute::Numbers(numbers)) => numbers.first().copied(),
+            _ => None,
+        };
+        Some(number("time")? * number("timeUnitSI").unwrap_or(1.0))
+    };
+    choice.arrays.iter().map(group).map(time).collect::<Option<_>>().unwrap_or_default()
+}

@@ -1,0 +1,163 @@
+//! Archives as the field's own software writes them: `tests/golden/inputs`, whose README says what is in there.
+
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use wavesplat::error::Result;
+use wavesplat::mapped::Access;
+use wavesplat::sample::load;
+use wavesplat::source::{Archive, FrameSource, OpenOptions, open};
+use wavesplat::volume::Grid;
+
+/// A case of `manifest.json`.
+#[derive(Debug, Clone, Deserialize)]
+struct Case {
+    path: String,
+    variable: Option<String>,
+    #[serde(default)]
+    refused: bool,
+    #[serde(default)]
+    may_refuse: bool,
+    #[serde(default)]
+    sample: String,
+    #[serde(default)]
+    sample_may_be: Vec<String>,
+    #[serde(default)]
+    frames: usize,
+    #[serde(default)]
+    dims: [usize; 3],
+    spacing: Option<[f64; 3]>,
+    origin: Option<[f64; 3]>,
+    #[serde(default)]
+    times: Vec<f64>,
+    units: Option<String>,
+    #[serde(default)]
+    values: String,
+    #[serde(default)]
+    missing: Vec<[usize; 4]>,
+    axes: Option<String>,
+    #[serde(default)]
+    may_lack: Vec<String>,
+    components: Option<usize>,
+    note: String,
+}
+
+fn folder() -> PathBuf {
+    match std::env::var_os("WAVESPLAT_INPUTS") {
+        Some(folder) => folder.into(),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/inputs"),
+    }
+}
+
+/// Cases of a format, and what is wrong with how they are read.
+fn check_all(format: &str) {
+    let text = std::fs::read_to_string(folder().join("manifest.json")).unwrap();
+    let cases: Vec<Case> = serde_json::from_str(&text).unwrap();
+    let cases: Vec<_> = cases.into_iter().filter(|case| case.path.split('/').next() == Some(format)).collect();
+    assert!(cases.len() > 7, "{format} has cases");
+    let wrong = |case: &Case| case.check().err().map(|e| format!("{} ({}): {e}", case.path, case.note));
+    let wrong: Vec<_> = cases.iter().filter_map(wrong).collect();
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+impl Case {
+    /// By map and by read, in memory and, where it must be decoded, out of it.
+    fn check(&self) -> std::result::Result<(), String> {
+        for (access, memory) in [(Access::Map, 1 << 20), (Access::Read, 4000)] {
+            let found = match (self.open(access, memory), self.refused) {
+                (Ok(_), true) => return Err("was read".into()),
+                (Err(e), true) => return if e.to_string().len() > 40 { Ok(()) } else { Err(e.to_string()) },
+                (Err(_), false) if self.may_refuse => return Ok(()),
+                (Err(e), false) => return Err(e.to_string()),
+                (Ok(found), false) => found,
+            };
+            self.check_archive(found.archive())?;
+            self.check_samples(found)?;
+        }
+        Ok(())
+    }
+
+    fn open(&self, access: Access, memory: usize) -> Result<Box<dyn FrameSource>> {
+        let first = |name: &String| if self.components.is_some() { format!("{name}[0]") } else { name.clone() };
+        let variable = self.variable.as_ref().map(first);
+        let options = OpenOptions { access, memory, variable, axes: self.axes.clone(), ..OpenOptions::default() };
+        let mut source = open(&[folder().join(&self.path)], &options)?;
+        if self.refused {
+            source.window(0, 1)?; // what is wrong may be seen only there
+        }
+        Ok(source)
+    }
+
+    fn check_archive(&self, found: &Archive) -> std::result::Result<(), String> {
+        let of = |what: &str, found: String, expected: String, same: bool| match same {
+            true => Ok(()),
+            false => Err(format!("{what} {found}, not {expected}")),
+        };
+        let Archive { grid, sample, frames, times, units, .. } = found;
+        let name = sample.name();
+        let types = [vec![self.sample.clone()], self.sample_may_be.clone()].concat();
+        of("type", name.into(), self.sample.clone(), types.iter().any(|ty| ty == name))?;
+        of("size", format!("{:?}", grid.dims), format!("{:?}", self.dims), grid.dims == self.dims)?;
+        of("frames", format!("{frames:?}"), self.frames.to_string(), *frames == Some(self.frames))?;
+        let lacks = |key: &str| self.may_lack.iter().any(|lacking| lacking == key);
+        for (key, found, expected, none) in
+            [("spacing", grid.spacing, self.spacing, [1.0; 3]), ("origin", grid.origin, self.origin, [0.0; 3])]
+        {
+            let same = |expected: [f64; 3]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
+            let good = expected.is_none_or(|e| same(e) || lacks(key) && same(none));
+            of(key, format!("{found:?}"), format!("{expected:?}"), good)?;
+        }
+        let factor = match units.times.as_deref().unwrap_or_default() {
+            unit if unit.starts_with("hour") => 3600.0,
+            unit if unit.starts_with("ms") => 1e-3,
+            _ => 1.0,
+        };
+        let same = times.len() == self.times.len()
+            && times.iter().zip(&self.times).all(|(a, b)| (a * factor - b).abs() < 1e-6);
+        let expected = format!("{:?}", self.times);
+        of("times", format!("{times:?}"), expected, same || lacks("times") && times.is_empty())?;
+        let same = units.samples == self.units || lacks("units") && units.samples.is_none();
+        of("unit", format!("{:?}", units.samples), format!("{:?}", self.units), same)
+    }
+
+    /// Frames in windows of two, read as boxes.
+    fn check_samples(&self, mut source: Box<dyn FrameSource>) -> std::result::Result<(), String> {
+        let (archive, whole) = (source.archive().clone(), Grid::unit(self.dims).whole());
+        let is_missing = |v: f64| v.is_nan() || archive.missing.is_some_and(|m| m == v);
+        for first in (0..self.frames).step_by(2) {
+            let count = 2.min(self.frames - first);
+            let window = source.window(first, count).map_err(|e| e.to_string())?;
+            for frame in 0..count {
+                let (mut bytes, mut values) =
+                    (vec![0; whole.voxels() * archive.sample.size()], vec![0.0; whole.voxels()]);
+                window.read_box(frame, &whole, &mut bytes).map_err(|e| e.to_string())?;
+                load(archive.sample, &bytes, &mut values);
+                for (voxel, found) in whole.iter().zip(values) {
+                    let t = first + frame;
+                    let number = (whole.index(voxel) + t) as f64;
+                    let expected = if self.values == "float" { number / 4.0 - 3.0 } else { number };
+                    let absent = self.missing.contains(&[t, voxel[0], voxel[1], voxel[2]]);
+                    if if absent { !is_missing(found) } else { (found - expected).abs() > 1e-4 } {
+                        return Err(format!("{found} at {voxel:?} of frame {t}, not {expected} (missing: {absent})"));
+                    }
+                }
+            }
+            window.check_unchanged().map_err(|e| e.to_string())?;
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn hdf5_is_read() {
+    check_all("hdf5");
+}
+
+#[test]
+fn netcdf_is_read() {
+    check_all("netcdf");
+}
+
+#[test]
+fn vtkhdf_is_read() {
+    check_all("vtkhdf");
+}
