@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// Where each third-party crate is at home: `src/` and then one of these.
-const HOMES: [(&str, &[&str]); 14] = [
+const HOMES: [(&str, &[&str]); 15] = [
     ("memmap2::", &["mapped.rs"]),
     ("libc::", &["mapped.rs"]),
     ("crossbeam::", &["convert/"]),
@@ -39,6 +39,7 @@ const HOMES: [(&str, &[&str]); 14] = [
     ("indicatif::", &["cli/"]),
     ("bytesize::", &["cli/"]),
     ("png::", &["render/sink/"]),
+    ("exr::", &["render/sink/"]),
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),

@@ -77,14 +77,19 @@ impl CommonArgs {
         if !self.json {
             return Ok(());
         }
-        let text = serde_json::to_string_pretty(&Versioned { schema: 1, report })
-            .map_err(|e| Error::usage(format!("--json: {e}")))?;
+        let text = report_text(report)?;
         if data_on_stdout {
-            note(text);
+            note(text.trim_end());
             return Ok(());
         }
-        print(&(text + "\n"))
+        print(&text)
     }
+}
+
+/// What `--json` prints of a report.
+pub fn report_text(report: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
+    text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
 }
 
 /// The object that `--json` prints; a change of a key's meaning changes `schema`.

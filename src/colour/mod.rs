@@ -177,10 +177,27 @@ impl TransferFunction {
     /// Its colours in a few words, for people.
     pub fn words(&self) -> String {
         let (lo, hi) = self.range;
+        format!("{} from {lo} to {hi}", self.name())
+    }
+
+    /// A map's name, or how many points a file's has.
+    pub fn name(&self) -> String {
         match &self.colours {
-            Colours::Named(named) => format!("{} from {lo} to {hi}", named.name),
-            Colours::Points(points, space) => format!("{} points ({}) from {lo} to {hi}", points.len(), space.name()),
+            Colours::Named(named) => named.name.into(),
+            Colours::Points(points, space) => format!("{} points ({})", points.len(), space.name()),
         }
+    }
+
+    /// Its opacities as VALUE:A,... or, where they are many, how many.
+    pub fn opacity_words(&self) -> String {
+        const MOST: usize = 32;
+        let points: Vec<String> = self.opacity.iter().map(|(value, opacity)| format!("{value}:{opacity}")).collect();
+        if points.len() <= MOST { points.join(",") } else { format!("{} points", points.len()) }
+    }
+
+    /// Whether all of its colours are greys.
+    fn is_grey(&self) -> bool {
+        matches!(&self.colours, Colours::Named(named) if named.name == "grey")
     }
 
     /// Whether a colour takes so long that a table of them is worth it.

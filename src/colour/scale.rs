@@ -56,26 +56,31 @@ impl Scale {
         self.colour_at(self.share(value))
     }
 
-    /// The colour of which these are the channels, each spread over the range; the background where any is NaN.
-    pub fn colour_of_channels(&self, channels: [f32; 3]) -> Rgb {
-        if channels.iter().any(|c| c.is_nan()) { self.background } else { bytes(channels.map(|c| self.share(c))) }
-    }
-
-    /// The colour of light that comes through with such an opacity, before the background.
-    pub fn over_background(&self, light: [f32; 3], opacity: f32) -> Rgb {
-        let behind = f64::from(1.0 - opacity) / 255.0;
-        let seen = |i: usize| (f64::from(light[i]) + behind * f64::from(self.background[i])).clamp(0.0, 1.0);
-        bytes(std::array::from_fn(seen))
-    }
-
-    /// The colour of a pixel: of a value, of channels, or of light and its opacity.
+    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the background
+    /// where any number is NaN.
     pub fn colour_of_pixel(&self, numbers: &[f32]) -> Rgb {
         match *numbers {
             [value] => self.colour(value),
-            [r, g, b] => self.colour_of_channels([r, g, b]),
-            [r, g, b, opacity] => self.over_background([r, g, b], opacity),
-            _ => self.background,
+            _ => bytes(self.exact_colour_of_pixel(numbers)),
         }
+    }
+
+    /// As [`Self::colour_of_pixel`], but neither rounded nor from a table.
+    pub fn exact_colour_of_pixel(&self, numbers: &[f32]) -> Colour {
+        let background = || self.background.map(|c| f64::from(c) / 255.0);
+        match *numbers {
+            _ if numbers.iter().any(|n| n.is_nan()) => background(),
+            [value] => self.map.colour(self.share(value)).unwrap_or_else(background),
+            [r, g, b] => [r, g, b].map(|c| self.share(c)),
+            [r, g, b, opacity] => self.over_background([r, g, b], opacity),
+            _ => background(),
+        }
+    }
+
+    /// The colour of light that comes through with such an opacity, before the background.
+    fn over_background(&self, light: [f32; 3], opacity: f32) -> Colour {
+        let behind = f64::from(1.0 - opacity) / 255.0;
+        std::array::from_fn(|i| (f64::from(light[i]) + behind * f64::from(self.background[i])).clamp(0.0, 1.0))
     }
 
     /// The colour at a share of the range, 0 to 1.
@@ -100,6 +105,12 @@ impl Scale {
     /// How values are spread over the range.
     pub fn norm(&self) -> Norm {
         self.norm
+    }
+
+    /// Whether every colour is a grey.
+    pub fn is_grey(&self) -> bool {
+        let [r, g, b] = self.background;
+        self.map.is_grey() && r == g && g == b
     }
 
     /// What is where there is nothing.
@@ -149,6 +160,22 @@ mod tests {
             let apart = exact.iter().zip(scale.colour_at(share)).map(|(a, b)| a.abs_diff(b)).max();
             assert!(apart <= Some(1), "{share}: {exact:?}");
         }
+    }
+
+    #[test]
+    fn exact_colours_are_those_that_are_rounded() {
+        let map = TransferFunction::open("turbo").expect("a known map");
+        let scale = Scale::new(&map, (-1.0, 2.0), Norm::Linear, [9, 8, 7]).expect("a range");
+        let pixels: [&[f32]; 6] =
+            [&[0.3], &[f32::NAN], &[0.1, 5.0, -3.0], &[0.1, f32::NAN, 0.0], &[0.2, 0.1, 0.0, 0.7], &[0.9; 4]];
+        for pixel in pixels {
+            assert_eq!(bytes(scale.exact_colour_of_pixel(pixel)), scale.colour_of_pixel(pixel), "{pixel:?}");
+        }
+        let grey = |name: &str, background| {
+            let map = TransferFunction::open(name).expect("a known map");
+            Scale::new(&map, (0.0, 1.0), Norm::Linear, background).expect("a range").is_grey()
+        };
+        assert!(grey("grey", [7; 3]) && !grey("grey", [7, 7, 8]) && !grey("turbo", [0; 3]));
     }
 
     #[test]

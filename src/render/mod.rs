@@ -61,6 +61,8 @@ pub type Picture<'a> = &'a [f32];
 /// A frame as it was rendered.
 #[derive(Debug, Clone, Copy)]
 pub struct Rendered<'a> {
+    /// How all views are splatted.
+    pub views: &'a [ViewReport],
     /// The number of the view.
     pub view: usize,
     /// That of the frame.
@@ -82,11 +84,12 @@ pub fn render(
     let started = Instant::now();
     let eyes = eyes(scene, config)?;
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
-    report.views = config.views.iter().zip(&eyes).map(|(view, eye)| ViewReport::new(view, eye)).collect();
+    report.views = reports(&eyes, config);
+    let views = report.views.clone();
     let mut sink_time = Duration::ZERO;
     let mut sink = |rendered: Rendered<'_>| {
         let writing = Instant::now();
-        sink(rendered)?;
+        sink(Rendered { views: &views, ..rendered })?;
         sink_time += writing.elapsed();
         Ok(())
     };
@@ -104,6 +107,12 @@ pub fn render(
 /// An error if [`render`] would refuse to begin.
 pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
     eyes(scene, config).map(|_| ())
+}
+
+/// What is to be said of each view before it is splatted.
+fn reports(eyes: &[Eye], config: &RenderConfig) -> Vec<ViewReport> {
+    let slabs = |eye| (!config.mode.is_projection()).then(|| slabs::count(eye, config));
+    config.views.iter().zip(eyes).map(|(view, eye)| ViewReport::new(view, eye, slabs(eye))).collect()
 }
 
 /// All views, for each of which there is memory enough.

@@ -114,6 +114,7 @@ impl Pictures {
             let of = |i: usize| Self::together(channels, i);
             let (picture, error) = (of(i), of(frames.len() + i));
             sink(Rendered {
+                views: &[],
                 view,
                 frame: *frame,
                 picture: picture.as_deref().unwrap_or_default(),

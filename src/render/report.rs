@@ -62,8 +62,12 @@ pub struct ViewReport {
     pub azimuth: f64,
     /// Degrees, as asked for.
     pub elevation: f64,
+    /// Degrees, as asked for.
+    pub roll: f64,
     /// Pixels per world unit.
     pub scale: f64,
+    /// The world point in the middle of the picture.
+    pub center: [f64; 3],
     /// The splat method.
     pub method: &'static str,
     /// The slabs that the volume is cut into.
@@ -94,9 +98,12 @@ impl RenderReport {
 }
 
 impl ViewReport {
-    pub(super) fn new(view: &View, eye: &Eye) -> Self {
-        let &View { azimuth, elevation, .. } = view;
-        let (scale, method, stated_splat_error) = (eye.camera.scale, eye.method.name, eye.stated_error);
-        Self { azimuth, elevation, scale, method, slabs: None, stated_splat_error, expected_error: 0.0 }
+    /// Of a view that is cut into slabs, or is not; before anything is splatted.
+    pub(super) fn new(view: &View, eye: &Eye, slabs: Option<usize>) -> Self {
+        let &View { azimuth, elevation, roll, .. } = view;
+        let (scale, center) = (eye.camera.scale, eye.camera.beside(0.0));
+        let (method, stated_splat_error) = (eye.method.name, eye.stated_error);
+        let expected_error = if slabs.is_some() { f64::NAN } else { 0.0 };
+        Self { azimuth, elevation, roll, scale, center, method, slabs, stated_splat_error, expected_error }
     }
 }

@@ -15,9 +15,7 @@ fn a_files_own_values_are_its_range() {
     let work = Work::with_file("");
     work.write("maps.json", MAPS);
     work.write("map.csv", "# grey\nvalue,red,green,blue\n-1,0,0,0\n2,255,255,255\n");
-    let render = |options: &str| {
-        work.render(&format!("a.wspl {SIZE} --frames 2 -o - {options}")).ok().out // a PNG
-    };
+    let render = |options: &str| decode_png(&work.render(&format!("a.wspl {SIZE} --frames 2 -o - {options}")).ok().out);
     let grey = render("--colormap grey --range=-1,2");
     assert!(render("--colormap maps.json#Grey") == grey && render("--colormap map.csv") == grey);
     assert!(render("--colormap maps.json#Grey --range 0,1") == render("--colormap grey --range 0,1"));

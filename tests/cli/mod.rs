@@ -16,6 +16,7 @@ mod killed;
 mod memory;
 mod modes;
 mod mutated;
+mod pictures;
 mod pipes;
 mod recover;
 mod render;

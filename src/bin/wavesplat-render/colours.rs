@@ -1,12 +1,11 @@
 //! Which colours values have.
 
+use crate::ranges::Ranges;
 use clap::{Args, ValueEnum};
 use wavesplat::cli::{CommonArgs, Pair, open_colours};
 use wavesplat::colour::{Norm, Rgb, TransferFunction};
 use wavesplat::error::{Error, Result};
-use wavesplat::progress::Silent;
 use wavesplat::render::sink::PictureFormat;
-use wavesplat::render::{RenderConfig, Scene, render};
 
 /// Options on colours.
 #[derive(Debug, Args)]
@@ -53,8 +52,12 @@ impl ColourArgs {
 
     /// An error if a format has no colours to draw in.
     pub(crate) fn check(&self, format: PictureFormat) -> Result<()> {
+        if format == PictureFormat::Exr && self.is_asked() {
+            return Err(Error::usage("--colormap: an .exr holds numbers as they are; take png, with --depth 16"));
+        }
         let why = match format {
             PictureFormat::Gray16 => "gray16 has no colours to draw in; take png, or another format",
+            PictureFormat::Exr => "an .exr holds numbers to compute with; take png, or another format",
             PictureFormat::Npy if !self.is_asked() => {
                 "an .npy holds values to compute with; give --colormap for colours"
             }
@@ -112,89 +115,4 @@ fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
     let digits = text.trim_start_matches('#');
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;
     Ok([(number >> 16) as u8, (number >> 8) as u8, number as u8])
-}
-
-/// Pixels that a range is judged by, at most.
-const MOST_SEEN: usize = 1 << 20;
-
-/// The range of ascending values, without the outermost ones where a few spots would take most of the colours: at either end
-/// at most one value in 200, and only if those take up two fifths of the range.
-fn without_spots(seen: &[f32]) -> (f64, f64) {
-    let few = seen.len() / 200;
-    let at = |n: usize| f64::from(seen[n]);
-    let (lo, hi, low, high) = (at(0), at(seen.len() - 1), at(few), at(seen.len() - 1 - few));
-    let (spots, nothing) = (0.4 * (hi - lo), 0.05 * (hi - lo));
-    let clipped = |end: f64, inner: f64| if (end - inner).abs() >= spots && high - low > nothing { inner } else { end };
-    (clipped(lo, low), clipped(hi, high))
-}
-
-/// The ranges of the pictures and of their errors.
-pub(crate) struct Ranges {
-    values: (f64, f64),
-    /// The smallest value above 0, if there is one.
-    positive: Option<f64>,
-    pub(crate) errors: (f64, f64),
-}
-
-impl Default for Ranges {
-    fn default() -> Self {
-        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0) }
-    }
-}
-
-impl Ranges {
-    /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
-    /// they show nothing; errors begin at 0.
-    pub(crate) fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
-        const PIXELS: f64 = 64.0;
-        const FRAMES: usize = 16;
-        for view in &mut small.views {
-            let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
-            view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
-            view.scale = view.scale.map(|s| s * shrink);
-        }
-        let last = scene.frames().unwrap_or(1).saturating_sub(1);
-        small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
-        small.frames.dedup();
-        let mut ranges = Self::default();
-        let pixels = small.frames.len() * small.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
-        let (step, mut seen) = (pixels.div_ceil(MOST_SEEN).max(1), Vec::new());
-        let report = render(scene, &small, &Silent, &mut |rendered| {
-            seen.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
-            Ok(())
-        })?;
-        seen.sort_unstable_by(f32::total_cmp);
-        if !seen.is_empty() {
-            ranges.values = without_spots(&seen);
-            ranges.positive = seen.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
-        }
-        ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
-        Ok(ranges)
-    }
-
-    /// Colours over the range of all values, but for few spots that would take most of them; these are of largest values.
-    pub(crate) fn without_spots(&self, colours: &TransferFunction) -> Result<TransferFunction> {
-        let ((lo, hi), most) = (colours.range(), self.values.1);
-        if !(0.0 < most && most < hi) {
-            return Ok(colours.clone());
-        }
-        colours.over((if lo < 0.0 { lo * most / hi } else { lo.min(0.5 * most) }, most))
-    }
-
-    /// From 0 to the largest.
-    pub(crate) fn up_from_zero(&self) -> (f64, f64) {
-        (0.0, self.values.1)
-    }
-
-    /// What colours are spread over where nobody says it.
-    fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
-        const DECADES: f64 = 1e-4;
-        let (lo, hi) = self.values;
-        if norm == Norm::Log {
-            let least =
-                self.positive.ok_or_else(|| Error::usage("--norm log: no value is above 0; give --norm linear"))?;
-            return Ok((least.max(hi * DECADES), hi));
-        }
-        Ok(if lo < hi { map.suitable((lo, hi)) } else { (lo, hi) })
-    }
 }

@@ -2,20 +2,24 @@
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 mod along;
+mod colouring;
 mod colours;
+mod made;
+mod ranges;
 mod sinks;
 mod targets;
 
 use along::{AlongArgs, ModeName};
 use clap::{Parser, ValueEnum};
+use colouring::Coloured;
 use colours::ColourArgs;
 use serde::Serialize;
-use sinks::{Coloured, of_view};
 use std::collections::HashSet;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use targets::{Targets, parse_format};
+use targets::{Targets, parse_depth, parse_format};
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{
@@ -25,9 +29,9 @@ use wavesplat::colour::TransferFunction;
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::footprint::Kernel;
-use wavesplat::output::STANDARD;
+use wavesplat::output::{Output, STANDARD};
 use wavesplat::render::annotate::room;
-use wavesplat::render::sink::{PictureFormat, Sink};
+use wavesplat::render::sink::{Depth, Made, PictureFormat, Sink};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
@@ -44,7 +48,7 @@ use wavesplat_format::Metadata;
 Examples:
   wavesplat-render run.wspl -o frame_%04d.png
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
-  wavesplat-render run.wspl -o values.npy --size 800x600
+  wavesplat-render run.wspl -o values.npy --size 800x600 --sidecar values.json
   wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
   wavesplat-render run.wspl --orbit 90 --frames 10 --annotate -o turntable.apng
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
@@ -52,6 +56,7 @@ Examples:
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render frames/ --method direct -o frame_%04d.png
 An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours.
+A PNG holds what made it as text, an .exr as comments.
 The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks
 along x. A tau of about 1 / the volume's depth lets the near side stand out."
 )]
@@ -129,10 +134,16 @@ struct Cli {
     /// From coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients")]
     method: MethodName,
-    /// png, npy, y4m, rgb24, gray16, apng (a moving PNG) or sheet (all pictures in one PNG) [default: by the ending of OUT; png
-    /// for -]
+    /// png, npy, y4m, rgb24, gray16, apng (a moving PNG), sheet (all pictures in one PNG) or, if it was built in, exr [default:
+    /// by the ending of OUT; png for -]
     #[arg(long, value_parser = parse_format)]
     format: Option<PictureFormat>,
+    /// Bits a channel of a PNG: 8, or 16 (with --colormap grey, of one channel)
+    #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth)]
+    depth: Depth,
+    /// Write what --json prints to a file as well
+    #[arg(long, value_name = "FILE")]
+    sidecar: Option<PathBuf>,
     /// Frames a second of a y4m or apng
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
     fps: u32,
@@ -193,28 +204,36 @@ impl Cli {
         let metadata = file.as_ref().map(|file| file.metadata());
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
-        config.reserved =
-            targets.0.memory(&config)? + targets.1.as_ref().map_or(Ok(0), |errors| errors.memory(&config))?;
+        config.reserved = self.reserved(&targets, &config)?;
         let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
-        let colours = colours.as_ref();
-        let (mut pictures, mut errors, coloured) = self.sinks(scene.as_mut(), &config, targets, (times, colours))?;
+        let targets = (&targets.0, targets.1.as_ref());
+        let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
+        let made = self.made(scene.as_ref(), &config, (file.as_deref(), &times), &colouring);
+        let mut sinks = self.sinks(&config, targets, &colouring, (&made, times))?;
         let progress = self.common.progress(if config.mode.is_projection() { "pictures" } else { "rows of slabs" });
-        let report = render(scene.as_mut(), &config, &progress, &mut |rendered| {
-            if let (Some(sink), Some(error)) = (of_view(&mut errors, rendered.view), rendered.error) {
-                sink.picture(rendered.frame, error)?;
-            }
-            of_view(&mut pictures, rendered.view).map_or(Ok(()), |sink| sink.picture(rendered.frame, rendered.picture))
-        })?;
-        errors.into_iter().chain(pictures).try_for_each(Sink::finish)?;
+        let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
+        sinks.finish()?;
         self.common.detail(summary(&report));
-        if self.tolerance.is_some() && !config.mode.is_projection() {
-            let RenderReport { certified_sample_error, left_out, .. } = &report;
+        self.note_errors(&report);
+        let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
+        if let (Some(read), Some(bytes)) = (file_bytes_read, file_bytes) {
+            self.common.detail(format_args!("{read} bytes were read of the file, which has {bytes}"));
+        }
+        let coloured = colouring.coloured();
+        let reported = Reported { report: &report, picture: &made, coloured, file_bytes_read, file_bytes };
+        self.report(&reported)?;
+        file.map_or(Ok(()), |file| file.refuse_skipped())
+    }
+
+    /// Notes on the errors of pictures.
+    fn note_errors(&self, report: &RenderReport) {
+        let RenderReport { certified_sample_error, expected_error, left_out, .. } = report;
+        if self.tolerance.is_some() && self.along.mode != ModeName::Projection {
             self.common.note(format_args!(
                 "no sample is off by more than {certified_sample_error:.4e}; {} coefficients left out",
                 left_out.coefficients
             ));
         } else if self.tolerance.is_some() {
-            let RenderReport { certified_sample_error, expected_error, left_out, .. } = &report;
             self.common.note(format_args!(
                 "no sample is off by more than {certified_sample_error:.4e}; pixels are expected to be by \
                  {expected_error:.4e} (root mean square); {} coefficients left out",
@@ -224,17 +243,22 @@ impl Cli {
         if let Some(error) = report.certified_error {
             self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
         }
-        if let Some(file) = &file {
-            self.common.detail(format_args!(
-                "{} bytes were read of the file, which has {}",
-                file.bytes_read(),
-                file.bytes()
-            ));
+    }
+
+    /// Prints and writes what is asked for of it.
+    fn report(&self, reported: &Reported<'_>) -> Result<()> {
+        if let Some(path) = &self.sidecar {
+            let mut out = Output::create(path, self.force)?;
+            out.write_all(cli::report_text(reported)?.as_bytes()).map_err(|e| Error::io(path, "writing", e))?;
+            out.commit()?;
         }
-        let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
-        let reported = Reported { report: &report, coloured, file_bytes_read, file_bytes };
-        self.common.report(&reported, self.output == Path::new(STANDARD))?;
-        file.map_or(Ok(()), |file| file.refuse_skipped())
+        self.common.report(reported, self.output == Path::new(STANDARD))
+    }
+
+    /// Bytes that the sinks take for themselves.
+    fn reserved(&self, (pictures, errors): &(Targets, Option<Targets>), config: &RenderConfig) -> Result<usize> {
+        let errors = errors.as_ref().map_or(Ok(0), |errors| errors.memory(self.depth, config))?;
+        Ok(pictures.memory(self.depth, config)? + errors)
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -245,19 +269,35 @@ impl Cli {
         if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
             return Err(Error::usage("--error-image: takes a file of its own"));
         }
+        let are_png = [Some(&pictures), errors.as_ref()].into_iter().flatten().any(|targets| targets.format.is_png());
+        if self.depth == Depth::Sixteen && !are_png {
+            let what = "is of png, apng and sheet; gray16 has 16 bits, npy and exr have floats";
+            return Err(Error::usage(format!("--depth 16: {what}")));
+        }
         let mut written = HashSet::new();
+        if let Some(path) = &self.sidecar {
+            self.check_sidecar(path)?;
+            written.insert(path.clone());
+        }
         for targets in [Some(&pictures), errors.as_ref()].into_iter().flatten() {
             for name in &targets.names {
                 spare_inputs(&self.inputs, name)?;
                 let paths = Sink::paths(name, targets.format, &config.frames)?;
                 if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
-                    let what =
-                        "would be written twice: --error-image takes a file of its own, and every picture a name";
+                    let what = "would be written twice: --error-image takes a file of its own, as does --sidecar, and every picture a name";
                     return Err(Error::usage(format!("{}: {what}", twice.display())));
                 }
             }
         }
         Ok((pictures, errors))
+    }
+
+    fn check_sidecar(&self, path: &Path) -> Result<()> {
+        if path == Path::new(STANDARD) {
+            return Err(Error::usage("--sidecar: takes a file of its own; --json prints"));
+        }
+        spare_inputs(&self.inputs, path)?;
+        Output::check(path, self.force)
     }
 
     /// What is rendered, and the file that it is from.
@@ -424,6 +464,8 @@ struct Reported<'a> {
     report: &'a RenderReport,
     #[serde(flatten)]
     coloured: Coloured,
+    /// What travels with every picture; of each view `views` says it.
+    picture: &'a Made,
     /// Bytes of the coefficient file that were read, directory and all, and those that it has.
     file_bytes_read: Option<u64>,
     file_bytes: Option<u64>,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::error::{Error, Result};
 use wavesplat::output::STANDARD;
 use wavesplat::render::RenderConfig;
-use wavesplat::render::sink::{PictureFormat, names_of_views};
+use wavesplat::render::sink::{Depth, PictureFormat, names_of_views};
 
 /// Where pictures go: a name for each view, or one for all.
 pub(crate) struct Targets {
@@ -15,25 +15,35 @@ pub(crate) struct Targets {
 impl Targets {
     pub(crate) fn new(path: &Path, format: Option<PictureFormat>, config: &RenderConfig) -> Result<Self> {
         let format = format.map_or_else(|| format_of(path), Ok)?;
+        format.check(path)?;
         let joined = config.frames.len() == 1 && format.takes_all(path);
         Ok(Self { format, names: names_of_views(path, config.views.len(), joined)? })
     }
 
-    /// Which frame each picture is of that goes to one name.
-    pub(crate) fn frames(&self, config: &RenderConfig) -> Vec<usize> {
-        config.frames.repeat(config.views.len() / self.names.len())
+    /// Which view and which frame each picture is of that goes to the name of such a number.
+    pub(crate) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
+        let views = if self.names.len() == 1 { 0..config.views.len() } else { name..name + 1 };
+        views.flat_map(|view| config.frames.iter().map(move |frame| (view, *frame))).collect()
     }
 
     /// Bytes that writing takes.
-    pub(crate) fn memory(&self, config: &RenderConfig) -> Result<usize> {
-        let each = self.format.memory(config.views[0].size, self.frames(config).len())?;
-        Ok(each * self.names.len())
+    pub(crate) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
+        let each = config.frames.len() * config.views.len() / self.names.len();
+        Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())
+    }
+}
+
+pub(crate) fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
+    match text {
+        "8" => Ok(Depth::Eight),
+        "16" => Ok(Depth::Sixteen),
+        _ => Err("8 or 16".into()),
     }
 }
 
 pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
     let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet".into())
+    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet exr".into())
 }
 
 fn format_of(path: &Path) -> Result<PictureFormat> {
@@ -43,7 +53,7 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let format = parse_format(ending).ok().filter(|format| *format != PictureFormat::Sheet);
     format.ok_or_else(|| {
-        let what = "the ending says no format: one of png npy y4m rgb24 gray16 apng";
+        let what = "the ending says no format: one of png npy y4m rgb24 gray16 apng exr";
         Error::usage(format!("{}: {what}", path.display()))
     })
 }

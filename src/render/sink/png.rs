@@ -1,6 +1,6 @@
 //! PNG files, still and moving.
 
-use super::{Picture, SinkConfig};
+use super::{Depth, Picture, Pixel, Rendered, SinkConfig};
 use crate::colour::Rgb;
 use crate::error::{Error, Result};
 use crate::output::Output;
@@ -8,18 +8,86 @@ use std::cell::RefCell;
 use std::io::{self, Write};
 use std::rc::Rc;
 
-/// Writes one picture.
-pub(super) fn write(size: [usize; 2], pixels: &[Rgb], out: &mut impl Write) -> io::Result<()> {
-    let mut writer = encoder(size, out).write_header().map_err(cause)?;
-    writer.write_image_data(pixels.as_flattened()).map_err(cause)?;
+/// How the pixels of a picture are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Samples {
+    Rgb8,
+    Rgb16,
+    Grey16,
+}
+
+impl Samples {
+    /// Those of all pictures of a sink.
+    pub(super) fn of(config: &SinkConfig) -> Self {
+        match config.depth {
+            Depth::Eight => Self::Rgb8,
+            Depth::Sixteen if config.pixel == Pixel::Value && config.colours.is_grey() => Self::Grey16,
+            Depth::Sixteen => Self::Rgb16,
+        }
+    }
+
+    /// Bytes of a pixel.
+    pub(super) fn bytes(self) -> usize {
+        match self {
+            Self::Rgb8 => 3,
+            Self::Rgb16 => 6,
+            Self::Grey16 => 2,
+        }
+    }
+
+    /// The bytes of a pixel of such a colour.
+    pub(super) fn pixel(self, [r, g, b]: Rgb) -> Vec<u8> {
+        match self {
+            Self::Rgb8 => vec![r, g, b],
+            Self::Rgb16 => vec![r, r, g, g, b, b],
+            Self::Grey16 => vec![r, r],
+        }
+    }
+
+    fn kind(self) -> (png::ColorType, png::BitDepth) {
+        match self {
+            Self::Rgb8 => (png::ColorType::Rgb, png::BitDepth::Eight),
+            Self::Rgb16 => (png::ColorType::Rgb, png::BitDepth::Sixteen),
+            Self::Grey16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
+        }
+    }
+}
+
+/// The bytes of a picture's pixels.
+pub(super) fn samples(config: &SinkConfig, frame: usize, picture: Picture<'_>) -> Vec<u8> {
+    let bytes = |level: &u16| [(level >> 8) as u8, *level as u8];
+    match Samples::of(config) {
+        Samples::Rgb8 => config.image(frame, picture).into_flattened(),
+        Samples::Rgb16 => config.deep_image(frame, picture).as_flattened().iter().flat_map(bytes).collect(),
+        Samples::Grey16 => config.deep_image(frame, picture).iter().flat_map(|[level, ..]| bytes(level)).collect(),
+    }
+}
+
+/// Writes one picture of such a size, from the bytes of its pixels.
+pub(super) fn write(
+    config: &SinkConfig,
+    size: [usize; 2],
+    texts: &[(String, String)],
+    samples: &[u8],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut writer = encoder(config, size, texts, out).and_then(png::Encoder::write_header).map_err(cause)?;
+    writer.write_image_data(samples).map_err(cause)?;
     writer.finish().map_err(cause)
 }
 
-fn encoder<W: Write>([width, height]: [usize; 2], out: W) -> png::Encoder<'static, W> {
+fn encoder<W: Write>(
+    config: &SinkConfig,
+    [width, height]: [usize; 2],
+    texts: &[(String, String)],
+    out: W,
+) -> std::result::Result<png::Encoder<'static, W>, png::EncodingError> {
     let mut encoder = png::Encoder::new(out, width as u32, height as u32);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder
+    let (colours, depth) = Samples::of(config).kind();
+    encoder.set_color(colours);
+    encoder.set_depth(depth);
+    texts.iter().try_for_each(|(key, text)| encoder.add_text_chunk(key.clone(), text.clone()))?;
+    Ok(encoder)
 }
 
 /// A PNG that moves, again and again.
@@ -34,17 +102,17 @@ impl Animation {
         Self { out: Shared(Rc::new(RefCell::new(out))), writer: None }
     }
 
-    pub(super) fn picture(&mut self, config: &SinkConfig, frame: usize, picture: Picture<'_>) -> Result<()> {
-        let written = self.write(config, &config.image(frame, picture));
-        written.map_err(|e| Error::io(self.path(), format!("writing frame {frame}"), e))
+    pub(super) fn picture(&mut self, config: &SinkConfig, rendered: &Rendered<'_>, picture: Picture<'_>) -> Result<()> {
+        let written = self.write(config, rendered, &samples(config, rendered.frame, picture));
+        written.map_err(|e| Error::io(self.path(), format!("writing frame {}", rendered.frame), e))
     }
 
-    fn write(&mut self, config: &SinkConfig, pixels: &[Rgb]) -> io::Result<()> {
+    fn write(&mut self, config: &SinkConfig, rendered: &Rendered<'_>, samples: &[u8]) -> io::Result<()> {
         let writer = match &mut self.writer {
             Some(writer) => writer,
-            None => self.writer.insert(begin(config, self.out.clone()).map_err(cause)?),
+            None => self.writer.insert(begin(config, rendered, self.out.clone()).map_err(cause)?),
         };
-        writer.write_image_data(pixels.as_flattened()).map_err(cause)
+        writer.write_image_data(samples).map_err(cause)
     }
 
     pub(super) fn finish(mut self) -> Result<()> {
@@ -58,9 +126,13 @@ impl Animation {
     }
 }
 
-fn begin(config: &SinkConfig, out: Shared) -> std::result::Result<png::Writer<Shared>, png::EncodingError> {
-    let mut encoder = encoder(config.size, out);
-    encoder.set_animated(config.frames.len() as u32, 0)?;
+fn begin(
+    config: &SinkConfig,
+    rendered: &Rendered<'_>,
+    out: Shared,
+) -> std::result::Result<png::Writer<Shared>, png::EncodingError> {
+    let mut encoder = encoder(config, config.size, &config.texts_of_all(rendered), out)?;
+    encoder.set_animated(config.shown.len() as u32, 0)?;
     encoder.set_frame_delay(1, config.fps as u16)?;
     encoder.write_header()
 }

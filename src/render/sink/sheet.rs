@@ -1,7 +1,7 @@
 //! All pictures of a run in one: a contact sheet.
 
-use super::{Picture, SinkConfig, png};
-use crate::colour::Rgb;
+use super::png::{self, Samples};
+use super::{Picture, Rendered, SinkConfig};
 use crate::error::{Error, Result};
 use crate::output::Output;
 
@@ -14,30 +14,36 @@ pub(super) struct Sheet {
     out: Output,
     /// Width and height in pixels.
     size: [usize; 2],
-    /// Empty before the first picture.
-    pixels: Vec<Rgb>,
+    /// The bytes of its pixels; empty before the first picture.
+    samples: Vec<u8>,
+    /// What made it.
+    texts: Vec<(String, String)>,
     placed: usize,
 }
 
 impl Sheet {
     pub(super) fn new(out: Output, config: &SinkConfig) -> Result<Self> {
-        let size = size(config.size, config.frames.len())?;
-        Ok(Self { out, size, pixels: Vec::new(), placed: 0 })
+        let size = size(config.size, config.shown.len())?;
+        Ok(Self { out, size, samples: Vec::new(), texts: Vec::new(), placed: 0 })
     }
 
-    pub(super) fn picture(&mut self, config: &SinkConfig, frame: usize, picture: Picture<'_>) {
+    pub(super) fn picture(&mut self, config: &SinkConfig, rendered: &Rendered<'_>, picture: Picture<'_>) {
         let ([width, height], [across, down]) = (config.size, self.size);
-        self.pixels.resize(across * down, config.colours.background());
-        let columns = across / width;
+        let (kind, columns) = (Samples::of(config), across / width);
+        if self.samples.is_empty() {
+            self.samples = kind.pixel(config.colours.background()).repeat(across * down);
+            self.texts = config.texts_of_all(rendered);
+        }
         let first = self.placed / columns * height * across + self.placed % columns * width;
-        for (y, row) in config.image(frame, picture).chunks_exact(width).enumerate() {
-            self.pixels[first + y * across..][..width].copy_from_slice(row);
+        let bytes = kind.bytes();
+        for (y, row) in png::samples(config, rendered.frame, picture).chunks_exact(width * bytes).enumerate() {
+            self.samples[(first + y * across) * bytes..][..row.len()].copy_from_slice(row);
         }
         self.placed += 1;
     }
 
-    pub(super) fn finish(mut self) -> Result<()> {
-        let written = png::write(self.size, &self.pixels, &mut self.out);
+    pub(super) fn finish(mut self, config: &SinkConfig) -> Result<()> {
+        let written = png::write(config, self.size, &self.texts, &self.samples, &mut self.out);
         written.map_err(|e| Error::io(self.out.path(), "writing", e))?;
         self.out.commit()
     }

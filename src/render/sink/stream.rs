@@ -1,9 +1,9 @@
 //! Pictures one after another in one file.
 
-use super::{PictureFormat, SinkConfig, png};
+use super::{PictureFormat, SinkConfig, exr, png};
 use crate::colour::Rgb;
 use crate::npy;
-use crate::render::{Picture, Pixel};
+use crate::render::{Picture, Pixel, Rendered};
 use crate::sample::SampleType;
 use std::io::{self, Write};
 
@@ -12,10 +12,10 @@ pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()>
     let [width, height] = config.size;
     match config.format {
         PictureFormat::Npy if config.coloured_array => {
-            npy::write_header(SampleType::U8, &[config.frames.len(), height, width, 3], out)
+            npy::write_header(SampleType::U8, &[config.shown.len(), height, width, 3], out)
         }
         PictureFormat::Npy => {
-            let shape = [config.frames.len(), height, width, config.pixel.numbers()];
+            let shape = [config.shown.len(), height, width, config.pixel.numbers()];
             let axes = if config.pixel == Pixel::Value { 3 } else { 4 };
             npy::write_header(SampleType::F32, &shape[..axes], out)
         }
@@ -27,7 +27,13 @@ pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()>
 }
 
 /// Writes one picture.
-pub(super) fn write(config: &SinkConfig, frame: usize, picture: Picture<'_>, out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write(
+    config: &SinkConfig,
+    rendered: &Rendered<'_>,
+    picture: Picture<'_>,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let frame = rendered.frame;
     match config.format {
         PictureFormat::Npy if !config.coloured_array => {
             out.write_all(&picture.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
@@ -38,8 +44,9 @@ pub(super) fn write(config: &SinkConfig, frame: usize, picture: Picture<'_>, out
         }
         PictureFormat::Y4m => write_yuv(config.image(frame, picture), out),
         PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(config.image(frame, picture).as_flattened()),
+        PictureFormat::Exr => exr::write(config, &config.texts_of(rendered), picture, out),
         PictureFormat::Png | PictureFormat::Apng | PictureFormat::Sheet => {
-            png::write(config.size, &config.image(frame, picture), out)
+            png::write(config, config.size, &config.texts_of(rendered), &png::samples(config, frame, picture), out)
         }
     }
 }

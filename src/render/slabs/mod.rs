@@ -30,7 +30,7 @@ mod medium;
 mod slab;
 mod visible;
 
-pub(super) use cut::{bytes, cut, of_block};
+pub(super) use cut::{bytes, count, cut, of_block};
 pub(super) use slab::Slab;
 
 use super::canvas::{self, Canvas, Finished, Pixels};
@@ -39,12 +39,12 @@ use super::eye::Eye;
 use super::plan::{self, Budget};
 use super::scene::{Group, Read, Scene};
 use super::weights::Look;
-use super::{Mode, RenderConfig, RenderReport, Rendered, ViewReport, lap};
+use super::{Mode, RenderConfig, RenderReport, Rendered, lap};
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::wavelet::{LANES, Lane};
 use blend::{Blend, Composite, Largest};
-use cut::{Slabs, count};
+use cut::Slabs;
 use lengths::WithLengths;
 use medium::Medium;
 use std::ops::Range;
@@ -67,9 +67,7 @@ pub(super) fn render(
     progress.start(Some((all * config.frames.len() * config.size()[1]) as u64));
     for (view, eye) in eyes.iter().enumerate() {
         let slabs = cut(eye, config)?;
-        let mut sink = |frame, picture: &[f32]| sink(Rendered { view, frame, picture, error: None });
-        let ViewReport { slabs: count, expected_error, .. } = &mut report.views[view];
-        (*count, *expected_error) = (Some(slabs.eyes.len()), f64::NAN);
+        let mut sink = |frame, picture: &[f32]| sink(Rendered { views: &[], view, frame, picture, error: None });
         render_view(scene, config, &slabs, progress, report, &mut sink)?;
     }
     Ok(())

@@ -41,7 +41,7 @@ fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
     for (letter, run) in ('a'..).zip(runs) {
         let numbers = shown(run, demo.size);
         for (frame, picture) in SHOWN.iter().zip(numbers.as_chunks::<3>().0.chunks_exact(width * height)) {
-            let image = Image::from_fn(width, height, |x, y| means.colour_of_channels(picture[y * width + x]));
+            let image = Image::from_fn(width, height, |x, y| means.colour_of_pixel(&picture[y * width + x]));
             rows.push(named(&image, &format!("({letter}) {}, frame {frame}", run.name)));
         }
     }

@@ -1,0 +1,102 @@
+//! Which colours the pictures of a run have.
+
+use crate::Cli;
+use crate::QuantityName;
+use crate::ranges::Ranges;
+use crate::targets::Targets;
+use serde::Serialize;
+use wavesplat::colour::{Norm, Scale, TransferFunction};
+use wavesplat::error::{Error, Result};
+use wavesplat::render::sink::PictureFormat;
+use wavesplat::render::{Pixel, RenderConfig, Scene};
+
+/// The colours of pictures, and of those of their errors.
+pub(crate) struct Colouring {
+    /// What the numbers of a pixel are.
+    pub(crate) pixel: Pixel,
+    pub(crate) map: TransferFunction,
+    pub(crate) of_pictures: Scale,
+    pub(crate) of_errors: Scale,
+    /// Whether pictures, and those of their errors, are in colours.
+    in_colours: (bool, bool),
+}
+
+/// The values of the first and the last colour, of what is in colours.
+#[derive(Serialize)]
+pub(crate) struct Coloured {
+    pub(crate) range: Option<(f64, f64)>,
+    pub(crate) error_range: Option<(f64, f64)>,
+}
+
+impl Colouring {
+    pub(crate) fn coloured(&self) -> Coloured {
+        let (pictures, errors) = self.in_colours;
+        Coloured {
+            range: pictures.then(|| self.of_pictures.range()),
+            error_range: errors.then(|| self.of_errors.range()),
+        }
+    }
+}
+
+impl Cli {
+    /// The colours, over ranges that are given or those of small pictures.
+    pub(crate) fn colouring(
+        &self,
+        scene: &mut dyn Scene,
+        config: &RenderConfig,
+        (pictures, errors): (&Targets, Option<&Targets>),
+        colours: Option<&TransferFunction>,
+    ) -> Result<Colouring> {
+        let pixel = self.pixel(scene, config, [Some(pictures), errors])?;
+        let in_colours = !pictures.format.is_of_numbers() || self.colour.is_asked();
+        let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
+        let fixed = self.fixed_range(pixel, colours);
+        let needed = (in_colours && fixed.is_none(), of_errors);
+        let seen = self.seen(scene, config, needed)?;
+        let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
+        let (range, norm) = match pixel {
+            Pixel::Value => self.colour.spread(&map, &seen, in_colours, &self.common)?,
+            _ => (fixed.unwrap_or(seen.up_from_zero()), Norm::Linear),
+        };
+        self.say_ranges(range, &seen, needed);
+        let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
+        let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(seen.errors, Norm::Linear)?);
+        Ok(Colouring { pixel, of_pictures, of_errors: of_errors_too, in_colours: (in_colours, of_errors), map })
+    }
+
+    fn say_ranges(&self, (lo, hi): (f64, f64), seen: &Ranges, (of_pictures, of_errors): (bool, bool)) {
+        if of_pictures || of_errors {
+            self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        }
+        if of_errors {
+            self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
+        }
+    }
+
+    /// What the numbers of a pixel are; an error where options or formats have no use for colours.
+    fn pixel(&self, scene: &dyn Scene, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
+        let pixel = if scene.channels() == 1 { config.mode.pixel() } else { Pixel::Channels };
+        if pixel == Pixel::Value {
+            return Ok(pixel);
+        }
+        let mut grey = targets.into_iter().flatten().filter(|targets| targets.format == PictureFormat::Gray16);
+        if let Some(name) = grey.next().and_then(|targets| targets.names.first()) {
+            let what = "gray16 holds one number a pixel, and colours are three; take png, npy or rgb24";
+            return Err(Error::usage(format!("{}: {what}", name.display())));
+        }
+        self.colour.refuse_for_colours()?;
+        Ok(pixel)
+    }
+
+    /// The values of the first and the last colour, where small pictures need not tell. Channels are bright between none and all;
+    /// only their sums along the ray know no end. With a transfer function --range is that of samples.
+    fn fixed_range(&self, pixel: Pixel, colours: Option<&TransferFunction>) -> Option<(f64, f64)> {
+        let range = self.colour.range.map(|range| range.0.into());
+        let bright = (self.quantity == QuantityName::Mean).then_some((0.0, 1.0));
+        match pixel {
+            Pixel::Value => range,
+            Pixel::Channels => range.filter(|_| colours.is_none()).or(bright),
+            Pixel::Light => colours.map(TransferFunction::range),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What the pictures of a run are made with.
+
+use crate::along::ModeName;
+use crate::colouring::Colouring;
+use crate::{Cli, ErrorName, MethodName, QuantityName};
+use wavesplat::colour::{Norm, Scale};
+use wavesplat::file::CoefficientFile;
+use wavesplat::render::sink::{Made, Shows};
+use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene};
+use wavesplat::report::PromiseReport;
+
+impl Cli {
+    /// What pictures are made with.
+    pub(crate) fn made(
+        &self,
+        scene: &dyn Scene,
+        config: &RenderConfig,
+        (file, times): (Option<&CoefficientFile>, &[f64]),
+        colouring: &Colouring,
+    ) -> Made {
+        let made = Made {
+            software: concat!("wavesplat-render ", env!("CARGO_PKG_VERSION")).into(),
+            size: self.size.0,
+            tau: config.kernel.tau,
+            sigma: config.kernel.sigma,
+            splat_error: config.splat_error,
+            tolerance: self.tolerance,
+            error: self.tolerance.map(|_| match self.error {
+                ErrorName::Certified => "certified",
+                ErrorName::Expected => "expected",
+            }),
+            region: config.region.map(|r| [0, 1, 2].map(|a| format!("{}:{}", r.start[a], r.end[a])).join(",")),
+            missing_value: self.missing_value,
+            frames: config.frames.clone(),
+            times: config.frames.iter().filter_map(|frame| times.get(*frame)).copied().collect(),
+            ..self.of_modes()
+        };
+        let made = of_transfer(made, scene, (config, file), colouring);
+        let made = file.map_or(made.clone(), |file| self.of_file(made, file, config));
+        match colouring.coloured().range {
+            Some(_) => in_colours(made, colouring, &colouring.of_pictures),
+            None => made,
+        }
+    }
+
+    fn of_modes(&self) -> Made {
+        let quantity = match self.quantity {
+            QuantityName::Mean => "mean",
+            QuantityName::Emission => "emission",
+        };
+        Made {
+            method: match self.method {
+                MethodName::Coefficients => "coefficients",
+                MethodName::Direct => "direct",
+            },
+            mode: match self.along.mode {
+                ModeName::Projection => "projection",
+                ModeName::Composite => "composite",
+                ModeName::Mip => "mip",
+            },
+            quantity: (self.along.mode == ModeName::Projection).then_some(quantity),
+            ..Made::default()
+        }
+    }
+
+    /// With what is known of a file.
+    fn of_file(&self, made: Made, file: &CoefficientFile, config: &RenderConfig) -> Made {
+        let m = file.metadata();
+        let reached = m.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
+        let certified = config.limited == Limit::Certified && !self.skip_damaged;
+        Made {
+            sample_error: certified.then(|| config.allowed.unwrap_or(0.0).max(reached)),
+            file_id: Some(file.id().to_string()),
+            file_promise: Some(PromiseReport::new(m.bound, m.tolerance, m.range()).promise),
+            file_reached: Some(reached),
+            ..made
+        }
+    }
+}
+
+/// With what turns samples into colours, before the transform or along the ray.
+fn of_transfer(
+    made: Made,
+    scene: &dyn Scene,
+    (config, file): (&RenderConfig, Option<&CoefficientFile>),
+    colouring: &Colouring,
+) -> Made {
+    let painter = file.and_then(CoefficientFile::painter).map(|painter| painter.colours.words());
+    let words = || painter.unwrap_or_else(|| colouring.map.words());
+    let made = Made { transfer_function: (colouring.pixel != Pixel::Value).then(words), ..made };
+    let Mode::Composite { transfer, unit, .. } = &config.mode else { return made };
+    let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
+    Made { opacity: Some(transfer.opacity_words()), opacity_unit: Some(unit), ..made }
+}
+
+/// With the colours that pixels have.
+fn in_colours(made: Made, colouring: &Colouring, scale: &Scale) -> Made {
+    let norm = match scale.norm() {
+        Norm::Linear => "linear",
+        Norm::Log => "log",
+    };
+    let [r, g, b] = scale.background();
+    Made {
+        colormap: (colouring.pixel == Pixel::Value).then(|| colouring.map.name()),
+        range: Some(scale.range()),
+        norm: Some(norm),
+        background: Some(format!("{r:02x}{g:02x}{b:02x}")),
+        ..made
+    }
+}
+
+/// What pictures of errors are made with, of what the pictures are.
+pub(crate) fn made_of_errors(made: &Made, colouring: &Colouring) -> Made {
+    let made = Made {
+        shows: Shows::CertifiedError,
+        colormap: None,
+        range: None,
+        norm: None,
+        background: None,
+        ..made.clone()
+    };
+    match colouring.coloured().error_range {
+        Some(_) => in_colours(made, colouring, &colouring.of_errors),
+        None => made,
+    }
+}

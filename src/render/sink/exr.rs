@@ -1,0 +1,69 @@
+//! OpenEXR files of numbers as they are, if the program is built with them.
+
+/// Whether it is.
+pub(super) const IS_BUILT: bool = cfg!(feature = "exr");
+
+/// What to do where it is not.
+pub(super) const HOW_TO_BUILD: &str =
+    "OpenEXR is not part of this build; make one with it by cargo build --release --features exr, or take .npy";
+
+#[cfg(not(feature = "exr"))]
+pub(super) fn write(
+    _: &super::SinkConfig,
+    _: &[(String, String)],
+    _: super::Picture<'_>,
+    _: &mut impl std::io::Write,
+) -> std::io::Result<()> {
+    Err(std::io::Error::other(HOW_TO_BUILD))
+}
+
+#[cfg(feature = "exr")]
+pub(super) use with_crate::write;
+
+#[cfg(feature = "exr")]
+mod with_crate {
+    use super::super::{Picture, Pixel, SinkConfig};
+    use ::exr::prelude::*;
+    use std::io::{self, Cursor, Write};
+
+    /// Writes one picture: float32 channels, compressed without loss. What made it is in the standard attributes `software` and
+    /// `comments`, a line for each name: attributes of other names have no order of their own.
+    pub(in super::super) fn write(
+        config: &SinkConfig,
+        texts: &[(String, String)],
+        picture: Picture<'_>,
+        out: &mut impl Write,
+    ) -> io::Result<()> {
+        let lines: Vec<String> = texts.iter().map(|(name, text)| format!("{name}: {text}")).collect();
+        let attributes = LayerAttributes {
+            software_name: Text::new_or_none(&config.made.software),
+            comments: Text::new_or_none(lines.join("\n")),
+            ..LayerAttributes::default()
+        };
+        let [width, height] = config.size;
+        let channels = channels(config.pixel, picture);
+        let layer = Layer::new((width, height), attributes, Encoding::SMALL_LOSSLESS, channels);
+        let mut bytes = Cursor::new(Vec::new()); // it is not written from its beginning to its end
+        Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(cause)?;
+        out.write_all(bytes.get_ref())
+    }
+
+    fn channels(pixel: Pixel, picture: Picture<'_>) -> AnyChannels<FlatSamples> {
+        let names: &[&str] = match pixel {
+            Pixel::Value => &["Y"],
+            Pixel::Channels => &["R", "G", "B"],
+            Pixel::Light => &["R", "G", "B", "A"],
+        };
+        let numbers = |n| picture.iter().skip(n).step_by(names.len()).copied().collect();
+        let channel = |(n, name): (usize, &&str)| AnyChannel::new(*name, FlatSamples::F32(numbers(n)));
+        AnyChannels::sort(names.iter().enumerate().map(channel).collect())
+    }
+
+    /// What the system said, if it was that.
+    fn cause(error: Error) -> io::Error {
+        match error {
+            Error::Io(e) => e,
+            other => io::Error::other(other),
+        }
+    }
+}
