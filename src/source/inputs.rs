@@ -43,7 +43,7 @@ pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
 }
 
 fn expand_one(input: &Path, options: &OpenOptions) -> Result<Files> {
-    if input.is_dir() {
+    if input.is_dir() && formats::zarr_metadata(input).is_none() {
         return directory(input, options);
     }
     if !input.exists() && is_pattern(input) {

@@ -17,7 +17,7 @@ use super::OpenOptions;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::described::{Described, head};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The formats that describe themselves, for messages.
 pub(in crate::source) const SUPPORTED: &str =
@@ -31,6 +31,8 @@ pub(in crate::source) enum Format {
     Vti,
     Hdf5,
     NetCdf,
+    /// A folder.
+    Zarr,
     /// A list of files, not frames itself.
     Pvd,
     /// A coefficient file, which is no input.
@@ -47,6 +49,7 @@ impl Format {
             "h5" | "hdf5" | "hdf" | "he5" | "vtkhdf" => Some(Self::Hdf5),
             "nc" | "nc4" | "nc3" | "cdf" | "netcdf" => Some(Self::NetCdf),
             "pvd" => Some(Self::Pvd),
+            "zarr" => Some(Self::Zarr),
             "wspl" => Some(Self::Coefficients),
             _ => None,
         }
@@ -54,7 +57,7 @@ impl Format {
 
     /// Whether a file may hold several arrays.
     fn has_variables(self) -> bool {
-        matches!(self, Self::Vti | Self::Hdf5 | Self::NetCdf)
+        matches!(self, Self::Vti | Self::Hdf5 | Self::NetCdf | Self::Zarr)
     }
 
     fn by_content(path: &Path) -> Result<Option<Self>> {
@@ -69,6 +72,12 @@ impl Format {
     }
 }
 
+/// The file with the metadata of a folder that is a Zarr store.
+pub(super) fn zarr_metadata(folder: &Path) -> Option<PathBuf> {
+    let names = ["zarr.json", ".zmetadata", ".zgroup", ".zarray"].into_iter();
+    names.map(|name| folder.join(name)).find(|path| path.is_file())
+}
+
 /// The extension in lower case, or nothing.
 pub(in crate::source) fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
@@ -77,6 +86,7 @@ pub(in crate::source) fn extension(path: &Path) -> String {
 /// Reads the header of a file of frames and checks its size.
 pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
     let format = match Format::by_name(path) {
+        _ if path.is_dir() && zarr_metadata(path).is_some() => Some(Format::Zarr),
         None if options.dims.is_none() => Format::by_content(path)?,
         format => format,
     };
@@ -89,6 +99,13 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
         Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
+        #[cfg(feature = "zarr")]
+        Some(Format::Zarr) => arrays::describe_zarr(path, options),
+        #[cfg(not(feature = "zarr"))]
+        Some(Format::Zarr) => {
+            let what = "Zarr is not built in; cargo build --release --features zarr does that";
+            Err(Error::input(path, what))
+        }
         Some(Format::Pvd) => Err(Error::usage(format!("{}: a .pvd must be the only input", path.display()))),
         Some(Format::Coefficients) => {
             Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
@@ -111,7 +128,7 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
         (options.big_endian, "--endian"),
         (options.offset > 0, "--offset"),
         (options.variable.is_some() && !format.has_variables(), "--variable"),
-        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf), "--axes"),
+        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "--axes"),
     ];
     match given.into_iter().find(|(given, _)| *given) {
         Some((_, "--variable")) => {

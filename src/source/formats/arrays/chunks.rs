@@ -1,6 +1,6 @@
 //! Reads a variable chunk by chunk, each once.
 
-use super::{ArrayFile, How, Open, Variable};
+use super::{ArrayFile, Opener, Variable};
 use crate::error::{Error, Result};
 use crate::sample::SampleType;
 use crate::source::Parsed;
@@ -26,30 +26,22 @@ pub(super) struct Chunks {
     together: usize,
     /// The axis that is cut, and into pieces of what length, so that one of them is no more than may be held.
     cut: (usize, usize),
-    open: Open,
-    how: How,
+    opener: Opener,
     /// The file, while frames are taken.
     file: Option<Box<dyn ArrayFile>>,
 }
 
-/// A chunk that is too large, by its bytes and those that it may have.
-pub(super) struct TooLarge(usize, usize);
+/// Of what a program may take, chunks as they are decoded have about this part.
+const SHARE: usize = 16;
 
-impl TooLarge {
-    pub(super) fn of(self, path: &Path) -> Error {
-        let Self(bytes, memory) = self;
-        let needed = (bytes as f64 / memory as f64 * 16.0 * memory as f64 / f64::from(1 << 20)).ceil();
-        Error::usage(format!("{}: is in chunks of {bytes} bytes: --memory {needed}MiB holds them", path.display()))
-    }
+/// The error of a chunk that is too large.
+fn too_large(path: &Path, bytes: usize) -> Error {
+    let needed = bytes.saturating_mul(SHARE).div_ceil(1 << 20);
+    Error::usage(format!("{}: is in chunks of {bytes} bytes: --memory {needed}MiB holds them", path.display()))
 }
 
 impl Chunks {
-    pub(super) fn new(
-        variable: &Variable,
-        counts: &[Counts],
-        order: Vec<usize>,
-        (open, how): (Open, How),
-    ) -> std::result::Result<Self, TooLarge> {
+    pub(super) fn new(variable: &Variable, counts: &[Counts], order: Vec<usize>, opener: &Opener) -> Result<Self> {
         let sample = variable.sample.clone().unwrap_or(SampleType::F64);
         let chunk = |axis: usize| variable.chunk.as_ref().map_or(1, |c| c[axis].clamp(1, variable.lengths[axis]));
         let of_frames = counts.iter().position(|c| *c == Counts::Frames);
@@ -69,12 +61,23 @@ impl Chunks {
         };
         let plane: usize = (0..counts.len()).filter(|i| *i != axis).map(of_axis).product::<usize>() * sample.size();
         let whole: usize = (0..counts.len()).map(chunk).product::<usize>() * sample.size();
-        if whole > how.memory {
-            return Err(TooLarge(whole, how.memory));
+        let memory = opener.how.memory;
+        if whole > memory {
+            return Err(too_large(&opener.path, whole));
         }
-        let piece = (how.memory / plane.max(1)).next_multiple_of(chunk(axis)).max(chunk(axis));
+        let piece = (memory / plane.max(1)).next_multiple_of(chunk(axis)).max(chunk(axis));
         let (path, lengths, counts) = (variable.path.clone(), variable.lengths.clone(), counts.to_vec());
-        Ok(Self { path, sample, lengths, counts, order, together, cut: (axis, piece), open, how, file: None })
+        Ok(Self {
+            path,
+            sample,
+            lengths,
+            counts,
+            order,
+            together,
+            cut: (axis, piece),
+            opener: opener.clone(),
+            file: None,
+        })
     }
 
     /// How the frames that are read together are held.
@@ -129,7 +132,7 @@ impl Decode for Chunks {
     fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
         let file = match self.file.take() {
             Some(file) => file,
-            None => (self.open)(path, self.how)?,
+            None => self.opener.open()?,
         };
         let (axis, piece) = self.cut;
         let stored = self.order.get(frames.start).map_or(frames.clone(), |at| *at..*at + 1);

@@ -12,6 +12,8 @@ mod openpmd;
 mod places;
 mod values;
 mod vtkhdf;
+#[cfg(feature = "zarr")]
+mod zarr;
 
 use super::component;
 use crate::error::{Error, Result};
@@ -107,9 +109,6 @@ trait ArrayFile: Send {
     }
 }
 
-/// Opens a file of arrays.
-type Open = fn(&Path, How) -> Result<Box<dyn ArrayFile>>;
-
 /// How a file is read.
 #[derive(Debug, Clone, Copy)]
 struct How {
@@ -118,20 +117,46 @@ struct How {
     memory: usize,
 }
 
+/// What opens a file of arrays, as often as it is asked.
+#[derive(Debug, Clone)]
+struct Opener {
+    path: PathBuf,
+    how: How,
+    open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>,
+}
+
+impl Opener {
+    fn new(path: &Path, open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>, options: &OpenOptions) -> Self {
+        let how = How { access: options.access, memory: options.memory / SHARE };
+        Self { path: path.into(), how, open }
+    }
+
+    fn open(&self) -> Result<Box<dyn ArrayFile>> {
+        (self.open)(&self.path, self.how)
+    }
+}
+
 /// Reads what an HDF5 file holds.
 pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<Described> {
-    describe(path, hdf5::open, options)
+    describe(&Opener::new(path, hdf5::open, options), path, options)
 }
 
 /// Reads what a NetCDF file holds.
 pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<Described> {
-    describe(path, netcdf::open, options)
+    describe(&Opener::new(path, netcdf::open, options), path, options)
 }
 
-fn describe(path: &Path, open: Open, options: &OpenOptions) -> Result<Described> {
-    let state = FileBytes::open(path, Access::Read)?.state();
-    let how = How { access: options.access, memory: options.memory / SHARE };
-    let file = open(path, how)?;
+/// Reads what a Zarr store, a folder, holds.
+#[cfg(feature = "zarr")]
+pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<Described> {
+    let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
+    describe(&Opener::new(path, zarr::open, options), &metadata, options)
+}
+
+/// Reads what is there; it changes when the file `watched` does.
+fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<Described> {
+    let (path, state) = (opener.path.as_path(), FileBytes::open(watched, Access::Read)?.state());
+    let file = opener.open()?;
     let refused = |e| Error::input(path, e);
     let mut all = file.variables().map_err(refused)?;
     let image = vtkhdf::Image::of(file.as_ref(), &all).map_err(refused)?;
@@ -148,9 +173,8 @@ fn describe(path: &Path, open: Open, options: &OpenOptions) -> Result<Described>
     let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
     let mut parts = Vec::new();
     for found in &found {
-        let chunks =
-            Chunks::new(&found.variable, &found.counts, found.order.clone(), (open, how)).map_err(|e| e.of(path))?;
-        parts.push(found.part((path, state), chunks).map_err(refused)?);
+        let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), opener)?;
+        parts.push(found.part((watched, state), chunks).map_err(refused)?);
     }
     let mut described = joined(found, parts).map_err(refused)?;
     let times = openpmd::times(file.as_ref(), &choice);

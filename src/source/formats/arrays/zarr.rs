@@ -1,0 +1,157 @@
+//! Zarr stores of versions 2 and 3, as [`super::ArrayFile`].
+
+use super::{ArrayFile, Attribute, Attributes, How, Variable};
+use crate::error::{Error, Result};
+use crate::sample::SampleType;
+use crate::source::Parsed;
+use serde_json::Value;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+use zarrs::array::{Array, ArrayBytes, ArrayMetadata, ArrayShardedExt, ArraySubset, DataType, data_type};
+use zarrs::filesystem::FilesystemStore;
+use zarrs::group::Group;
+
+const MOST_DEPTH: usize = 16;
+
+/// Opens a folder.
+pub(super) fn open(path: &Path, _how: How) -> Result<Box<dyn ArrayFile>> {
+    let store = FilesystemStore::new(path);
+    Ok(Box::new(Opened(Arc::new(store.map_err(|e| Error::input(path, format!("is no Zarr store: {e}")))?))))
+}
+
+struct Opened(Arc<FilesystemStore>);
+
+impl ArrayFile for Opened {
+    fn variables(&self) -> Parsed<Vec<Variable>> {
+        if let Ok(array) = Array::open(self.0.clone(), "/") {
+            return Ok(vec![variable(&array)]);
+        }
+        let root = Group::open(self.0.clone(), "/").map_err(|e| format!("is no Zarr store that can be read: {e}"))?;
+        let mut all = Vec::new();
+        add(&root, 0, &mut all)?;
+        Ok(all)
+    }
+
+    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+        let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
+        let ranges: Vec<_> = ranges.iter().map(|r| r.start as u64..r.end as u64).collect();
+        let bytes = array.retrieve_array_subset::<ArrayBytes<'_>>(&ArraySubset::new_with_ranges(&ranges));
+        let bytes = bytes.map_err(|e| e.to_string())?.into_fixed().map_err(|e| e.to_string())?;
+        let mut bytes = bytes.into_owned();
+        if cfg!(target_endian = "big") {
+            crate::sample::swap_endian(sample, &mut bytes);
+        }
+        Ok(bytes)
+    }
+
+    fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
+        let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
+        let all = array.subset_all();
+        macro_rules! any_of {
+            ($($ty:ty),*) => {$(
+                if let Ok(numbers) = array.retrieve_array_subset::<Vec<$ty>>(&all) {
+                    return Ok(numbers.into_iter().map(|n| n as f64).collect());
+                }
+            )*};
+        }
+        any_of!(f64, f32, i64, i32, u64, u32, i16, u16, i8, u8);
+        Err(format!("{path} is of type {}, which is no number", array.data_type()))
+    }
+}
+
+fn add(group: &Group<FilesystemStore>, depth: usize, all: &mut Vec<Variable>) -> Parsed<()> {
+    if depth > MOST_DEPTH {
+        return Ok(());
+    }
+    for node in group.child_paths().map_err(|e| e.to_string())? {
+        let store = group.storage();
+        match Array::open(store.clone(), node.as_str()) {
+            Ok(array) => all.push(variable(&array)),
+            Err(e) => match Group::open(store, node.as_str()) {
+                Ok(group) => add(&group, depth + 1, all)?,
+                Err(_) => all.push(unread(node.as_str(), e.to_string())),
+            },
+        }
+    }
+    Ok(())
+}
+
+/// An array that cannot be read, and why.
+fn unread(path: &str, why: String) -> Variable {
+    let (lengths, dims) = (Vec::new(), Vec::new());
+    Variable { path: path.into(), sample: Err(why), lengths, dims, chunk: None, attributes: Attributes::new() }
+}
+
+fn variable(array: &Array<FilesystemStore>) -> Variable {
+    let length = |n: &u64| usize::try_from(*n).unwrap_or(usize::MAX);
+    let lengths: Vec<usize> = array.shape().iter().map(length).collect();
+    let of_shard = array.effective_subchunk_shape();
+    let first = vec![0; lengths.len()];
+    let chunk = of_shard.or_else(|| array.chunk_shape(&first).ok());
+    let chunk = chunk.map(|chunk| chunk.iter().map(|n| length(&n.get())).collect());
+    let mut variable = Variable {
+        path: array.path().as_str().into(),
+        sample: sample_type(array.data_type()),
+        dims: vec![String::new(); lengths.len()],
+        lengths,
+        chunk,
+        attributes: attributes(array),
+    };
+    let of_version_2 = variable.attributes.remove("_ARRAY_DIMENSIONS");
+    let of_version_3 = array.dimension_names().clone().unwrap_or_default().into_iter().map(Option::unwrap_or_default);
+    let names = match of_version_2 {
+        Some(Attribute::Texts(names)) => names,
+        Some(Attribute::Text(name)) => vec![name],
+        _ => of_version_3.collect(),
+    };
+    variable.dims.iter_mut().zip(names).for_each(|(dim, name)| *dim = name);
+    variable
+}
+
+/// What is said of an array. In version 2 xarray keeps what stands for missing samples as the array's fill value alone.
+fn attributes(array: &Array<FilesystemStore>) -> Attributes {
+    let mut found: Attributes =
+        array.attributes().iter().filter_map(|(name, value)| Some((name.clone(), attribute(value)?))).collect();
+    if let ArrayMetadata::V2(metadata) = array.metadata()
+        && found.contains_key("_ARRAY_DIMENSIONS")
+        && !found.contains_key("_FillValue")
+        && let Some(value) = serde_json::to_value(&metadata.fill_value).ok().as_ref().and_then(attribute)
+    {
+        found.insert("_FillValue".into(), value);
+    }
+    found
+}
+
+/// A value as JSON says it; what is neither a text nor numbers is left out.
+fn attribute(value: &Value) -> Option<Attribute> {
+    let number = |value: &Value| match value.as_str() {
+        Some("NaN") => Some(f64::NAN),
+        _ => value.as_f64(),
+    };
+    Some(match value {
+        Value::Array(all) if all.iter().all(Value::is_string) => {
+            Attribute::Texts(all.iter().filter_map(|text| Some(text.as_str()?.to_string())).collect())
+        }
+        Value::Array(all) => Attribute::Numbers(all.iter().map(number).collect::<Option<_>>()?),
+        value => match number(value) {
+            Some(number) => Attribute::Numbers(vec![number]),
+            None => Attribute::Text(value.as_str()?.into()),
+        },
+    })
+}
+
+fn sample_type(ty: &DataType) -> Parsed<SampleType> {
+    let types = [
+        (data_type::uint8(), SampleType::U8),
+        (data_type::int8(), SampleType::I8),
+        (data_type::uint16(), SampleType::U16),
+        (data_type::int16(), SampleType::I16),
+        (data_type::uint32(), SampleType::U32),
+        (data_type::int32(), SampleType::I32),
+        (data_type::float16(), SampleType::F16),
+        (data_type::float32(), SampleType::F32),
+        (data_type::float64(), SampleType::F64),
+    ];
+    types.into_iter().find(|(of, _)| of == ty).map(|(_, sample)| sample).ok_or_else(|| ty.to_string())
+}
