@@ -1,5 +1,9 @@
 //! Results out: to standard output, or to a file whose final name exists only when it is complete.
 
+mod names;
+
+pub use names::{Numbered, names_of_views};
+
 use crate::error::{Error, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, Permissions, TryLockError};

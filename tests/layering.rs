@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// Where each third-party crate is at home: `src/` and then one of these.
-const HOMES: [(&str, &[&str]); 15] = [
+const HOMES: [(&str, &[&str]); 19] = [
     ("memmap2::", &["mapped.rs"]),
     ("libc::", &["mapped.rs"]),
     ("crossbeam::", &["convert/"]),
@@ -29,7 +29,7 @@ const HOMES: [(&str, &[&str]); 15] = [
             "render/canvas.rs",
             "render/plan.rs",
             "render/weights.rs",
-            "extract.rs",
+            "extract/mod.rs",
             "file.rs",
             "verify.rs",
             "cli/mod.rs",
@@ -44,7 +44,11 @@ const HOMES: [(&str, &[&str]); 15] = [
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),
     ("npyz::", &["npy.rs", "source/formats/npy.rs"]),
-    ("quick_xml::", &["source/formats/"]),
+    ("quick_xml::", &["source/formats/", "extract/vti.rs"]),
+    ("flate2::", &["source/formats/"]),
+    ("hdf5_reader::", &["source/formats/arrays/"]),
+    ("netcdf_reader::", &["source/formats/arrays/"]),
+    ("zarrs::", &["source/formats/arrays/"]),
     ("half::", &["sample.rs", "bound.rs"]),
 ];
 

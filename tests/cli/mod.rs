@@ -10,6 +10,7 @@ mod damage;
 mod errors;
 mod extract;
 mod faults;
+mod formats_out;
 mod help;
 mod job;
 mod killed;

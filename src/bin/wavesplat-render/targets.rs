@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use wavesplat::error::{Error, Result};
-use wavesplat::output::STANDARD;
+use wavesplat::output::{STANDARD, names_of_views};
 use wavesplat::render::RenderConfig;
-use wavesplat::render::sink::{Depth, PictureFormat, names_of_views};
+use wavesplat::render::sink::{Depth, PictureFormat};
 
 /// Where pictures go: a name for each view, or one for all.
 pub(crate) struct Targets {

@@ -1,14 +1,14 @@
 //! `wavesplat extract`
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
 use wavesplat::error::{Error, Result};
-use wavesplat::extract::{ExtractConfig, check_memory, extract};
+use wavesplat::extract::{Contents, ExtractConfig, ExtractReport, Files, SampleFormat, Sink, check_memory, extract_to};
 use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
-use wavesplat::npy;
-use wavesplat::output::{Output, STANDARD};
+use wavesplat::output::STANDARD;
 use wavesplat::source::CHANNELS;
 
 /// Decode frames back to samples
@@ -18,12 +18,22 @@ Examples:
   wavesplat extract run.wspl -o run.npy
   wavesplat extract run.wspl --frames 10:20 --region 0:32,:,5:6 -o part.npy
   wavesplat extract run.wspl -o - --format raw | python analyse.py
+  wavesplat extract run.wspl -o run.pvd
+  wavesplat extract run.wspl -o run.nc
   wavesplat extract coloured.wspl --channel red -o red.npy
-The samples keep their type. An .npy holds (frames, z, y, x), with one header for all frames.")]
+Formats, by the ending of OUT:
+  .npy   NumPy array (frames, z, y, x), with one header for all frames
+  .raw   the samples alone, little-endian
+  .nrrd  NRRD of x y z t, of one frame x y z; .nhdr: its header, with the samples in a .raw beside it
+  .vti   VTK's image data: one file for each frame, numbered as in out_%04d.vti
+  .pvd   ParaView's list of .vti files and their times; they are in a folder beside it
+  .nc    NetCDF (time, z, y, x) with times and positions: CDF-2, of unsigned samples CDF-5
+The samples keep their type, but f16 becomes f32 where a format lacks it. Places, times and units go with them where the
+format has room for these.")]
 pub(crate) struct ExtractArgs {
     /// Coefficient file
     file: PathBuf,
-    /// File to write, or - for standard output
+    /// File to write, a pattern as out_%04d.vti where each frame has its own, or - for standard output
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Replace an existing file
@@ -38,9 +48,9 @@ pub(crate) struct ExtractArgs {
     /// Of a file of colours: red, green or blue
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
-    /// npy or raw [default: by the ending of OUT; npy for -]
-    #[arg(long, value_enum)]
-    format: Option<Format>,
+    /// npy raw nrrd nhdr vti pvd nc [default: by the ending of OUT; npy for -]
+    #[arg(long, value_parser = parse_format)]
+    format: Option<SampleFormat>,
     /// Take damaged and lost blocks for missing samples (NaN, or the declared value, or 0) and give the rest; exit code 3
     #[arg(long)]
     skip_damaged: bool,
@@ -51,12 +61,13 @@ pub(crate) struct ExtractArgs {
     common: CommonArgs,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// NumPy array
-    Npy,
-    /// Samples alone, little-endian
-    Raw,
+/// What `--json` says.
+#[derive(Debug, Serialize)]
+struct Extracted {
+    #[serde(flatten)]
+    report: ExtractReport,
+    /// The files that were written, - for standard output.
+    files: Vec<PathBuf>,
 }
 
 pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
@@ -74,20 +85,20 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
         memory: args.common.memory.0,
     };
     check_memory(&file, &config)?;
-    spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
-    let mut out = Output::create(&args.output, args.force)?;
-    if format == Format::Npy {
-        let [x, y, z] = config.region.dims();
-        let header = npy::write_header(file.sample(), &[config.frames.len(), z, y, x], &mut out);
-        header.map_err(|e| Error::io(&args.output, "writing", e))?;
-    }
-    let report = extract(&file, &config, &args.output, &mut out, &args.common.progress("frames"))?;
-    out.commit()?;
+    let contents = Contents::new(&file, &config);
+    let files = Files::new(&args.output, format, &config.frames)?;
+    files.paths().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
+    let paths: Vec<PathBuf> = files.paths().map(Path::to_path_buf).collect();
+    let mut sink = Sink::create(files, &contents, args.force)?;
+    format.notes(&contents).iter().for_each(|note| args.common.note(note));
+    let progress = args.common.progress("frames");
+    let report = extract_to(&file, &config, &mut |samples| sink.write(samples), &progress)?;
+    sink.finish()?;
     args.common.detail(format_args!(
         "{} bytes were read of the file, which has {}",
         report.file_bytes_read, report.file_bytes
     ));
-    args.common.report(&report, args.output == Path::new(STANDARD))?;
+    args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
 }
 
@@ -116,11 +127,18 @@ fn parse_channel(text: &str) -> std::result::Result<usize, String> {
     found.ok_or_else(|| format!("one of {}", CHANNELS.join(", ")))
 }
 
-fn format_of(path: &Path) -> Result<Format> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("npy") => Ok(Format::Npy),
-        Some("raw" | "bin") => Ok(Format::Raw),
-        None if path == Path::new(STANDARD) => Ok(Format::Npy),
-        _ => Err(Error::usage(format!("{}: the ending says neither .npy nor .raw; give --format", path.display()))),
+fn parse_format(text: &str) -> std::result::Result<SampleFormat, String> {
+    let found = SampleFormat::NAMES.into_iter().find(|(name, _)| *name == text);
+    found
+        .map(|(_, format)| format)
+        .ok_or_else(|| format!("one of {}", SampleFormat::NAMES.map(|(name, _)| name).join(" ")))
+}
+
+fn format_of(path: &Path) -> Result<SampleFormat> {
+    if path == Path::new(STANDARD) {
+        return Ok(SampleFormat::Npy);
     }
+    let formats = SampleFormat::NAMES.map(|(name, _)| format!(".{name}")).join(" ");
+    let what = || format!("{}: the ending is none of {formats}; rename it or give --format", path.display());
+    SampleFormat::of_ending(path).ok_or_else(|| Error::usage(what()))
 }

@@ -3,20 +3,17 @@
 
 mod exr;
 mod made;
-mod names;
 mod png;
 mod sheet;
 mod stream;
 
 pub use made::{Made, Shows};
-pub use names::names_of_views;
 
 use super::annotate::Annotation;
 use super::{Picture, Pixel, Rendered};
 use crate::colour::{Rgb, Scale};
 use crate::error::{Error, Result};
-use crate::output::{Output, STANDARD};
-use names::Numbered;
+use crate::output::{Numbered, Output, STANDARD};
 use png::Animation;
 use sheet::Sheet;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,16 @@
-//! A coefficient file back to samples: any frames, any region, without reading the rest.
+//! A coefficient file back to samples: any frames, any region, without reading the rest; and into files of other programs.
+
+mod contents;
+mod encoding;
+mod format;
+mod netcdf;
+mod nrrd;
+mod sink;
+mod vti;
+
+pub use contents::Contents;
+pub use format::SampleFormat;
+pub use sink::{Files, Sink};
 
 use crate::codec::WindowCodec;
 use crate::error::{Error, Result};
@@ -54,13 +66,24 @@ pub fn extract(
     out: &mut dyn Write,
     progress: &dyn Progress,
 ) -> Result<ExtractReport> {
+    let mut write = |samples: &[u8]| out.write_all(samples).map_err(|e| Error::io(name, "writing", e));
+    extract_to(file, config, &mut write, progress)
+}
+
+/// As [`extract`]; `write` is given the samples in pieces: whole frames, or some of one frame.
+pub fn extract_to(
+    file: &CoefficientFile,
+    config: &ExtractConfig,
+    write: &mut dyn FnMut(&[u8]) -> Result<()>,
+    progress: &dyn Progress,
+) -> Result<ExtractReport> {
     progress.start(Some(config.frames.len() as u64));
     let mut report = ExtractReport::default();
     let pieces = Pieces::new(file, config)?;
     let mut bytes = Vec::new();
     for piece in pieces.list(file, config) {
         read_piece(file, config.channel, &piece, pieces.blocks, &mut bytes, &mut report)?;
-        out.write_all(&bytes).map_err(|e| Error::io(name, "writing", e))?;
+        write(&bytes)?;
         report.bytes += bytes.len() as u64;
         if piece.region.end[2] == config.region.end[2] {
             report.frames += piece.frames.len();

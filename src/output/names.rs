@@ -1,28 +1,29 @@
 //! Names of files, by frame and by view.
 
+use super::STANDARD;
 use crate::error::{Error, Result};
-use crate::output::STANDARD;
 use std::path::{Path, PathBuf};
 
-/// Names of numbered files.
+/// Names of numbered files, a frame in each.
 #[derive(Debug)]
-pub(super) struct Numbered {
+pub struct Numbered {
     before: String,
     after: String,
     /// Digits of the number; none: there is but one file.
-    pub(super) digits: Option<usize>,
+    pub digits: Option<usize>,
 }
 
 impl Numbered {
-    /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one picture.
-    pub(super) fn new(path: &Path, frames: usize) -> Result<Self> {
+    /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one frame.
+    pub fn new(path: &Path, frames: usize) -> Result<Self> {
         let name = path.to_string_lossy().into_owned();
         let Some((before, digits, after)) = place_of_number(&name, 'd') else {
             if name.contains('%') {
                 return Err(misplaced(&name));
             }
             if frames != 1 {
-                let what = format!("{name}: {frames} frames need a numbered name, as frame_%04d.png");
+                let ending = path.extension().unwrap_or_default().to_string_lossy();
+                let what = format!("{name}: {frames} frames need a numbered name, as frame_%04d.{ending}");
                 return Err(Error::usage(what));
             }
             return Ok(Self { before: name, after: String::new(), digits: None });
@@ -34,7 +35,7 @@ impl Numbered {
     }
 
     /// The name of a frame's file.
-    pub(super) fn of(&self, frame: usize) -> PathBuf {
+    pub fn of(&self, frame: usize) -> PathBuf {
         match self.digits {
             Some(digits) => format!("{}{frame:0digits$}{}", self.before, self.after).into(),
             None => PathBuf::from(&self.before),

@@ -1,0 +1,118 @@
+//! What is extracted, in words for which every format has some place.
+
+use super::ExtractConfig;
+use crate::file::{CoefficientFile, setting};
+use crate::sample::{SampleType, missing_value, round_to};
+use crate::source::CHANNELS;
+use crate::volume::Grid;
+
+/// How far a regular time may be from where it should be, in steps.
+const REGULAR: f64 = 1e-6;
+
+/// What the header of a file of samples can tell of them.
+#[derive(Debug, Clone)]
+pub struct Contents {
+    /// The lattice of the extracted region.
+    pub grid: Grid,
+    /// The type of the samples.
+    pub sample: SampleType,
+    /// The number of each frame in the coefficient file.
+    pub frames: Vec<usize>,
+    /// The time of each frame; its number where the file has no times.
+    pub times: Vec<f64>,
+    /// Whether times are numbers of frames.
+    pub numbered: bool,
+    /// Name of the variable, without control characters, as all texts here.
+    pub name: String,
+    /// Units of the samples.
+    pub units: Option<String>,
+    /// Units of times.
+    pub time_units: Option<String>,
+    /// Units of positions.
+    pub space_units: Option<String>,
+    /// What marks a missing sample, if some may be missing: a number of the samples' type, or NaN.
+    pub missing: Option<f64>,
+}
+
+impl Contents {
+    /// What a file says of what is extracted from it.
+    pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Self {
+        let m = file.metadata();
+        let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
+        let channel = file.painter().map(|_| CHANNELS[config.channel]);
+        let name = channel.or(m.variable.as_deref()).map(plain).filter(|name| !name.is_empty());
+        let numbered = m.times.is_empty();
+        let time = |frame: &usize| if numbered { *frame as f64 } else { m.times[*frame] };
+        Self {
+            grid: file.grid.crop(&config.region),
+            sample: file.sample(),
+            frames: config.frames.clone(),
+            times: config.frames.iter().map(time).collect(),
+            numbered,
+            name: name.unwrap_or_else(|| "values".into()),
+            units: text("units").filter(|_| channel.is_none()),
+            time_units: text("time-units").filter(|_| !numbered),
+            space_units: text("space-units"),
+            missing: missing(file, config),
+        }
+    }
+
+    /// The first time and the step to each next one, if all steps are the same.
+    pub(super) fn regular_times(&self) -> Option<(f64, f64)> {
+        let [first, .., last] = self.times[..] else { return None };
+        let step = (last - first) / (self.times.len() - 1) as f64;
+        let is_near = |(i, time): (usize, &f64)| (first + step * i as f64 - time).abs() <= REGULAR * step;
+        (step > 0.0 && self.times.iter().enumerate().all(is_near)).then_some((first, step))
+    }
+
+    /// Samples of one frame.
+    pub(super) fn voxels(&self) -> u64 {
+        self.grid.dims.iter().fold(1, |n: u64, dim| n.saturating_mul(*dim as u64))
+    }
+}
+
+/// What marks missing samples: what is declared to, or NaN if some are missing.
+fn missing(file: &CoefficientFile, config: &ExtractConfig) -> Option<f64> {
+    let ty = file.sample();
+    if let Some(declared) = missing_value(ty, file.metadata().missing_value) {
+        return (ty.is_float() || round_to(ty, declared) == declared).then_some(declared);
+    }
+    let any = config.frames.iter().any(|frame| file.has_missing(file.window_of(*frame)));
+    (any && ty.is_float()).then_some(f64::NAN)
+}
+
+/// Text for one line of a header.
+fn plain(text: &str) -> String {
+    text.trim().chars().filter(|c| !c.is_control()).collect()
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use super::*;
+
+    /// Three frames of 5 x 4 x 3 voxels, with all units.
+    pub(in crate::extract) fn contents() -> Contents {
+        Contents {
+            grid: Grid { dims: [5, 4, 3], spacing: [0.5, 2.0, 1.0], origin: [-1.0, 0.0, 7.5] },
+            sample: SampleType::I16,
+            frames: vec![2, 4, 6],
+            times: vec![0.25, 0.5, 0.75],
+            numbered: false,
+            name: "a & \"b\"".into(),
+            units: Some("<K>".into()),
+            time_units: Some("s".into()),
+            space_units: Some("mm".into()),
+            missing: None,
+        }
+    }
+
+    #[test]
+    fn steps_of_times_are_all_the_same_or_none() {
+        let regular = |times: &[f64]| Contents { times: times.to_vec(), ..contents() }.regular_times();
+        assert_eq!(regular(&[0.25, 0.5, 0.75]), Some((0.25, 0.25)));
+        assert_eq!(regular(&[0.0, 0.1, 0.2, 0.30000000000000004]).map(|(_, step)| (step * 1e9).round()), Some(1e8));
+        for irregular in [&[0.0, 0.1, 0.3][..], &[3.0, 2.0, 1.0], &[1.0, 1.0], &[7.0], &[]] {
+            assert_eq!(regular(irregular), None, "{irregular:?}");
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Samples as a format stores them.
+
+use crate::sample::{SampleType, load, store, swap_endian};
+use std::io::{self, Write};
+
+/// Samples that are turned at a time.
+const RUN: usize = 8 << 10;
+
+/// What becomes of samples on their way into a file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Encoding {
+    /// Their type before.
+    pub(super) from: SampleType,
+    /// Their type in the file, which has all numbers of the other.
+    pub(super) to: SampleType,
+    /// Whether the file has their most significant byte first.
+    pub(super) big_endian: bool,
+}
+
+impl Encoding {
+    /// Writes some samples, given little-endian.
+    pub(super) fn write(&self, samples: &[u8], out: &mut impl Write) -> io::Result<()> {
+        if self.from == self.to && !self.big_endian {
+            return out.write_all(samples);
+        }
+        samples.chunks(RUN * self.from.size()).try_for_each(|run| out.write_all(&self.turned(run)))
+    }
+
+    fn turned(&self, run: &[u8]) -> Vec<u8> {
+        let mut bytes = if self.from == self.to { run.to_vec() } else { self.retyped(run) };
+        if self.big_endian {
+            swap_endian(self.to, &mut bytes);
+        }
+        bytes
+    }
+
+    fn retyped(&self, run: &[u8]) -> Vec<u8> {
+        let mut values = vec![0.0; run.len() / self.from.size()];
+        load(self.from, run, &mut values);
+        let mut bytes = vec![0; values.len() * self.to.size()];
+        store(self.to, &values, &mut bytes);
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_keep_their_values() {
+        let values: Vec<f64> = (0..RUN + 3).map(|i| (i % 1000) as f64 - 500.0).collect();
+        let mut samples = vec![0; 2 * values.len()];
+        store(SampleType::F16, &values, &mut samples);
+        for big_endian in [false, true] {
+            let encoding = Encoding { from: SampleType::F16, to: SampleType::F32, big_endian };
+            let mut out = Vec::new();
+            encoding.write(&samples, &mut out).expect("written");
+            let number = |b: &[u8; 4]| if big_endian { b.iter().rev().copied().collect() } else { b.to_vec() };
+            let little: Vec<u8> = out.as_chunks::<4>().0.iter().flat_map(number).collect();
+            let mut back = vec![0.0; values.len()];
+            load(SampleType::F32, &little, &mut back);
+            assert!(back == values);
+        }
+    }
+}

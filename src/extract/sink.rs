@@ -1,0 +1,206 @@
+//! Extracted samples into files.
+
+use super::contents::Contents;
+use super::encoding::Encoding;
+use super::format::SampleFormat;
+use super::{netcdf, nrrd, vti};
+use crate::error::{Error, Result};
+use crate::npy;
+use crate::output::{Numbered, Output, STANDARD};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Which files an extraction writes.
+#[derive(Debug)]
+pub struct Files {
+    format: SampleFormat,
+    /// Files of samples: one for all frames, or one for each.
+    samples: Vec<PathBuf>,
+    /// What leads to those, and is written when they are there.
+    last: Option<PathBuf>,
+}
+
+impl Files {
+    /// Those that `path` stands for: itself, or `-`; a pattern as `out_%04d.vti` if each frame has its own; of a header or a
+    /// list also what is beside it.
+    pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
+        let (samples, last) = match format {
+            SampleFormat::Vti => (numbered(path, frames)?, None),
+            SampleFormat::Pvd => {
+                let pattern = PathBuf::from(format!("{}_%04d.vti", stem(path)?));
+                let folder = path.with_extension("");
+                let names = numbered(&pattern, frames)?.into_iter();
+                (names.map(|name| folder.join(name)).collect(), Some(path.into()))
+            }
+            SampleFormat::Nhdr => {
+                stem(path)?;
+                (vec![path.with_extension("raw")], Some(path.into()))
+            }
+            _ => (vec![path.into()], None),
+        };
+        Ok(Self { format, samples, last })
+    }
+
+    /// All of them, in the order in which they are finished.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.samples.iter().chain(&self.last).map(PathBuf::as_path)
+    }
+
+    /// The folder of files that a list leads to.
+    fn folder(&self) -> Option<&Path> {
+        self.samples[0].parent().filter(|_| self.format == SampleFormat::Pvd)
+    }
+
+    /// An error if one of them cannot be made, as far as can be told without making it.
+    fn check(&self, force: bool) -> Result<()> {
+        if let Some(folder) = self.folder().filter(|folder| !folder.is_dir()) {
+            self.last.iter().try_for_each(|list| Output::check(list, force))?;
+            return if folder.exists() { Err(no_folder(folder)) } else { Ok(()) };
+        }
+        self.paths().filter(|path| *path != Path::new(STANDARD)).try_for_each(|path| match path.metadata() {
+            Ok(other) if !other.is_file() && !other.is_dir() => Ok(()), // a device or a pipe
+            _ => Output::check(path, force),
+        })
+    }
+}
+
+/// A name for each frame.
+fn numbered(path: &Path, frames: &[usize]) -> Result<Vec<PathBuf>> {
+    if path == Path::new(STANDARD) && frames.len() > 1 {
+        return Err(Error::usage(format!("-: standard output takes one .vti, and these are {} frames", frames.len())));
+    }
+    let names = Numbered::new(path, frames.len())?;
+    Ok(frames.iter().map(|frame| names.of(*frame)).collect())
+}
+
+/// The name, without its ending, that is also that of what lies beside the file.
+fn stem(path: &Path) -> Result<String> {
+    let stem = path.file_stem().filter(|_| path != Path::new(STANDARD) && path.extension().is_some());
+    let none =
+        || format!("{}: other files lie beside this one, named after it: name a file with an ending", path.display());
+    stem.map(|stem| stem.to_string_lossy().into_owned()).ok_or_else(|| Error::usage(none()))
+}
+
+fn no_folder(path: &Path) -> Error {
+    Error::usage(format!("{}: must be a folder, for the files of frames; it is a file", path.display()))
+}
+
+/// A folder that goes away if nothing is in it.
+#[derive(Debug)]
+struct Folder(PathBuf);
+
+impl Folder {
+    fn create(path: &Path) -> Result<Self> {
+        match fs::create_dir(path) {
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => Err(Error::io(path, "creating the folder", e)),
+            _ => Ok(Self(path.into())),
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir(&self.0); // which fails if it is of use
+    }
+}
+
+/// Where samples go.
+#[derive(Debug)]
+pub struct Sink<'a> {
+    contents: &'a Contents,
+    files: Files,
+    force: bool,
+    encoding: Encoding,
+    /// The file that is being written, and how many bytes of samples it is yet to be given.
+    open: Option<(Output, u64)>,
+    /// Files of samples that were begun.
+    begun: usize,
+    _folder: Option<Folder>, // after the file: it is gone by then
+}
+
+impl<'a> Sink<'a> {
+    /// Opens the first of the files; existing ones are an error unless `force` replaces them.
+    pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
+        files.check(force)?;
+        let folder = files.folder().map(Folder::create).transpose()?;
+        let encoding = files.format.encoding(contents.sample);
+        let mut sink = Self { contents, files, force, encoding, open: None, begun: 0, _folder: folder };
+        sink.begin()?;
+        Ok(sink)
+    }
+
+    /// Takes the next samples, little-endian.
+    pub fn write(&mut self, mut samples: &[u8]) -> Result<()> {
+        while !samples.is_empty() {
+            if self.open.is_none() {
+                self.begin()?;
+            }
+            let (out, left) = self.open.as_mut().expect("just begun");
+            let (these, others) = samples.split_at((*left).min(samples.len() as u64) as usize);
+            self.encoding.write(these, out).map_err(|e| Error::io(out.path(), "writing", e))?;
+            *left -= these.len() as u64;
+            if *left == 0 {
+                self.end()?;
+            }
+            samples = others;
+        }
+        Ok(())
+    }
+
+    /// Writes what leads to the files of samples, if there is such a file.
+    pub fn finish(self) -> Result<()> {
+        let Some(path) = &self.files.last else { return Ok(()) };
+        let mut out = Output::create(path, self.force)?;
+        self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
+        out.commit()
+    }
+
+    /// Opens the next file and writes what precedes its samples.
+    fn begin(&mut self) -> Result<()> {
+        let path = &self.files.samples[self.begun];
+        let frames = self.contents.frames.len() / self.files.samples.len();
+        let bytes = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
+        let mut out = Output::create(path, self.force)?;
+        self.write_header(&mut out).map_err(|e| Error::io(path, "writing", e))?;
+        (self.open, self.begun) = (Some((out, bytes)), self.begun + 1);
+        Ok(())
+    }
+
+    /// Writes what follows the samples and gives the file its name.
+    fn end(&mut self) -> Result<()> {
+        let Some((mut out, _)) = self.open.take() else { return Ok(()) };
+        let end = match self.files.format {
+            SampleFormat::Vti | SampleFormat::Pvd => vti::END.to_vec(),
+            SampleFormat::Netcdf => netcdf::padding(self.contents, self.encoding.to),
+            _ => Vec::new(),
+        };
+        out.write_all(&end).map_err(|e| Error::io(out.path(), "writing", e))?;
+        out.commit()
+    }
+
+    fn write_header(&self, out: &mut Output) -> io::Result<()> {
+        let (contents, ty) = (self.contents, self.encoding.to);
+        match self.files.format {
+            SampleFormat::Npy => {
+                let [x, y, z] = contents.grid.dims;
+                npy::write_header(ty, &[contents.frames.len(), z, y, x], out)
+            }
+            SampleFormat::Nrrd => nrrd::write_header(contents, ty, None, out),
+            SampleFormat::Vti | SampleFormat::Pvd => vti::write_header(contents, ty, contents.times[self.begun], out),
+            SampleFormat::Netcdf => netcdf::write_header(contents, ty, out),
+            SampleFormat::Raw | SampleFormat::Nhdr => Ok(()),
+        }
+    }
+
+    fn write_last(&self, out: &mut Output) -> io::Result<()> {
+        let samples = &self.files.samples;
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if self.files.format == SampleFormat::Nhdr {
+            return nrrd::write_header(self.contents, self.encoding.to, Some(&name(&samples[0])), out);
+        }
+        let folder = self.files.folder().map(name).unwrap_or_default();
+        let within: Vec<String> = samples.iter().map(|path| format!("{folder}/{}", name(path))).collect();
+        vti::write_list(self.contents, &within, out)
+    }
+}

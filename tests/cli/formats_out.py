@@ -1,0 +1,59 @@
+"""xarray and VTK read what `wavesplat extract` wrote into this folder, and find what is in p.npy and u.npy."""
+
+import numpy
+import xarray
+import xml.etree.ElementTree
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOImage import vtkNrrdReader
+from vtkmodules.vtkIONetCDF import vtkNetCDFCFReader
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader
+
+SPACING, ORIGIN, TIMES = (0.5, 0.25, 2.0), (1.5, 2.0, 38.0), (3.375, 3.875, 4.375, 4.875, 5.375)
+expected = numpy.load("p.npy")
+
+
+def check_image(image, frame):
+    samples = vtk_to_numpy(image.GetPointData().GetArray(0))
+    assert (samples.reshape(frame.shape) == frame).all()
+    assert image.GetSpacing() == SPACING and image.GetOrigin() == ORIGIN, (image.GetSpacing(), image.GetOrigin())
+
+
+def check_with_xarray():
+    for engine in ("scipy", "netcdf4"):
+        with xarray.open_dataset("p.nc", engine=engine) as data:
+            values = data["values"]
+            assert values.dims == ("time", "z", "y", "x") and (values == expected).all()
+            assert tuple(data.time.values) == TIMES
+            for name, axis in zip("xyz", range(3)):
+                places = ORIGIN[axis] + SPACING[axis] * numpy.arange(len(data[name]))
+                assert (data[name] == places).all()
+    with xarray.open_dataset("u.nc", engine="netcdf4") as data:
+        assert data["values"].dtype == numpy.uint8 and (data["values"] == numpy.load("u.npy")).all()
+
+
+def check_with_vtk():
+    reader = vtkNetCDFCFReader()
+    reader.SetFileName("p.nc")
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    assert times == TIMES, times
+    for time, frame in zip(times, expected):
+        reader.UpdateTimeStep(time)
+        check_image(reader.GetOutput(), frame)
+    sets = list(xml.etree.ElementTree.parse("p.pvd").getroot().iter("DataSet"))
+    assert tuple(float(item.get("timestep")) for item in sets) == TIMES
+    for item, frame in zip(sets, expected):
+        reader = vtkXMLImageDataReader()
+        reader.SetFileName(item.get("file"))
+        reader.Update()
+        check_image(reader.GetOutput(), frame)
+        assert reader.GetOutput().GetPointData().GetScalars().GetName() == "values"
+    reader = vtkNrrdReader()
+    reader.SetFileName("p.nrrd")
+    reader.Update()
+    check_image(reader.GetOutput(), expected[0])
+
+
+check_with_xarray()
+check_with_vtk()
