@@ -29,9 +29,9 @@
 //!                                           annotate/, sink/; colour/; output.rs
 //! ```
 //!
-//! `extract.rs` takes the same file back to samples, `verify.rs` compares it with its source, `recover.rs` saves what is whole
-//! of a damaged one, and `resume.rs` finds what a conversion can go on with. The programs in `bin/`
-//! turn arguments into configurations and call one function; what they share is `cli/`.
+//! `extract/` takes the same file back to samples, in the formats of other programs too, `verify.rs` compares it with its
+//! source, `recover.rs` saves what is whole of a damaged one, and `resume.rs` finds what a conversion can go on with. The
+//! programs in `bin/` turn arguments into configurations and call one function; what they share is `cli/`.
 //!
 //! # Words
 //!
@@ -54,7 +54,7 @@
 //! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions
 //!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
 //!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/canvas.rs`,
-//!    `render/weights.rs`, `extract.rs`, `verify.rs` and, to find damage, `file.rs`; `render/plan.rs` asks how many there are.
+//!    `render/weights.rs`, `extract/mod.rs`, `verify.rs` and, to find damage, `file.rs`; `render/plan.rs` asks how many there are.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and

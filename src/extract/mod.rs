@@ -49,7 +49,7 @@ pub struct ExtractReport {
     pub file_bytes_read: u64,
     /// Bytes that the file has.
     pub file_bytes: u64,
-    /// Bytes written.
+    /// Bytes of samples, in the type that they have in the file.
     pub bytes: u64,
 }
 

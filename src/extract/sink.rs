@@ -86,15 +86,17 @@ fn no_folder(path: &Path) -> Error {
     Error::usage(format!("{}: must be a folder, for the files of frames; it is a file", path.display()))
 }
 
-/// A folder that goes away if nothing is in it.
+/// A folder that was made for files, and goes away if none is in it.
 #[derive(Debug)]
 struct Folder(PathBuf);
 
 impl Folder {
-    fn create(path: &Path) -> Result<Self> {
+    /// None if there is such a folder already.
+    fn create(path: &Path) -> Result<Option<Self>> {
         match fs::create_dir(path) {
-            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => Err(Error::io(path, "creating the folder", e)),
-            _ => Ok(Self(path.into())),
+            Ok(()) => Ok(Some(Self(path.into()))),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Ok(None),
+            Err(e) => Err(Error::io(path, "creating the folder", e)),
         }
     }
 }
@@ -112,8 +114,10 @@ pub struct Sink<'a> {
     files: Files,
     force: bool,
     encoding: Encoding,
-    /// The file that is being written, and how many bytes of samples it is yet to be given.
-    open: Option<(Output, u64)>,
+    /// The file that is being written.
+    open: Option<Output>,
+    /// Bytes of samples that it is yet to be given.
+    left: u64,
     /// Files of samples that were begun.
     begun: usize,
     _folder: Option<Folder>, // after the file: it is gone by then
@@ -123,9 +127,9 @@ impl<'a> Sink<'a> {
     /// Opens the first of the files; existing ones are an error unless `force` replaces them.
     pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
         files.check(force)?;
-        let folder = files.folder().map(Folder::create).transpose()?;
+        let folder = files.folder().map(Folder::create).transpose()?.flatten();
         let encoding = files.format.encoding(contents.sample);
-        let mut sink = Self { contents, files, force, encoding, open: None, begun: 0, _folder: folder };
+        let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, _folder: folder };
         sink.begin()?;
         Ok(sink)
     }
@@ -133,23 +137,23 @@ impl<'a> Sink<'a> {
     /// Takes the next samples, little-endian.
     pub fn write(&mut self, mut samples: &[u8]) -> Result<()> {
         while !samples.is_empty() {
-            if self.open.is_none() {
+            if self.left == 0 {
+                self.end()?;
                 self.begin()?;
             }
-            let (out, left) = self.open.as_mut().expect("just begun");
-            let (these, others) = samples.split_at((*left).min(samples.len() as u64) as usize);
-            self.encoding.write(these, out).map_err(|e| Error::io(out.path(), "writing", e))?;
-            *left -= these.len() as u64;
-            if *left == 0 {
-                self.end()?;
+            let (these, others) = samples.split_at(self.left.min(samples.len() as u64) as usize);
+            if let Some(out) = &mut self.open {
+                self.encoding.write(these, out).map_err(|e| Error::io(out.path(), "writing", e))?;
             }
+            self.left -= these.len() as u64;
             samples = others;
         }
         Ok(())
     }
 
-    /// Writes what leads to the files of samples, if there is such a file.
-    pub fn finish(self) -> Result<()> {
+    /// Gives the last file of samples its name, and writes what leads to them, if there is such a file.
+    pub fn finish(mut self) -> Result<()> {
+        self.end()?;
         let Some(path) = &self.files.last else { return Ok(()) };
         let mut out = Output::create(path, self.force)?;
         self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
@@ -160,16 +164,16 @@ impl<'a> Sink<'a> {
     fn begin(&mut self) -> Result<()> {
         let path = &self.files.samples[self.begun];
         let frames = self.contents.frames.len() / self.files.samples.len();
-        let bytes = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
         let mut out = Output::create(path, self.force)?;
         self.write_header(&mut out).map_err(|e| Error::io(path, "writing", e))?;
-        (self.open, self.begun) = (Some((out, bytes)), self.begun + 1);
+        self.left = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
+        (self.open, self.begun) = (Some(out), self.begun + 1);
         Ok(())
     }
 
     /// Writes what follows the samples and gives the file its name.
     fn end(&mut self) -> Result<()> {
-        let Some((mut out, _)) = self.open.take() else { return Ok(()) };
+        let Some(mut out) = self.open.take() else { return Ok(()) };
         let end = match self.files.format {
             SampleFormat::Vti | SampleFormat::Pvd => vti::END.to_vec(),
             SampleFormat::Netcdf => netcdf::padding(self.contents, self.encoding.to),
@@ -200,7 +204,7 @@ impl<'a> Sink<'a> {
             return nrrd::write_header(self.contents, self.encoding.to, Some(&name(&samples[0])), out);
         }
         let folder = self.files.folder().map(name).unwrap_or_default();
-        let within: Vec<String> = samples.iter().map(|path| format!("{folder}/{}", name(path))).collect();
-        vti::write_list(self.contents, &within, out)
+        let within = samples.iter().map(|path| format!("{folder}/{}", name(path)));
+        vti::write_list(self.contents, within, out)
     }
 }

@@ -41,13 +41,17 @@ fn units(contents: &Contents) -> String {
 }
 
 /// Writes the list of the files of all frames, by their names from the list's folder, with their times.
-pub(super) fn write_list(contents: &Contents, names: &[String], out: &mut impl Write) -> io::Result<()> {
+pub(super) fn write_list(
+    contents: &Contents,
+    names: impl Iterator<Item = String>,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let start = r#"<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
   <Collection>"#;
     writeln!(out, "{start}")?;
     for (time, name) in contents.times.iter().zip(names) {
-        writeln!(out, r#"    <DataSet timestep="{time}" part="0" file="{}"/>"#, escape(name))?;
+        writeln!(out, r#"    <DataSet timestep="{time}" part="0" file="{}"/>"#, escape(&name))?;
     }
     writeln!(out, "  </Collection>\n</VTKFile>")
 }
@@ -62,5 +66,34 @@ fn name_of(ty: SampleType) -> &'static str {
         SampleType::I32 => "Int32",
         SampleType::F16 | SampleType::F32 => "Float32",
         SampleType::F64 => "Float64",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::contents::testing::contents;
+    use super::*;
+
+    #[test]
+    fn names_and_units_are_escaped() {
+        let mut bytes = Vec::new();
+        write_header(&contents(), SampleType::I16, 0.25, &mut bytes).expect("written");
+        let (text, count) = bytes.split_at(bytes.len() - 8);
+        let text = std::str::from_utf8(text).expect("text");
+        for words in [
+            r#"Scalars="a &amp; &quot;b&quot;""#,
+            r#"type="Int16" Name="a &amp; &quot;b&quot;""#,
+            ">&lt;K&gt;</InformationKey>",
+            r#"WholeExtent="0 4 0 3 0 2" Origin="-1 0 7.5" Spacing="0.5 2 1""#,
+            ">0.25</DataArray>",
+        ] {
+            assert!(text.contains(words), "{words} in\n{text}");
+        }
+        assert!(text.ends_with('_') && *count == [120, 0, 0, 0, 0, 0, 0, 0], "{count:?}");
+        let mut list = Vec::new();
+        let names = ["a&b/1.vti", "a&b/2.vti", "a&b/3.vti"].map(String::from);
+        write_list(&contents(), names.into_iter(), &mut list).expect("written");
+        let list = String::from_utf8(list).expect("text");
+        assert!(list.contains(r#"timestep="0.75" part="0" file="a&amp;b/3.vti""#), "{list}");
     }
 }
