@@ -28,10 +28,8 @@ impl Files {
         let (samples, last) = match format {
             SampleFormat::Vti => (numbered(path, frames)?, None),
             SampleFormat::Pvd => {
-                let pattern = PathBuf::from(format!("{}_%04d.vti", stem(path)?));
-                let folder = path.with_extension("");
-                let names = numbered(&pattern, frames)?.into_iter();
-                (names.map(|name| folder.join(name)).collect(), Some(path.into()))
+                let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, "vti"));
+                (frames.iter().map(|frame| folder.join(names.of(*frame))).collect(), Some(path.into()))
             }
             SampleFormat::Nhdr => {
                 stem(path)?;

@@ -34,6 +34,11 @@ impl Numbered {
         Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
     }
 
+    /// Of files that are named after another, whose name is taken as it is.
+    pub fn after(name: &str, ending: &str) -> Self {
+        Self { before: format!("{name}_"), after: format!(".{ending}"), digits: Some(4) }
+    }
+
     /// The name of a frame's file.
     pub fn of(&self, frame: usize) -> PathBuf {
         match self.digits {
@@ -85,6 +90,7 @@ mod tests {
         for bad in ["a.png", "a_%x.png", "a_%4d_%d.png", "a%"] {
             assert!(name(bad, 0).is_err(), "{bad}");
         }
+        assert_eq!(Numbered::after("100%", "vti").of(7), Path::new("100%_0007.vti"));
         assert_eq!(Numbered::new(Path::new("a.png"), 1).expect("one picture").of(5), Path::new("a.png"));
     }
 

@@ -133,6 +133,8 @@ fn times_that_a_nrrd_cannot_hold_are_left_out_and_said_to_be() {
     assert!(!String::from_utf8_lossy(&work.read("p.nrrd")).contains("spacings"));
     assert!(work.wavesplat("extract a.wspl --frames 1,2,7 -o p.pvd").ok().err.is_empty());
     let list = String::from_utf8(work.read("p.pvd")).unwrap();
+    work.wavesplat("extract a.wspl --frames 1,2,7 -o 5%.pvd").ok();
+    assert!(work.read("5%/5%_0007.vti") == work.read("p/p_0007.vti"));
     for words in [r#"timestep="3.125""#, r#"timestep="3.875""#, r#"file="p/p_0007.vti""#] {
         assert!(list.contains(words), "{words} in {list}");
     }

@@ -24,12 +24,13 @@ Examples:
 Formats, by the ending of OUT:
   .npy   NumPy array (frames, z, y, x), with one header for all frames
   .raw   the samples alone, little-endian
-  .nrrd  NRRD of x y z t, of one frame x y z; .nhdr: its header, with the samples in a .raw beside it
+  .nrrd  NRRD of x y z t, of one frame x y z
+  .nhdr  its header, with the samples in a .raw beside it
   .vti   VTK's image data: one file for each frame, numbered as in out_%04d.vti
   .pvd   ParaView's list of .vti files and their times; they are in a folder beside it
   .nc    NetCDF (time, z, y, x) with times and positions: CDF-2, of unsigned samples CDF-5
-The samples keep their type, but f16 becomes f32 where a format lacks it. Places, times and units go with them where the
-format has room for these.")]
+The samples keep their type, but f16 becomes f32 where a format lacks it. Places, times and
+units go with them where the format has room for these.")]
 pub(crate) struct ExtractArgs {
     /// Coefficient file
     file: PathBuf,
