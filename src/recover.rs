@@ -48,17 +48,25 @@ pub struct Run {
     pub channel: Option<&'static str>,
 }
 
-/// Writes all of `damaged` that is whole to `out`, which `name` stands for in messages.
-pub fn recover(damaged: &FileBytes, name: &Path, out: impl Write, progress: &dyn Progress) -> Result<RecoverReport> {
+/// Writes all of `damaged` that is whole to `out`, which `name` stands for in messages. The first progress is that of searching
+/// bytes, the second that of saving blocks.
+pub fn recover(
+    damaged: &FileBytes,
+    name: &Path,
+    out: impl Write,
+    [searching, saving]: [&dyn Progress; 2],
+) -> Result<RecoverReport> {
     let failed = |source| Error::CoefficientFile { path: damaged.path().into(), source };
-    let salvage = Salvage::search(damaged, &mut |_| {}).map_err(failed)?;
+    searching.start(Some(damaged.len()));
+    let salvage = Salvage::search(damaged, &mut |bytes| searching.advance(bytes)).map_err(failed)?;
+    searching.finish();
     let metadata = salvage.metadata();
-    progress.start(Some(metadata.blocks()));
-    let saved = salvage.write(damaged, out, &mut || progress.advance(1));
+    saving.start(Some(metadata.blocks()));
+    let saved = salvage.write(damaged, out, &mut || saving.advance(1));
     let (mut out, saved) = saved.map_err(|source| Error::CoefficientFile { path: name.into(), source })?;
     out.flush().map_err(|e| Error::io(name, "writing", e))?;
     damaged.check_unchanged()?;
-    progress.finish();
+    saving.finish();
     let coloured = usize::from(metadata.channels) == CHANNELS.len();
     let frames = |window: u32| {
         let window = &metadata.windows[window as usize];

@@ -109,7 +109,7 @@ fn golden_files_are_made() {
     let path = work.path().join("damaged.wspl");
     fs::write(&path, damaged).unwrap();
     let mut saved = Vec::new();
-    recover(&FileBytes::open(&path, Access::Read).unwrap(), &path, &mut saved, &Silent).unwrap();
+    recover(&FileBytes::open(&path, Access::Read).unwrap(), &path, &mut saved, [&Silent, &Silent]).unwrap();
     keep("lost", &saved);
 }
 

@@ -2,30 +2,31 @@
 //!
 //! Standard output carries data or one JSON object; notes and progress go to standard error.
 
+mod advice;
 mod colours;
 mod input;
+mod program;
 mod terminal;
 mod values;
 
 pub use colours::{open_colours, stretched, transfer_function};
 pub use input::{InputArgs, narrow, remembered, spare_inputs};
+pub use program::main;
 pub use terminal::TerminalProgress;
-pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole};
+pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
 
 use crate::error::{Error, Result};
-use crate::mapped;
 use clap::Args;
-use clap::error::ErrorKind;
 use serde::Serialize;
 use std::io::{self, Write};
-use std::process::ExitCode;
+use std::num::NonZeroUsize;
 
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]
 pub struct CommonArgs {
     /// Worker threads; by default one for each core
-    #[arg(long, value_name = "N", help_heading = "Common options")]
-    pub threads: Option<std::num::NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = values::threads, help_heading = "Common options")]
+    pub threads: Option<NonZeroUsize>,
     /// Budget for what the program allocates
     #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Common options")]
     pub memory: Size,
@@ -43,7 +44,7 @@ pub struct CommonArgs {
 impl CommonArgs {
     /// Starts the workers. Call once.
     pub fn start(&self) -> Result<()> {
-        let threads = self.threads.map_or(0, std::num::NonZeroUsize::get);
+        let threads = self.threads.map_or(0, NonZeroUsize::get);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}")))
     }
@@ -108,26 +109,4 @@ pub fn print(text: &str) -> Result<()> {
 
 fn note(text: impl std::fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "{text}"); // nowhere is left to report a failure
-}
-
-/// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
-pub fn main<A: clap::Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
-    mapped::explain_sigbus();
-    let args = match A::try_parse() {
-        Ok(args) => args,
-        Err(e) => {
-            let _ = e.print();
-            let help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
-            return ExitCode::from(if help { 0 } else { 2 });
-        }
-    };
-    match run(args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
-        Err(e) => {
-            note(format_args!("error: {e}"));
-            e.advice().into_iter().for_each(note);
-            ExitCode::from(e.exit_code())
-        }
-    }
 }

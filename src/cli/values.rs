@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::volume::{Grid, Region};
 use std::fmt;
+use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 /// A number of bytes, as `512MiB`.
@@ -14,8 +15,27 @@ impl FromStr for Size {
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let bytes = bytesize::ByteSize::from_str(text).map_err(|_| "takes a size, as 512MiB or 2GB".to_string())?;
+        if text.parse::<u64>().is_ok_and(|bytes| bytes < 1 << 20) {
+            return Err(format!("is {text} bytes; a size has a unit, as 512MiB or 2GB"));
+        }
         usize::try_from(bytes.as_u64()).map(Self).map_err(|_| "is more than this machine can address".into())
     }
+}
+
+/// A share of a whole; whether it is one from 0 to 1 is asked where it is used.
+///
+/// # Errors
+/// It is no number.
+pub fn share(text: &str) -> std::result::Result<f64, String> {
+    text.parse().map_err(|_| "takes a share, 0 to 1; 2 % is 0.02".into())
+}
+
+/// A number of threads.
+///
+/// # Errors
+/// It is no whole number above 0.
+pub(super) fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
+    text.parse().map_err(|_| "takes a whole number, at least 1; without --threads each core has one".into())
 }
 
 /// `NXxNYxNZ` or `NXxNYxNZxNT`, x fastest.
@@ -105,6 +125,11 @@ impl fmt::Display for FrameRange {
 }
 
 impl FrameRange {
+    /// Whether these are the frames that come after `frames` and nothing else: none yet.
+    pub fn begins_at_end(&self, frames: usize) -> bool {
+        self.end.is_none() && self.start.is_some_and(|start| start == frames as i64)
+    }
+
     /// First frame, step and number of frames, of an archive of `frames` frames; the number is unknown for all that a
     /// stream brings.
     pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {
@@ -250,8 +275,9 @@ mod tests {
     #[test]
     fn sizes_have_units() {
         assert_eq!("512MiB".parse(), Ok(Size(512 << 20)));
-        assert_eq!("1000".parse(), Ok(Size(1000)));
-        assert!("much".parse::<Size>().is_err());
+        assert_eq!("2000000".parse(), Ok(Size(2_000_000)));
+        assert_eq!("1KiB".parse(), Ok(Size(1024)));
+        assert!(["much", "5", "512"].iter().all(|text| text.parse::<Size>().is_err()));
     }
 
     #[test]

@@ -337,7 +337,8 @@ fn batch_len(config: &ConvertConfig, blocks: BlockGrid, archive: &Archive, paint
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
         let window = config.window;
-        Error::usage(format!("--memory: windows of {window} frames in blocks of {edge} voxels a side need {least}MiB"))
+        let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
+        Error::usage(format!("--memory: {what}; give that, or a smaller --window or --block"))
     })
 }
 

@@ -1,17 +1,33 @@
 //! What the programs say about themselves.
 
-use super::Work;
+use super::{Run, Work};
 
 #[test]
 fn every_command_has_help_with_examples() {
     let work = Work::new();
-    for command in ["", "convert", "info", "verify", "extract"] {
-        let run = work.wavesplat(&format!("{command} --help")).ok();
-        assert!(run.text().contains("Examples:") && run.text().contains("Usage:"), "{command}");
-        assert!(run.err.is_empty());
+    for command in ["", "convert", "append", "info", "verify", "extract", "recover"] {
+        begins_with_examples(&work.wavesplat(&format!("{command} --help")).ok());
     }
     let run = work.render("--help").ok();
-    assert!(run.text().contains("Examples:") && run.text().contains("--splat-error"));
+    begins_with_examples(&run);
+    assert!(run.text().contains("--splat-error"));
+}
+
+/// Two examples at least, after what the command does and before its options.
+fn begins_with_examples(run: &Run) {
+    let (before, help) = run.text().split_once("Examples:\n").unwrap();
+    assert!(before.contains("Usage:") && !before.contains("--help"), "{before}");
+    let examples = help.lines().take_while(|line| line.starts_with("  ")).filter(|line| line.contains("wavesplat"));
+    assert!(examples.count() >= 2 && help.contains("--help") && run.err.is_empty(), "{help}");
+}
+
+#[test]
+fn long_help_has_headings() {
+    let headings = ["Output:", "What is promised:", "Input:", "How it is coded", "Common options:"];
+    let run = Work::new().wavesplat("convert --help").ok();
+    let places =
+        headings.map(|heading| run.text().find(&format!("\n{heading}")).unwrap_or_else(|| panic!("{heading}")));
+    assert!(places.is_sorted(), "{}", run.text());
 }
 
 #[test]

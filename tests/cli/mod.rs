@@ -14,6 +14,7 @@ mod formats_out;
 mod help;
 mod job;
 mod killed;
+mod manners;
 mod memory;
 mod modes;
 mod mutated;

@@ -23,7 +23,7 @@ use targets::{Targets, parse_depth, parse_format};
 use wavesplat::bound::range_bound;
 use wavesplat::camera::{Camera, View};
 use wavesplat::cli::{
-    self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, spare_inputs, transfer_function,
+    self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share, spare_inputs, transfer_function,
 };
 use wavesplat::colour::TransferFunction;
 use wavesplat::error::{Error, Result};
@@ -44,7 +44,7 @@ use wavesplat_format::Metadata;
     name = "wavesplat-render",
     version,
     arg_required_else_help = true,
-    after_help = "\
+    before_help = "\
 Examples:
   wavesplat-render run.wspl -o frame_%04d.png
   wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
@@ -54,10 +54,11 @@ Examples:
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
-  wavesplat-render frames/ --method direct -o frame_%04d.png
-An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours.
-A PNG holds what made it as text, an .exr as comments.
-The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks
+  wavesplat-render frames/ --method direct -o frame_%04d.png",
+    after_help = "\
+An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours. \
+A PNG holds what made it as text, an .exr as comments. \
+The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks \
 along x. A tau of about 1 / the volume's depth lets the near side stand out."
 )]
 struct Cli {
@@ -66,10 +67,10 @@ struct Cli {
     inputs: Vec<PathBuf>,
     /// File to write, a pattern as frame_%04d.png, or - for standard output; %v or %03v is the number of the view; a file that
     /// is no pattern takes all views of one frame, one after another
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     output: PathBuf,
     /// Replace existing files
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     force: bool,
     /// Azimuth and elevation in degrees; several views of one run share its reading, and take a name with %v
     #[arg(
@@ -96,10 +97,10 @@ struct Cli {
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
     center: Option<Triple>,
     /// Only these frames: ranges a:b:step or numbers, with commas between them
-    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
     frames: Option<FrameList>,
     /// Only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX")]
+    #[arg(long, value_name = "BOX", help_heading = "View")]
     region: Option<RegionSpec>,
     /// Attenuation per world unit of depth; where weights sum to less than 1 % of the view's largest is background
     #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
@@ -114,7 +115,7 @@ struct Cli {
     splat_error: Option<f64>,
     /// Read and splat less, so that pictures may be this share of the range off (emissions, as samples that are): no less
     /// than the file's largest sample error, or see --error
-    #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = "Error")]
+    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]
     tolerance: Option<f64>,
     /// Which error --tolerance limits; both are reported
     #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
@@ -125,34 +126,34 @@ struct Cli {
     #[arg(long, value_name = "OUT", help_heading = "Error")]
     error_image: Option<PathBuf>,
     /// What a pixel means
-    #[arg(long, value_enum, default_value = "mean")]
+    #[arg(long, value_enum, default_value = "mean", help_heading = "Along the ray")]
     quantity: QuantityName,
     #[command(flatten)]
     colour: ColourArgs,
     #[command(flatten)]
     along: AlongArgs,
     /// From coefficients, or frame by frame (the conventional method)
-    #[arg(long, value_enum, default_value = "coefficients")]
+    #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     method: MethodName,
     /// png, npy, y4m, rgb24, gray16, apng (a moving PNG), sheet (all pictures in one PNG) or, if it was built in, exr [default:
     /// by the ending of OUT; png for -]
-    #[arg(long, value_parser = parse_format)]
+    #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<PictureFormat>,
     /// Bits a channel of a PNG: 8, or 16 (with --colormap grey, of one channel)
-    #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth)]
+    #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth, help_heading = "Output")]
     depth: Depth,
     /// Write what --json prints to a file as well
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     sidecar: Option<PathBuf>,
     /// Frames a second of a y4m or apng
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
     fps: u32,
     /// A value that means "missing" in frames, besides NaN and infinities
-    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = "Input")]
     missing_value: Option<f64>,
     /// Show damaged and lost blocks of a coefficient file as missing samples, and the rest; exit code 3. Nothing is certified
     /// then
-    #[arg(long, conflicts_with_all = ["error_image", "tolerance"])]
+    #[arg(long, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Input")]
     skip_damaged: bool,
     #[command(flatten)]
     input: InputArgs,

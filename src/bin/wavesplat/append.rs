@@ -3,7 +3,7 @@
 use super::convert::finish;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, spare_inputs};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use wavesplat::convert::{Begun, ConvertConfig, of_file};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
@@ -13,13 +13,17 @@ use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    before_help = "\
 Examples:
   wavesplat append run.wspl more/
-  wavesplat append run.wspl frames/ --frames 400:
-The new frames are coded as the others were, in windows after theirs; the region that was converted is chosen again. Whole
-windows come out as if all frames had been converted at once. The file is copied, and its successor takes its name when it is
-complete: whoever reads the old one meanwhile is not disturbed, and a kill costs nothing that was there.")]
+  wavesplat append run.wspl frames/ --frames 400:",
+    after_help = "\
+The new frames are coded as the others were, in windows after theirs; the region that was converted is chosen again. Whole \
+windows come out as if all frames had been converted at once. The file is copied, and its successor takes its name when it is \
+complete: whoever reads the old one meanwhile is not disturbed, and a kill costs nothing that was there. Where --frames \
+begins at the end of what is there so far, nothing is done, and that is no error."
+)]
 pub(crate) struct AppendArgs {
     /// Coefficient file
     file: PathBuf,
@@ -49,7 +53,14 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let path = linked.unwrap_or(args.file.clone()); // what is replaced is not the link
     let file = CoefficientFile::open(&path, args.input.access())?;
     let config = args.config(&file)?;
-    let mut source = args.input.open_again(&file, &args.inputs, args.frames, &args.common)?;
+    let source = args.input.open_again(&file, &args.inputs, None, &args.common)?;
+    if let (Some(asked), Some(all)) = (args.frames, source.archive().frames)
+        && asked.begins_at_end(all)
+    {
+        args.common.note(format_args!("{}: there are no frames after {all} yet, nothing to add", args.file.display()));
+        return Ok(());
+    }
+    let mut source = narrow(source, args.frames, None)?;
     let timed = source.archive().times.is_empty() == file.metadata().times.is_empty();
     if !timed {
         return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));

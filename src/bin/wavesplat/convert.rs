@@ -3,7 +3,9 @@
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, spare_inputs, transfer_function};
+use wavesplat::cli::{
+    CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, share, spare_inputs, transfer_function,
+};
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
@@ -15,93 +17,102 @@ use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    before_help = "\
 Examples:
   wavesplat convert frames/ -o run.wspl
-  wavesplat convert 'frames/step_*.vti' -o run.wspl --basis multi --tolerance 0.001
+  wavesplat convert 'frames/step_*.vti' -o run.wspl --tolerance 0.001
   wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
-  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
-A run that is killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. With
---resume the same command goes on there (frames that were converted are read again and compared); a producer behind a pipe
-must begin at its first frame again.
+  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis",
+    after_help = "\
 Inputs: .npy, .nrrd/.nhdr, .vti, .pvd, headerless data with --dims and --dtype.
-The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass;
---range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of
-every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range:
-wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker
-than the mean, and single frames, may be off by many times the tolerance.")]
+
+A run that is stopped or killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. \
+With --resume the same command goes on there (frames that were converted are read again and compared); a producer behind a \
+pipe must begin at its first frame again.
+
+The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass; \
+--range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
+every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range: \
+wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker \
+than the mean, and single frames, may be off by many times the tolerance."
+)]
 pub(crate) struct ConvertArgs {
     /// Frame files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Coefficient file to write, or - for standard output
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
     /// Replace an existing file, and what an earlier run left unfinished unless --resume goes on with that
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     force: bool,
     /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     resume: bool,
-    /// What series, or samples, are made of
-    #[arg(long, value_enum, default_value = "auto")]
-    basis: BasisName,
-    /// What coefficients are predicted from in space [default: none for haar and multi, else auto]
-    #[arg(long, value_enum)]
-    space: Option<SpaceName>,
-    /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
-    #[arg(long, value_name = "T")]
-    window: Option<usize>,
     /// Largest error as a share of what the bound refers to; 0 keeps every bit
-    #[arg(long, value_name = "X", default_value_t = 0.01, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = share, allow_hyphen_values = true, help_heading = PROMISE)]
     tolerance: f64,
     /// What the tolerance bounds
-    #[arg(long, value_enum, default_value = "pointwise")]
+    #[arg(long, value_enum, default_value = "pointwise", help_heading = PROMISE)]
     bound: BoundName,
-    /// For --bound relative: samples smaller than this may be as wrong as one of this size. Say where values stop to
-    /// matter: with 0, zeros must come back as zeros, and values near zero cost most of the file [default: 0]
-    #[arg(long, value_name = "V", allow_hyphen_values = true)]
-    floor: Option<f64>,
-    /// For --bound sampled: random pixels on each of three faces [default: 300]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true)]
-    samples: Option<u32>,
-    /// For --bound sampled: another seed takes other pixels [default: 0]
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    seed: Option<u64>,
-    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's file.
-    /// The tolerance is a share of full brightness then
-    #[arg(long, value_name = "F")]
-    transfer_function: Option<String>,
     /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms. With
     /// --transfer-function: the values of its first and last colour [default: its own, or the range of all frames]
-    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = PROMISE)]
     range: Option<Pair>,
     /// NaN, infinities and the missing value: refuse them, or keep them as they are
     /// [default: error; mask with --missing-value, and where files declare a value for what is missing]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = PROMISE)]
     missing: Option<MissingName>,
     /// A value that means "missing"
-    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = PROMISE)]
     missing_value: Option<f64>,
+    /// For --bound relative: samples smaller than this may be as wrong as one of this size. Say where values stop to
+    /// matter: with 0, zeros must come back as zeros, and values near zero cost most of the file [default: 0]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = PROMISE)]
+    floor: Option<f64>,
+    /// For --bound sampled: random pixels on each of three faces [default: 300]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true, help_heading = PROMISE)]
+    samples: Option<u32>,
+    /// For --bound sampled: another seed takes other pixels [default: 0]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = PROMISE)]
+    seed: Option<u64>,
     /// Only these frames: a:b, a:b:step, the end left out
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
     frames: Option<FrameRange>,
     /// Only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX")]
+    #[arg(long, value_name = "BOX", help_heading = "Input")]
     region: Option<RegionSpec>,
-    /// Voxels a side of a block [default: up to 48, up to 32 without a pyramid; less for long windows]
-    #[arg(long, value_name = "N")]
-    block: Option<usize>,
-    /// zstd level
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=19))]
-    level: i32,
     #[command(flatten)]
     input: InputArgs,
+    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's file.
+    /// The tolerance is a share of full brightness then
+    #[arg(long, value_name = "F", help_heading = CODING)]
+    transfer_function: Option<String>,
+    /// What series, or samples, are made of
+    #[arg(long, value_enum, default_value = "auto", help_heading = CODING)]
+    basis: BasisName,
+    /// What coefficients are predicted from in space [default: none for haar and multi, else auto]
+    #[arg(long, value_enum, help_heading = CODING)]
+    space: Option<SpaceName>,
+    /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
+    #[arg(long, value_name = "T", help_heading = CODING)]
+    window: Option<usize>,
+    /// Voxels a side of a block [default: up to 48, up to 32 without a pyramid; less for long windows]
+    #[arg(long, value_name = "N", help_heading = CODING)]
+    block: Option<usize>,
+    /// zstd level
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=19), help_heading = CODING)]
+    level: i32,
     #[command(flatten)]
     common: CommonArgs,
 }
+
+/// Headings of the help.
+const PROMISE: &str = "What is promised";
+const CODING: &str = "How it is coded (the defaults are good)";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum BasisName {

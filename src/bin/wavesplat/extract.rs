@@ -13,14 +13,16 @@ use wavesplat::source::CHANNELS;
 
 /// Decode frames back to samples
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    before_help = "\
 Examples:
   wavesplat extract run.wspl -o run.npy
   wavesplat extract run.wspl --frames 10:20 --region 0:32,:,5:6 -o part.npy
   wavesplat extract run.wspl -o - --format raw | python analyse.py
   wavesplat extract run.wspl -o run.pvd
   wavesplat extract run.wspl -o run.nc
-  wavesplat extract coloured.wspl --channel red -o red.npy
+  wavesplat extract coloured.wspl --channel red -o red.npy",
+    after_help = "\
 Formats, by the ending of OUT:
   .npy   NumPy array (frames, z, y, x), with one header for all frames
   .raw   the samples alone, little-endian
@@ -30,15 +32,16 @@ Formats, by the ending of OUT:
   .pvd   ParaView's list of .vti files and their times; they are in a folder beside it
   .nc    NetCDF (time, z, y, x) with times and positions: CDF-2, of unsigned samples CDF-5
 The samples keep their type, but f16 becomes f32 where a format lacks it. Places, times and
-units go with them where the format has room for these.")]
+units go with them where the format has room for these."
+)]
 pub(crate) struct ExtractArgs {
     /// Coefficient file
     file: PathBuf,
     /// File to write, a pattern as out_%04d.vti where each frame has its own, or - for standard output
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     output: PathBuf,
     /// Replace an existing file
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     force: bool,
     /// Only these frames: ranges a:b:step or numbers, with commas between them
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
@@ -50,7 +53,7 @@ pub(crate) struct ExtractArgs {
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
     /// npy raw nrrd nhdr vti pvd nc [default: by the ending of OUT; npy for -]
-    #[arg(long, value_parser = parse_format)]
+    #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<SampleFormat>,
     /// Take damaged and lost blocks for missing samples (NaN, or the declared value, or 0) and give the rest; exit code 3
     #[arg(long)]

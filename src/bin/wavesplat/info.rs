@@ -14,7 +14,7 @@ use wavesplat::source::CHANNELS;
 
 /// Say what a coefficient file holds, promises and reached
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(before_help = "\
 Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows")]

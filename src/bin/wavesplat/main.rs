@@ -17,7 +17,7 @@ use std::process::ExitCode;
     name = "wavesplat",
     version,
     arg_required_else_help = true,
-    after_help = "\
+    before_help = "\
 Examples:
   wavesplat convert frames/ -o run.wspl --tolerance 0.001
   wavesplat append run.wspl more/
@@ -25,7 +25,8 @@ Examples:
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
   wavesplat recover damaged.wspl -o saved.wspl
-Pictures are made by wavesplat-render."
+  wavesplat convert --help",
+    after_help = "Pictures are made by wavesplat-render."
 )]
 struct Cli {
     #[command(subcommand)]

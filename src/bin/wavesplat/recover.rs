@@ -11,14 +11,17 @@ use wavesplat::resume;
 
 /// Save what is whole of a damaged coefficient file
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    before_help = "\
 Examples:
   wavesplat recover damaged.wspl -o saved.wspl
-  wavesplat recover run.wspl.part -o run-so-far.wspl
-A new file is written, and the damaged one is not touched. Blocks of which anything is damaged are lost in the new file: they
-are listed here, and whatever reads them says so (--skip-damaged leaves them out). If no block is lost, the new file is the
-one that was damaged, byte for byte (where the end of a file is gone, some statistics are counted anew). Exit code 3 if anything
-is lost.")]
+  wavesplat recover run.wspl.part -o run-so-far.wspl",
+    after_help = "\
+A new file is written, and the damaged one is not touched. Blocks of which anything is damaged are lost in the new file: they \
+are listed here, and whatever reads them says so (--skip-damaged leaves them out). If no block is lost, the new file is the \
+one that was damaged, byte for byte (where the end of a file is gone, some statistics are counted anew). Exit code 3 if anything \
+is lost."
+)]
 pub(crate) struct RecoverArgs {
     /// Damaged or unfinished coefficient file
     file: PathBuf,
@@ -40,7 +43,8 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
     let damaged = FileBytes::open(&args.file, Access::unless(args.no_mmap))?;
     spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
-    let report = recover(&damaged, &args.output, &mut out, &args.common.progress("blocks"))?;
+    let report =
+        recover(&damaged, &args.output, &mut out, [&args.common.progress("bytes"), &args.common.progress("blocks")])?;
     out.commit_if(resume::check)?;
     let to_stdout = args.output == Path::new(STANDARD);
     if !args.common.json && !args.common.quiet {

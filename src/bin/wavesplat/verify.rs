@@ -11,13 +11,17 @@ use wavesplat::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify
 
 /// Check a coefficient file, and its promise against the source
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    before_help = "\
 Examples:
   wavesplat verify run.wspl
-  wavesplat verify run.wspl --against frames/
-Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every
-sample is decoded and compared; exit code 4 if any is outside the bound, or further off than its block says. Of a file with a sampled bound, an estimate, what is checked is the rms of each series.
-The frames and the region that were converted are remembered and chosen again, but for --frames.")]
+  wavesplat verify run.wspl --against frames/",
+    after_help = "\
+Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every \
+sample is decoded and compared; exit code 4 if any is outside the bound, or further off than its block says. Of a file with a sampled bound, \
+an estimate, what is checked is the rms of each series. \
+The frames and the region that were converted are remembered and chosen again, but for --frames."
+)]
 pub(crate) struct VerifyArgs {
     /// Coefficient file
     file: PathBuf,

@@ -1,0 +1,104 @@
+//! What to do next, where arguments are not understood.
+
+use clap::Command;
+use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
+use std::ffi::OsString;
+use std::path::Path;
+
+/// An error of arguments with a tip, where there is one to give that is better than none or than what it has.
+pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString]) -> Error {
+    let word = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => word.clone(),
+        _ => String::new(),
+    };
+    let tip = match error.kind() {
+        ErrorKind::InvalidSubcommand => for_a_word(&word(ContextKind::InvalidSubcommand)),
+        ErrorKind::UnknownArgument => owner(command, &word(ContextKind::InvalidArg)),
+        ErrorKind::MissingRequiredArgument => example(chosen(command, args)),
+        _ => None,
+    };
+    if let Some(tip) = tip {
+        for kind in [ContextKind::SuggestedSubcommand, ContextKind::SuggestedArg] {
+            error.remove(kind);
+        }
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    error
+}
+
+/// The subcommand that was given, or the program itself.
+fn chosen<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
+    args.get(1).and_then(|name| command.find_subcommand(name)).unwrap_or(command)
+}
+
+/// The first example of a command's help.
+fn example(command: &Command) -> Option<String> {
+    let examples = command.get_before_help()?.to_string();
+    examples.lines().nth(1).map(|line| format!("an example: {}", line.trim()))
+}
+
+/// What may be meant by a word that is no subcommand.
+fn for_a_word(word: &str) -> Option<String> {
+    let ending = Path::new(word).extension().and_then(|ending| ending.to_str());
+    match (word, ending) {
+        (_, Some("wspl")) => Some(format!(
+            "'wavesplat info {word}' says what it holds, 'wavesplat-render {word} -o frame_%04d.png' makes pictures"
+        )),
+        _ if Path::new(word).exists() || ending.is_some_and(|ending| FRAMES.contains(&ending)) => {
+            Some(format!("'wavesplat convert {word} -o run.wspl' converts frames"))
+        }
+        ("render" | "view" | "show" | "plot", _) => Some("wavesplat-render makes pictures".into()),
+        _ => None,
+    }
+}
+
+/// Endings of frames.
+const FRAMES: [&str; 7] = ["npy", "nrrd", "nhdr", "vti", "pvd", "raw", "bin"];
+
+/// Who takes an option that a command does not know.
+fn owner(command: &Command, option: &str) -> Option<String> {
+    let name = option.strip_prefix("--")?;
+    let takes = |command: &&Command| command.get_arguments().any(|arg| arg.get_long() == Some(name));
+    let others: Vec<&str> = command.get_subcommands().filter(takes).map(Command::get_name).collect();
+    if !others.is_empty() {
+        return Some(format!("{option} is an option of {} {}", command.get_name(), others.join(", ")));
+    }
+    let elsewhere = ELSEWHERE.iter().find(|(_, options)| options.contains(&name));
+    let elsewhere = elsewhere.filter(|(owner, _)| owner.split(' ').next() != Some(command.get_name()));
+    elsewhere.map(|(owner, _)| format!("{option} is an option of {owner}"))
+}
+
+/// Options that only one of the programs has; each program knows just its own.
+const ELSEWHERE: [(&str, &[&str]); 2] = [
+    (
+        "wavesplat-render",
+        &[
+            "annotate",
+            "background",
+            "center",
+            "colormap",
+            "error",
+            "error-image",
+            "fps",
+            "method",
+            "mode",
+            "norm",
+            "opacity",
+            "opacity-unit",
+            "orbit",
+            "quantity",
+            "roll",
+            "scale",
+            "sigma",
+            "size",
+            "slabs",
+            "splat-error",
+            "tau",
+            "view",
+        ],
+    ),
+    (
+        "wavesplat convert",
+        &["basis", "block", "bound", "floor", "level", "missing", "resume", "samples", "seed", "space", "window"],
+    ),
+];
