@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// Where each third-party crate is at home: `src/` and then one of these.
-const HOMES: [(&str, &[&str]); 19] = [
+const HOMES: [(&str, &[&str]); 22] = [
     ("memmap2::", &["mapped.rs"]),
     ("libc::", &["mapped.rs"]),
     ("crossbeam::", &["convert/"]),
@@ -36,6 +36,9 @@ const HOMES: [(&str, &[&str]); 19] = [
         ],
     ),
     ("clap::", &["cli/", "bin/"]),
+    ("clap_complete::", &["cli/generate.rs"]),
+    ("clap_mangen::", &["cli/generate.rs"]),
+    ("toml::", &["cli/config.rs"]),
     ("indicatif::", &["cli/"]),
     ("bytesize::", &["cli/"]),
     ("png::", &["render/sink/"]),

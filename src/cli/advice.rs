@@ -1,12 +1,13 @@
 //! What to do next, where arguments are not understood.
 
+use super::config::Config;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;
 use std::path::Path;
 
 /// An error of arguments with a tip, where there is one to give that is better than none or than what it has.
-pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString]) -> Error {
+pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString], config: &Config) -> Error {
     let word = |kind| match error.get(kind) {
         Some(ContextValue::String(word)) => word.clone(),
         _ => String::new(),
@@ -15,7 +16,10 @@ pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString]) ->
         ErrorKind::InvalidSubcommand => for_a_word(&word(ContextKind::InvalidSubcommand)),
         ErrorKind::UnknownArgument => owner(command, &word(ContextKind::InvalidArg)),
         ErrorKind::MissingRequiredArgument => example(chosen(command, args)),
-        _ => None,
+        _ => {
+            let option = word(ContextKind::InvalidArg);
+            config.place(option.trim_start_matches('-').split([' ', '=']).next().unwrap_or_default())
+        }
     };
     if let Some(tip) = tip {
         for kind in [ContextKind::SuggestedSubcommand, ContextKind::SuggestedArg] {
@@ -27,7 +31,7 @@ pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString]) ->
 }
 
 /// The subcommand that was given, or the program itself.
-fn chosen<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
+pub(super) fn chosen<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
     args.get(1).and_then(|name| command.find_subcommand(name)).unwrap_or(command)
 }
 

@@ -25,7 +25,7 @@ pub fn transfer_function(
             let what = "standard input is read once: give --range LO,HI, the values of the first and the last colour";
             return Err(Error::usage(format!("--transfer-function {name}: {what}")));
         }
-        let (lo, hi) = value_range(source, missing_value, &common.progress("frames"))?.unwrap_or((0.0, 1.0));
+        let (lo, hi) = value_range(source, missing_value, &common.progress("values", "frames"))?.unwrap_or((0.0, 1.0));
         common.detail(format_args!("values from {lo:.4e} to {hi:.4e}; --range sets those of the colours"));
         Ok((lo, hi))
     };

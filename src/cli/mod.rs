@@ -1,18 +1,23 @@
 //! The manners that the programs share: common options, values of options, progress, exit codes.
 //!
-//! Standard output carries data or one JSON object; notes and progress go to standard error.
+//! Standard output carries data or one JSON object; notes and progress go to standard error. `config` puts options of a file
+//! before those of the command line.
 
 mod advice;
 mod colours;
+mod config;
+mod generate;
 mod input;
+mod lines;
 mod program;
 mod terminal;
 mod values;
 
 pub use colours::{open_colours, stretched, transfer_function};
+pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, narrow, remembered, spare_inputs};
-pub use program::main;
-pub use terminal::TerminalProgress;
+pub use program::{command, main};
+pub use terminal::{ProgressKind, TerminalProgress};
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
 
 use crate::error::{Error, Result};
@@ -20,16 +25,25 @@ use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]
 pub struct CommonArgs {
+    /// TOML file with more options, by their long names: tolerance = 0.001; those of one command in a table of its name. What
+    /// the command line says wins [default: the file that WAVESPLAT_CONFIG, or WAVESPLAT_RENDER_CONFIG of wavesplat-render,
+    /// names]
+    #[arg(long, value_name = "FILE", help_heading = "Common options")]
+    pub config: Option<PathBuf>,
     /// Worker threads; by default one for each core
     #[arg(long, value_name = "N", value_parser = values::threads, help_heading = "Common options")]
     pub threads: Option<NonZeroUsize>,
     /// Budget for what the program allocates
     #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Common options")]
     pub memory: Size,
+    /// Progress, on standard error: a bar if that is a terminal, lines of JSON, or none
+    #[arg(long, value_enum, value_name = "HOW", default_value = "auto", help_heading = "Common options")]
+    pub progress: ProgressKind,
     /// Neither progress nor notes
     #[arg(short, long, help_heading = "Common options")]
     pub quiet: bool,
@@ -54,9 +68,10 @@ impl CommonArgs {
         self.memory.0 / 4
     }
 
-    /// Progress on a terminal, or none.
-    pub fn progress(&self, unit: &'static str) -> TerminalProgress {
-        TerminalProgress::new(self.quiet, unit)
+    /// Progress of a stage that counts `unit`s.
+    pub fn progress(&self, stage: &'static str, unit: &'static str) -> TerminalProgress {
+        let kind = if self.quiet { ProgressKind::None } else { self.progress };
+        TerminalProgress::new(kind, stage, unit)
     }
 
     /// A note on standard error, unless quiet.

@@ -1,7 +1,8 @@
 //! A program from its arguments to its exit code.
 
+use super::config::Config;
 use super::{advice, note};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mapped;
 use clap::error::ErrorKind;
 use clap::{Command, Parser};
@@ -12,7 +13,12 @@ use std::process::ExitCode;
 /// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     mapped::explain_sigbus();
-    let args = match parse::<A>(env::args_os().collect()) {
+    let args: Vec<OsString> = env::args_os().collect();
+    let config = match Config::read(&command::<A>(), &args) {
+        Ok(config) => config,
+        Err(e) => return failed(&e),
+    };
+    let args = match parse::<A>(&args, &config) {
         Ok(args) => args,
         Err(e) => {
             let _ = e.print(); // nowhere is left to report a failure
@@ -24,21 +30,28 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
         Err(e) => {
-            note(format_args!("error: {e}"));
-            e.advice().into_iter().for_each(note);
-            ExitCode::from(e.exit_code())
+            let code = failed(&e);
+            config.words().filter(|_| matches!(e, Error::Usage(_))).into_iter().for_each(note);
+            code
         }
     }
 }
 
-fn parse<A: Parser>(args: Vec<OsString>) -> std::result::Result<A, clap::Error> {
+fn failed(error: &Error) -> ExitCode {
+    note(format_args!("error: {error}"));
+    error.advice().into_iter().for_each(note);
+    ExitCode::from(error.exit_code())
+}
+
+fn parse<A: Parser>(args: &[OsString], config: &Config) -> std::result::Result<A, clap::Error> {
     let mut command = command::<A>();
-    let parsed = command.try_get_matches_from_mut(&args).and_then(|matches| A::from_arg_matches(&matches));
-    parsed.map_err(|error| advice::advised(error, &command, &args))
+    let all = config.before(&command, args);
+    let parsed = command.try_get_matches_from_mut(all).and_then(|matches| A::from_arg_matches(&matches));
+    parsed.map_err(|error| advice::advised(error, &command, args, config))
 }
 
 /// What a program takes, with help that begins with examples.
-fn command<A: Parser>() -> Command {
+pub fn command<A: Parser>() -> Command {
     const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\n{before-help}{all-args}{after-help}";
     A::command().help_template(HELP).mut_subcommands(|command| command.help_template(HELP))
 }

@@ -1,28 +1,86 @@
-//! Progress on a terminal.
+//! Progress on standard error: a bar for people, lines for programs, or nothing.
 
+use super::lines::Lines;
 use crate::progress::Progress;
+use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// A bar on standard error; nothing unless that is a terminal.
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProgressKind {
+    /// A bar, if standard error is a terminal
+    Auto,
+    /// JSON objects, one a line, a few a second and a last one
+    Json,
+    /// Nothing
+    None,
+}
+
+/// Progress of one stage of a program.
 #[derive(Debug)]
-pub struct TerminalProgress {
-    bar: ProgressBar,
-    unit: &'static str,
+pub enum TerminalProgress {
+    /// A bar on standard error; nothing unless that is a terminal.
+    Bar(Bar),
+    /// Lines of JSON on standard error.
+    Lines(Lines),
 }
 
 impl TerminalProgress {
-    /// A bar that counts `unit`s, or no bar at all.
-    pub fn new(quiet: bool, unit: &'static str) -> Self {
-        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        Self { bar: ProgressBar::with_draw_target(None, target), unit }
+    /// Of a stage that counts `unit`s.
+    pub fn new(kind: ProgressKind, stage: &'static str, unit: &'static str) -> Self {
+        let target = match kind {
+            ProgressKind::Json => return Self::Lines(Lines::new(stage, unit)),
+            ProgressKind::Auto => ProgressDrawTarget::stderr(),
+            ProgressKind::None => ProgressDrawTarget::hidden(),
+        };
+        Self::Bar(Bar { bar: ProgressBar::with_draw_target(None, target), stage, unit })
     }
 }
 
 impl Progress for TerminalProgress {
     fn start(&self, steps: Option<u64>) {
-        let known = "{wide_bar} {pos}/{len} UNIT, {eta} left";
-        let template = if steps.is_some() { known } else { "{spinner} {pos} UNIT, {elapsed}" };
-        if let Ok(style) = ProgressStyle::with_template(&template.replace("UNIT", self.unit)) {
+        match self {
+            Self::Bar(bar) => bar.start(steps),
+            Self::Lines(lines) => lines.start(steps),
+        }
+    }
+
+    fn go_on(&self, steps: u64) {
+        match self {
+            Self::Bar(bar) => bar.go_on(steps),
+            Self::Lines(lines) => lines.go_on(steps),
+        }
+    }
+
+    fn advance(&self, steps: u64) {
+        match self {
+            Self::Bar(bar) => bar.bar.inc(steps),
+            Self::Lines(lines) => lines.advance(steps),
+        }
+    }
+
+    fn finish(&self) {
+        match self {
+            Self::Bar(bar) => bar.bar.finish_and_clear(),
+            Self::Lines(lines) => lines.tell_last(),
+        }
+    }
+}
+
+/// A bar with speed and remaining time.
+#[derive(Debug)]
+pub struct Bar {
+    bar: ProgressBar,
+    stage: &'static str,
+    unit: &'static str,
+}
+
+impl Bar {
+    fn start(&self, steps: Option<u64>) {
+        let known = "STAGE {wide_bar} {human_pos}/{human_len} UNIT, {per_sec}, {eta} left";
+        let template = if steps.is_some() { known } else { "STAGE {spinner} {human_pos} UNIT, {per_sec}, {elapsed}" };
+        let template = template.replace("STAGE", self.stage).replace("UNIT", self.unit);
+        if let Ok(style) = ProgressStyle::with_template(&template) {
             self.bar.set_style(style);
         }
         if let Some(steps) = steps {
@@ -30,11 +88,8 @@ impl Progress for TerminalProgress {
         }
     }
 
-    fn advance(&self, steps: u64) {
-        self.bar.inc(steps);
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
+    fn go_on(&self, steps: u64) {
+        self.bar.set_position(steps);
+        self.bar.reset_eta();
     }
 }

@@ -174,14 +174,22 @@ impl TransferFunction {
         (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) })
     }
 
+    /// The name of its colours, unless they are points of a file.
+    pub fn name(&self) -> Option<&'static str> {
+        match &self.colours {
+            Colours::Named(named) => Some(named.name),
+            Colours::Points(..) => None,
+        }
+    }
+
     /// Its colours in a few words, for people.
     pub fn words(&self) -> String {
         let (lo, hi) = self.range;
-        format!("{} from {lo} to {hi}", self.name())
+        format!("{} from {lo} to {hi}", self.description())
     }
 
     /// A map's name, or how many points a file's has.
-    pub fn name(&self) -> String {
+    pub fn description(&self) -> String {
         match &self.colours {
             Colours::Named(named) => named.name.into(),
             Colours::Points(points, space) => format!("{} points ({})", points.len(), space.name()),

@@ -40,7 +40,7 @@ use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
 use serde::Serialize;
-pub use settings::of_file;
+pub use settings::{of_file, options};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -192,7 +192,7 @@ pub fn go_on<W: Write>(
     let done = Done::of(begun.as_ref(), &plan, name)?;
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.before);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
-    progress.advance((done.windows.len() * plan.blocks_of_window()) as u64);
+    progress.go_on((done.windows.len() * plan.blocks_of_window()) as u64);
     let mut recorder = Recorder::new(config, &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);

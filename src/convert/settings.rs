@@ -1,6 +1,7 @@
 //! What a file remembers of how it was made: enough to verify it against its source, and to append to it.
 
 use super::{Coding, ConvertConfig, MissingPolicy, Space};
+use crate::bound::Bound;
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::setting;
@@ -59,6 +60,33 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         settings: file.settings.iter().filter(|(name, _)| !is_ours(name)).cloned().collect(),
     })
 }
+
+/// The options of `wavesplat convert` by which the same samples become the same file, with their values: all that its bytes
+/// follow from, defaults too. Of colours that are the points of a file there is no name to say, so they are not among these.
+pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
+    let mut options = vec![("tolerance", format!("{:?}", file.tolerance)), ("bound", file.bound.name().into())];
+    match file.bound {
+        Bound::Relative { floor } => options.push(("floor", format!("{floor:?}"))),
+        Bound::Sampled { samples, seed } => {
+            options.extend([("samples", samples.to_string()), ("seed", seed.to_string())]);
+        }
+        Bound::Pointwise | Bound::Rms => {}
+    }
+    let colours = setting(file, "colours").and_then(TransferFunction::of_text);
+    if let Some((colours, name)) = colours.as_ref().and_then(|colours| Some((colours, colours.name()?))) {
+        let (lo, hi) = colours.range();
+        options.extend([("transfer-function", name.into()), ("range", format!("{lo:?},{hi:?}"))]);
+    }
+    options.extend(file.missing_value.map(|value| ("missing-value", format!("{value:?}"))));
+    options.push(("block", file.block_edge.to_string()));
+    let of_samples = STORED.into_iter().filter(|name| *name != "range" || colours.is_none()); // that of brightness is fixed
+    options.extend(of_samples.filter_map(|name| Some((name, setting(file, name)?.to_string()))));
+    options
+}
+
+/// Settings of a file that are options by the same names.
+const STORED: [&str; 10] =
+    ["range", "missing", "missing-value", "basis", "space", "window", "level", "frames", "region", "variable"];
 
 /// The first thing in which two conversions differ, in words; the program's version may, unless it must be the same.
 pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) -> Option<String> {

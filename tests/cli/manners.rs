@@ -5,8 +5,11 @@ use super::{CONVERT, RENDER, Work, small};
 /// The long options that a command's help lists.
 fn options(work: &Work, program: &str, command: &str) -> Vec<String> {
     let help = work.run(program, &format!("{command} --help"), b"").ok();
-    let words = help.text().lines().filter(|line| line.trim_start().starts_with('-'));
-    let long = words.filter_map(|line| line.split_whitespace().find(|word| word.starts_with("--")));
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let lines = help.text().lines().filter(|line| line.trim_start().starts_with('-'));
+    let long = lines
+        .filter(|line| (1..=6).contains(&indent(line)))
+        .filter_map(|line| line.split_whitespace().find(|word| word.starts_with("--")));
     long.map(String::from).collect()
 }
 
@@ -17,7 +20,7 @@ fn options_of_another_command_are_said_to_be_its() {
     assert!(convert.len() > 20 && render.len() > 30, "{convert:?} {render:?}");
     let mut tried = 0;
     let others = ["append", "verify", "extract"].map(|command| options(&work, CONVERT, command)).concat();
-    let others = [others, vec!["--version".into()]].concat();
+    let others = [others, vec!["--version".into(), "--generate".into()]].concat();
     for option in render.iter().filter(|option| !convert.contains(option) && !others.contains(option)) {
         let words = [option.as_str(), "is an option of wavesplat-render"];
         work.wavesplat(&format!("convert a.npy -o a.wspl {option}")).fails(2, &words);

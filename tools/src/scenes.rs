@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use wavesplat::camera::View;
-use wavesplat::cli::{CommonArgs, Size};
+use wavesplat::cli::{CommonArgs, ProgressKind, Size};
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
 use wavesplat::error::Result;
 use wavesplat::footprint::Kernel;
@@ -17,7 +17,15 @@ pub(crate) const MEMORY: usize = 512 << 20;
 
 /// What the programs' functions want of options, where there are none.
 pub(crate) fn quietly() -> CommonArgs {
-    CommonArgs { threads: None, memory: Size(MEMORY), quiet: true, verbose: false, json: false }
+    CommonArgs {
+        config: None,
+        threads: None,
+        memory: Size(MEMORY),
+        progress: ProgressKind::None,
+        quiet: true,
+        verbose: false,
+        json: false,
+    }
 }
 
 /// Converts an archive to the file `path`, which is replaced.

@@ -101,7 +101,7 @@ fn in_colours(made: Made, colouring: &Colouring, scale: &Scale) -> Made {
     };
     let [r, g, b] = scale.background();
     Made {
-        colormap: (colouring.pixel == Pixel::Value).then(|| colouring.map.name()),
+        colormap: (colouring.pixel == Pixel::Value).then(|| colouring.map.description()),
         range: Some(scale.range()),
         norm: Some(norm),
         background: Some(format!("{r:02x}{g:02x}{b:02x}")),

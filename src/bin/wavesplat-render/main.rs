@@ -4,6 +4,7 @@
 mod along;
 mod colouring;
 mod colours;
+mod generate;
 mod made;
 mod ranges;
 mod sinks;
@@ -13,6 +14,7 @@ use along::{AlongArgs, ModeName};
 use clap::{Parser, ValueEnum};
 use colouring::Coloured;
 use colours::ColourArgs;
+use generate::Program;
 use serde::Serialize;
 use std::collections::HashSet;
 use std::io::Write;
@@ -195,7 +197,7 @@ enum MethodName {
 }
 
 fn main() -> ExitCode {
-    cli::main(|cli: Cli| cli.run())
+    cli::main(Program::run)
 }
 
 impl Cli {
@@ -211,7 +213,8 @@ impl Cli {
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let made = self.made(scene.as_ref(), &config, (file.as_deref(), &times), &colouring);
         let mut sinks = self.sinks(&config, targets, &colouring, (&made, times))?;
-        let progress = self.common.progress(if config.mode.is_projection() { "pictures" } else { "rows of slabs" });
+        let unit = if config.mode.is_projection() { "pictures" } else { "rows of slabs" };
+        let progress = self.common.progress("render", unit);
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         self.common.detail(summary(&report));

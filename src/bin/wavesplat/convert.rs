@@ -185,7 +185,7 @@ pub(crate) fn finish(
     common: &CommonArgs,
     still: &dyn Fn() -> Result<()>,
 ) -> Result<()> {
-    let report = go_on(source, config, begun, name, &mut out, &common.progress("blocks"));
+    let report = go_on(source, config, begun, name, &mut out, &common.progress("convert", "blocks"));
     let report = report.inspect_err(|error| {
         if let Some(part) =
             out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_) | Error::Changed { .. }))

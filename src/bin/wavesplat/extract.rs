@@ -95,7 +95,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let paths: Vec<PathBuf> = files.paths().map(Path::to_path_buf).collect();
     let mut sink = Sink::create(files, &contents, args.force)?;
     format.notes(&contents).iter().for_each(|note| args.common.note(note));
-    let progress = args.common.progress("frames");
+    let progress = args.common.progress("extract", "frames");
     let report = extract_to(&file, &config, &mut |samples| sink.write(samples), &progress)?;
     sink.finish()?;
     args.common.detail(format_args!(

@@ -2,10 +2,12 @@
 
 use clap::Args;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, print};
+use wavesplat::convert::options;
 use wavesplat::error::Result;
 use wavesplat::file::CoefficientFile;
 use wavesplat::mapped::Access;
@@ -56,6 +58,8 @@ struct Info {
     lost_blocks: u64,
     windows: Vec<WindowReport>,
     settings: Vec<(String, String)>,
+    /// What made it: options of `wavesplat convert` by their names.
+    options: BTreeMap<&'static str, String>,
     program: String,
 }
 
@@ -100,6 +104,7 @@ impl Info {
             lost_blocks: (0..windows.len() as u32).flat_map(|w| file.leaves(w)).map(|leaf| leaf.lost).sum(),
             windows,
             settings: m.settings.clone(),
+            options: options(m).into_iter().collect(),
             program: m.program.clone(),
         }
     }
@@ -142,6 +147,8 @@ impl Info {
             let _ =
                 writeln!(text, "LOST       {lost} blocks, when the file was recovered; wavesplat verify lists them");
         }
+        let options: Vec<String> = self.options.iter().map(|(name, value)| format!("--{name}={value}")).collect();
+        let _ = writeln!(text, "made by    convert {}", options.join(" "));
         let shown = if verbose { self.windows.len() } else { self.windows.len().min(MOST_WINDOWS) };
         for w in &self.windows[..shown] {
             let _ = writeln!(text, "window     {}", w.line(bound, self.promise.tolerance));

@@ -10,6 +10,7 @@ mod verify;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+use wavesplat::cli::{self, GenerateArgs};
 
 /// Compresses time-varying volumes along time under a guaranteed error bound.
 #[derive(Debug, Parser)]
@@ -41,15 +42,26 @@ enum Command {
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),
     Recover(recover::RecoverArgs),
+    /// Write completions for a shell, or man pages
+    #[command(
+        subcommand,
+        before_help = "\
+Examples:
+  wavesplat generate completions bash > /etc/bash_completion.d/wavesplat
+  wavesplat generate man -o /usr/local/share/man/man1",
+        after_help = "Of pictures: wavesplat-render --generate completions-bash, wavesplat-render --generate man."
+    )]
+    Generate(GenerateArgs),
 }
 
 fn main() -> ExitCode {
-    wavesplat::cli::main(|cli: Cli| match cli.command {
+    cli::main(|cli: Cli| match cli.command {
         Command::Convert(args) => convert::run(&args),
         Command::Append(args) => append::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Extract(args) => extract::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Generate(args) => args.run(cli::command::<Cli>()),
     })
 }

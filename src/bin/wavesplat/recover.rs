@@ -43,8 +43,12 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
     let damaged = FileBytes::open(&args.file, Access::unless(args.no_mmap))?;
     spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
-    let report =
-        recover(&damaged, &args.output, &mut out, [&args.common.progress("bytes"), &args.common.progress("blocks")])?;
+    let report = recover(
+        &damaged,
+        &args.output,
+        &mut out,
+        [&args.common.progress("search", "bytes"), &args.common.progress("recover", "blocks")],
+    )?;
     out.commit_if(resume::check)?;
     let to_stdout = args.output == Path::new(STANDARD);
     if !args.common.json && !args.common.quiet {

@@ -45,7 +45,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         Some(source) => Some(source.as_mut()),
         None => None,
     };
-    let report = verify(&file, source, args.common.memory.0, &args.common.progress("blocks"))?;
+    let report = verify(&file, source, args.common.memory.0, &args.common.progress("verify", "blocks"))?;
     if args.common.json {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {

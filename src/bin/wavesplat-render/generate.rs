@@ -1,0 +1,52 @@
+//! The program's own completions and man page, instead of pictures.
+
+use crate::Cli;
+use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
+use wavesplat::cli::{self, Generated};
+use wavesplat::error::Result;
+
+/// What the program is asked for.
+pub(crate) enum Program {
+    Render(Box<Cli>),
+    Generate(Generated),
+}
+
+impl Program {
+    pub(crate) fn run(self) -> Result<()> {
+        match self {
+            Self::Render(cli) => cli.run(),
+            Self::Generate(what) => what.run(cli::command::<Self>()),
+        }
+    }
+}
+
+const GENERATE: &str = "generate";
+
+impl CommandFactory for Program {
+    fn command() -> Command {
+        let generate = Arg::new(GENERATE).long(GENERATE).value_name("WHAT").exclusive(true);
+        let generate = generate.value_parser(|text: &str| text.parse::<Generated>());
+        let help = "Print the man page (man) or the completions of a shell (completions-bash, -zsh, -fish ...), and nothing else";
+        Cli::command().arg(generate.help(help))
+    }
+
+    fn command_for_update() -> Command {
+        Self::command()
+    }
+}
+
+impl FromArgMatches for Program {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        match matches.get_one::<Generated>(GENERATE) {
+            Some(what) => Ok(Self::Generate(*what)),
+            None => Cli::from_arg_matches(matches).map(|cli| Self::Render(Box::new(cli))),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Parser for Program {}

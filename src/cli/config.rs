@@ -1,0 +1,199 @@
+//! Options from a file: TOML whose keys are the long names of options, at its top for every command that has them, or in a table
+//! for the command of its name. They are put before the arguments of the command line, without those that are there too.
+
+use super::advice::chosen;
+use crate::error::{Error, Result};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Command};
+use std::env;
+use std::ffi::OsString;
+use std::fs;
+use std::ops::Range;
+use std::path::PathBuf;
+use toml::de::{DeTable, DeValue};
+
+/// The id of the option that names a file.
+const CONFIG: &str = "config";
+
+/// What a file gives.
+#[derive(Debug, Default)]
+pub(super) struct Config {
+    path: PathBuf,
+    options: Vec<Taken>,
+}
+
+/// An option that is taken from a file.
+#[derive(Debug)]
+struct Taken {
+    name: String,
+    line: usize,
+    args: Vec<OsString>,
+}
+
+impl Config {
+    /// What the file of `--config`, or of the program's environment variable, gives to a command line; nothing if there is no
+    /// file, or a command that takes none.
+    pub(super) fn read(program: &Command, args: &[OsString]) -> Result<Self> {
+        let command = chosen(program, args);
+        let parsed = program.clone().ignore_errors(true).try_get_matches_from(args);
+        let Ok(matches) = parsed else { return Ok(Self::default()) }; // help, or an error that comes again
+        let given = matches.subcommand().map_or(&matches, |(_, of_command)| of_command);
+        if !command.get_arguments().any(|arg| arg.get_id() == CONFIG) {
+            return Ok(Self::default());
+        }
+        match given.get_one::<PathBuf>(CONFIG).cloned().or_else(|| from_environment(program)) {
+            Some(path) => {
+                let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "reading", e))?;
+                let file = File { path, text: &text, program };
+                let options = file.options(command, given)?;
+                Ok(Self { path: file.path, options })
+            }
+            None => Ok(Self::default()),
+        }
+    }
+
+    /// The command line with what the file adds.
+    pub(super) fn before(&self, program: &Command, args: &[OsString]) -> Vec<OsString> {
+        let at = if program.has_subcommands() { 2 } else { 1 }.min(args.len());
+        let added = self.options.iter().flat_map(|option| &option.args);
+        args[..at].iter().chain(added).chain(&args[at..]).cloned().collect()
+    }
+
+    /// Where an option is from, if it is from the file.
+    pub(super) fn place(&self, option: &str) -> Option<String> {
+        let taken = self.options.iter().find(|taken| taken.name == option)?;
+        Some(format!("{} is from {}, line {}", taken.name, self.path.display(), taken.line))
+    }
+
+    /// What was taken from the file, in words.
+    pub(super) fn words(&self) -> Option<String> {
+        let names: Vec<&str> = self.options.iter().map(|taken| taken.name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("{} gives: {}", self.path.display(), names.join(", ")))
+    }
+}
+
+/// The file that a program's variable names: `WAVESPLAT_CONFIG` and so on.
+fn from_environment(program: &Command) -> Option<PathBuf> {
+    let name = program.get_name().to_uppercase().replace('-', "_");
+    env::var_os(format!("{name}_CONFIG")).filter(|path| !path.is_empty()).map(PathBuf::from)
+}
+
+/// A file that is looked through.
+struct File<'a> {
+    path: PathBuf,
+    text: &'a str,
+    program: &'a Command,
+}
+
+impl File<'_> {
+    /// All options of the file for a command, but those that the command line gives or that cannot go with these.
+    fn options(&self, command: &Command, given: &ArgMatches) -> Result<Vec<Taken>> {
+        let table = DeTable::parse(self.text);
+        let table = table.map_err(|e| self.wrong(&e.span().unwrap_or(0..0), e.message().trim()))?.into_inner();
+        let (mut options, mut own): (Vec<Taken>, Vec<&str>) = (Vec::new(), Vec::new());
+        for (name, entries) in table.iter().filter_map(|(key, value)| Some((key, value.get_ref().as_table()?))) {
+            let Some(owner) = self.program.find_subcommand(name.get_ref().as_ref()) else {
+                let what = format!("[{}] is no command of {}", name.get_ref(), self.program.get_name());
+                return Err(self.wrong(&name.span(), &what));
+            };
+            for (key, value) in entries {
+                let taken = self.taken(owner, (key.get_ref(), &key.span()), (value.get_ref(), given))?;
+                if owner.get_name() == command.get_name() {
+                    own.push(key.get_ref());
+                    options.extend(taken);
+                }
+            }
+        }
+        for (key, value) in table.iter().filter(|(_, value)| !value.get_ref().is_table()) {
+            self.check_known(key.get_ref(), &key.span())?;
+            if find(command, key.get_ref()).is_some() && !own.contains(&key.get_ref().as_ref()) {
+                options.extend(self.taken(command, (key.get_ref(), &key.span()), (value.get_ref(), given))?);
+            }
+        }
+        Ok(options)
+    }
+
+    /// An error if no command has an option of this name.
+    fn check_known(&self, key: &str, at: &Range<usize>) -> Result<()> {
+        let commands = || std::iter::once(self.program).chain(self.program.get_subcommands());
+        if commands().any(|command| find(command, key).is_some()) {
+            return Ok(());
+        }
+        Err(self.unknown(self.program.get_name(), key, at))
+    }
+
+    fn unknown(&self, owner: &str, key: &str, at: &Range<usize>) -> Error {
+        let commands = || std::iter::once(self.program).chain(self.program.get_subcommands());
+        let meant = key.trim_start_matches('-').replace('_', "-");
+        let what = if commands().any(|command| command.get_positionals().any(|arg| arg.get_id() == key)) {
+            format!("{key}: what is read is named on the command line")
+        } else if meant != key && commands().any(|command| find(command, &meant).is_some()) {
+            format!("{key}: no option of {owner}; {meant} is one")
+        } else {
+            format!("{key}: no option of {owner}; its --help lists them")
+        };
+        self.wrong(at, &what)
+    }
+
+    /// What is taken of a key; nothing if the command line has more to say.
+    fn taken(
+        &self,
+        owner: &Command,
+        (key, at): (&str, &Range<usize>),
+        (value, given): (&DeValue<'_>, &ArgMatches),
+    ) -> Result<Option<Taken>> {
+        let Some(arg) = find(owner, key) else { return Err(self.unknown(owner.get_name(), key, at)) };
+        let args = arguments(arg, value).map_err(|what| self.wrong(at, &format!("{key}: {what}")))?;
+        let is_given = |arg: &Arg| {
+            let id = arg.get_id().as_str();
+            given.try_contains_id(id).is_ok() && given.value_source(id) == Some(ValueSource::CommandLine)
+        };
+        let against = |a: &Arg, b: &Arg| owner.get_arg_conflicts_with(a).iter().any(|c| c.get_id() == b.get_id());
+        let mut asked = owner.get_arguments().filter(|arg| is_given(arg));
+        let yields = is_given(arg) || asked.any(|asked| against(asked, arg) || against(arg, asked));
+        Ok((!yields && !args.is_empty()).then(|| Taken { name: key.into(), line: self.line(at), args }))
+    }
+
+    fn wrong(&self, at: &Range<usize>, what: &str) -> Error {
+        Error::usage(format!("{}: line {}: {what}", self.path.display(), self.line(at)))
+    }
+
+    fn line(&self, at: &Range<usize>) -> usize {
+        self.text.bytes().take(at.start).filter(|byte| *byte == b'\n').count() + 1
+    }
+}
+
+/// A command's option of a long name that a file may have.
+fn find<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
+    let mut options = command.get_opts().chain(command.get_arguments().filter(|arg| is_flag(arg)));
+    options.find(|arg| arg.get_long() == Some(name) && arg.get_id() != CONFIG && !arg.is_exclusive_set())
+}
+
+fn is_flag(arg: &Arg) -> bool {
+    matches!(arg.get_action(), ArgAction::SetTrue)
+}
+
+/// An option of a file as arguments.
+fn arguments(arg: &Arg, value: &DeValue<'_>) -> std::result::Result<Vec<OsString>, &'static str> {
+    let name = arg.get_long().unwrap_or_default();
+    let with = |value: String| OsString::from(format!("--{name}={value}"));
+    match (value, arg.get_action()) {
+        (DeValue::Boolean(on), ArgAction::SetTrue) => Ok(on.then(|| format!("--{name}").into()).into_iter().collect()),
+        (_, ArgAction::SetTrue) => Err("takes true or false"),
+        (DeValue::Array(values), ArgAction::Append) => {
+            let words = values.iter().map(|value| scalar(value.get_ref()).map(with));
+            words.collect::<Option<Vec<_>>>().ok_or("takes strings or numbers")
+        }
+        (DeValue::Array(_), _) => Err("takes one value, not several: numbers with commas between them are a string"),
+        (value, _) => scalar(value).map(|value| vec![with(value)]).ok_or("takes a string or a number"),
+    }
+}
+
+fn scalar(value: &DeValue<'_>) -> Option<String> {
+    match value {
+        DeValue::String(text) => Some(text.to_string()),
+        DeValue::Integer(number) if number.radix() == 10 => Some(number.as_str().into()),
+        DeValue::Float(number) => Some(number.as_str().into()),
+        _ => None,
+    }
+}

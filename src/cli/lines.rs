@@ -1,0 +1,96 @@
+//! Progress as lines of JSON.
+
+use super::note;
+use serde::Serialize;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// An object a line on standard error: a few a second, and always one of how far the stage came.
+#[derive(Debug)]
+pub struct Lines {
+    stage: &'static str,
+    unit: &'static str,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    total: Option<u64>,
+    done: u64,
+    /// Steps of these that an earlier run did.
+    before: u64,
+    /// None before the stage begins.
+    started: Option<Instant>,
+    /// When a line was written last, and how many steps it said.
+    told: Option<(Instant, u64)>,
+}
+
+/// What a line says.
+#[derive(Debug, Serialize)]
+struct Line {
+    stage: &'static str,
+    done: u64,
+    total: Option<u64>,
+    unit: &'static str,
+    per_second: Option<f64>,
+    seconds_left: Option<f64>,
+}
+
+const BETWEEN_LINES: Duration = Duration::from_millis(500);
+
+impl Lines {
+    pub(super) fn new(stage: &'static str, unit: &'static str) -> Self {
+        let state = State { total: None, done: 0, before: 0, started: None, told: None };
+        Self { stage, unit, state: Mutex::new(state) }
+    }
+
+    pub(super) fn start(&self, total: Option<u64>) {
+        let mut state = self.state();
+        (state.total, state.started) = (total, Some(Instant::now()));
+        self.tell(&mut state);
+    }
+
+    pub(super) fn go_on(&self, steps: u64) {
+        let mut state = self.state();
+        (state.done, state.before) = (steps, steps);
+    }
+
+    pub(super) fn advance(&self, steps: u64) {
+        let mut state = self.state();
+        state.done += steps;
+        if state.told.is_none_or(|(when, _)| when.elapsed() >= BETWEEN_LINES) {
+            self.tell(&mut state);
+        }
+    }
+
+    /// Says how far it is, unless that was the last that was said.
+    pub(super) fn tell_last(&self) {
+        let mut state = self.state();
+        if state.started.is_some() && state.told.is_none_or(|(_, done)| done != state.done) {
+            self.tell(&mut state);
+        }
+    }
+
+    fn tell(&self, state: &mut State) {
+        let State { total, done, before, started, .. } = *state;
+        let seconds = started.map_or(0.0, |started| started.elapsed().as_secs_f64());
+        let per_second = Some((done - before) as f64 / seconds).filter(|speed| speed.is_finite() && *speed > 0.0);
+        let left = total.map(|total| total.saturating_sub(done) as f64);
+        let seconds_left = left.and_then(|left| per_second.map(|speed| left / speed));
+        let line = Line { stage: self.stage, done, total, unit: self.unit, per_second, seconds_left };
+        if let Ok(line) = serde_json::to_string(&line) {
+            note(line);
+        }
+        state.told = Some((Instant::now(), done));
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        self.tell_last();
+    }
+}

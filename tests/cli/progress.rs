@@ -1,0 +1,64 @@
+//! Progress for programs that watch.
+
+use super::{Archive, Run, Work};
+use serde_json::Value;
+
+/// The lines of a run's progress.
+fn lines(run: &Run) -> Vec<Value> {
+    let lines = run.err.lines().filter(|line| line.starts_with('{'));
+    lines.map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"))).collect()
+}
+
+/// Every stage of a run counts up and ends with all done.
+#[track_caller]
+fn counts(run: &Run, stages: &[&str]) {
+    let lines = lines(run);
+    let mut seen: Vec<&str> = lines.iter().map(|line| line["stage"].as_str().unwrap()).collect();
+    seen.dedup();
+    assert_eq!(seen, stages, "{}", run.err);
+    for stage in stages {
+        let of_stage: Vec<&Value> = lines.iter().filter(|line| line["stage"] == *stage).collect();
+        let done: Vec<u64> = of_stage.iter().map(|line| line["done"].as_u64().unwrap()).collect();
+        let last = of_stage[of_stage.len() - 1];
+        assert!(done.is_sorted() && last["done"] == last["total"], "{}", run.err);
+        assert!(last["unit"].is_string() && last.get("per_second").is_some() && last.get("seconds_left").is_some());
+    }
+}
+
+#[test]
+fn every_command_that_works_long_tells_how_far_it_is() {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([20, 14, 10], 40).npy());
+    counts(&work.wavesplat("convert a.npy -o a.wspl --window 8 --progress json").ok(), &["convert"]);
+    counts(&work.wavesplat("verify a.wspl --against a.npy --progress json").ok(), &["verify"]);
+    counts(&work.wavesplat("extract a.wspl -o b.npy --progress json").ok(), &["extract"]);
+    counts(&work.wavesplat("recover a.wspl -o b.wspl --progress json").ok(), &["search", "recover"]);
+    counts(&work.wavesplat("append a.wspl a.npy --force --progress json").ok(), &["convert"]);
+    counts(&work.render("a.wspl --size 20x20 -o c.npy --progress json").ok(), &["render"]);
+    counts(&work.render("a.wspl --size 20x20 --mode mip -o d.npy --progress json").ok(), &["render"]);
+    let colours = "convert a.npy -o c.wspl --transfer-function turbo --progress json";
+    counts(&work.wavesplat(colours).ok(), &["values", "convert"]);
+}
+
+#[test]
+fn nothing_is_told_of_progress_unasked() {
+    let work = Work::with_file("");
+    for how in ["", "--progress auto", "--progress none", "--progress json -q"] {
+        let run = work.wavesplat(&format!("convert a.npy -o a.wspl --force {how}")).ok();
+        assert!(lines(&run).is_empty() && run.err.lines().count() <= 1, "{how}: {}", run.err);
+    }
+    work.wavesplat("convert a.npy -o b.wspl --progress often").fails(2, &["--progress", "auto", "json", "none"]);
+}
+
+#[test]
+fn a_stage_that_fails_still_says_how_far_it_came() {
+    let work = Work::new();
+    let archive = Archive::smooth([20, 14, 10], 40);
+    let cut = &archive.npy()[..128 + 29 * 11_200];
+    let run = work.piped("convert - -o a.wspl --window 8 --progress json", cut).fails(3, &["what is finished is kept"]);
+    let lines = lines(&run);
+    let last = &lines[lines.len() - 1];
+    assert!(last["done"].as_u64() >= Some(3), "{}", run.err);
+    let again = work.piped("convert - -o a.wspl --window 8 --progress json --resume", &archive.npy()).ok();
+    assert!(again.err.contains("\"done\":5,\"total\":5"), "{}", again.err);
+}
