@@ -16,6 +16,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+use std::thread;
 use std::time::SystemTime;
 
 /// How the bytes of a file are reached.
@@ -237,6 +238,40 @@ pub fn explain_sigbus() {
         action.sa_flags = libc::SA_SIGINFO;
         libc::sigaction(libc::SIGBUS, &raw const action, ptr::null_mut());
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
+}
+
+/// Bytes of the stack of a thread that waits, then writes a few words: they count where memory is limited.
+const WAITING_STACK: usize = 256 << 10;
+
+/// Makes SIGINT (Ctrl-C) and SIGTERM call `end` with the signal's number, on a thread that waits for nothing else; a second one
+/// ends the process at once. Signals that are ignored, as those of a background job may be, stay so.
+///
+/// For programs, called once at their start, before any thread: those that come inherit what is blocked.
+pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
+    // SAFETY: both sets are made by `sigemptyset`, `was` is zeroed and filled in by `sigaction`, which changes nothing where
+    // it is given no new action. Only the mask of this thread changes, and that of the thread that waits.
+    unsafe {
+        let mut asked: libc::sigset_t = std::mem::zeroed();
+        libc::sigemptyset(&raw mut asked);
+        for signal in [libc::SIGINT, libc::SIGTERM] {
+            let mut was: libc::sigaction = std::mem::zeroed();
+            libc::sigaction(signal, ptr::null(), &raw mut was);
+            if was.sa_sigaction != libc::SIG_IGN {
+                libc::sigaddset(&raw mut asked, signal);
+            }
+        }
+        libc::pthread_sigmask(libc::SIG_BLOCK, &raw const asked, ptr::null_mut());
+        let waits = thread::Builder::new().stack_size(WAITING_STACK).spawn(move || {
+            let mut signal = 0;
+            if libc::sigwait(&raw const asked, &raw mut signal) == 0 {
+                libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const asked, ptr::null_mut());
+                end(signal);
+            }
+        });
+        if waits.is_err() {
+            libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const asked, ptr::null_mut()); // as if nobody had asked
+        }
     }
 }
 

@@ -10,6 +10,8 @@ use std::fs::{self, File, Permissions, TryLockError};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The name that stands for a standard stream.
@@ -38,7 +40,7 @@ struct Part {
     /// Whether what is flushed can be gone on with, and must outlive this run.
     resumable: bool,
     /// No longer to be removed.
-    keep: bool,
+    keep: Arc<AtomicBool>,
     synced: Instant,
 }
 
@@ -48,9 +50,31 @@ const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 /// How long a lock is waited for: a process that was killed may hold it a little longer.
 const DYING: Duration = Duration::from_secs(1);
 
+/// The unfinished files of this process, and whether each is worth keeping: for [`abandon`].
+static PARTS: Mutex<Vec<(PathBuf, Arc<AtomicBool>)>> = Mutex::new(Vec::new());
+
+fn parts() -> MutexGuard<'static, Vec<(PathBuf, Arc<AtomicBool>)>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes all unfinished files but those that can be gone on with, which it names. The process must end now: whoever gives a
+/// file its name, or takes one away, waits for ever.
+pub fn abandon() -> Vec<PathBuf> {
+    let parts = parts();
+    let is_kept = |keep: &AtomicBool| keep.load(Ordering::Relaxed);
+    for (path, _) in parts.iter().filter(|(_, keep)| !is_kept(keep)) {
+        let _ = fs::remove_file(path); // nobody is left to hear of a failure
+    }
+    let kept = parts.iter().filter(|(path, keep)| is_kept(keep) && path.exists());
+    let kept = kept.map(|(path, _)| path.clone()).collect();
+    std::mem::forget(parts);
+    kept
+}
+
 impl Drop for Part {
     fn drop(&mut self) {
-        if !self.keep {
+        parts().retain(|(path, _)| *path != self.path);
+        if !self.is_kept() {
             let _ = fs::remove_file(&self.path); // nobody is left to hear of a failure
         }
     }
@@ -91,7 +115,8 @@ impl Output {
         let mut out = Self::create_after(path, force, |_| Ok(()))?;
         if let Target::File(part, file) = &mut out.target {
             let held = file.get_ref().metadata().map_or(0, |m| m.len());
-            (part.resumable, part.keep) = (true, held > 0);
+            part.resumable = true;
+            part.set_kept(held > 0);
         }
         Ok(out)
     }
@@ -107,14 +132,14 @@ impl Output {
     /// Leaves the first `bytes` of an unfinished file, after which writing goes on.
     pub fn begin_at(&mut self, bytes: u64) -> Result<()> {
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
-        part.keep = bytes > 0;
+        part.set_kept(bytes > 0);
         let cut = file.get_mut().set_len(bytes).and_then(|()| file.seek(SeekFrom::Start(bytes)));
         cut.map(drop).map_err(|e| Error::io(&part.path, "cutting", e))
     }
 
     /// Whether what was written so far stays if the output is dropped.
     pub fn is_kept(&self) -> bool {
-        matches!(&self.target, Target::File(part, _) if part.keep)
+        matches!(&self.target, Target::File(part, _) if part.is_kept())
     }
 
     /// An error if a file cannot be made at `path`, as far as can be told without making it.
@@ -151,7 +176,7 @@ impl Output {
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
         right(&part.path)?;
-        part.keep = true; // if its name cannot be given, the work must not be lost
+        part.set_kept(true); // if its name cannot be given, the work must not be lost
         let doing = || format!("giving the finished {} this name", part.path.display());
         part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))?;
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -161,6 +186,20 @@ impl Output {
 }
 
 impl Part {
+    fn new(path: PathBuf, replace: bool) -> Self {
+        let keep = Arc::new(AtomicBool::new(false));
+        parts().push((path.clone(), keep.clone()));
+        Self { path, replace, resumable: false, keep, synced: Instant::now() }
+    }
+
+    fn is_kept(&self) -> bool {
+        self.keep.load(Ordering::Relaxed)
+    }
+
+    fn set_kept(&self, keep: bool) {
+        self.keep.store(keep, Ordering::Relaxed);
+    }
+
     /// Opens and locks `NAME.part`; one that nobody holds is left over from a run that died.
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
         let part = part_of(path);
@@ -199,8 +238,7 @@ impl Part {
                         let mode = replaced.permissions().mode() | 0o200; // it is yet to be written
                         file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
                     }
-                    let (resumable, keep, synced) = (false, false, Instant::now());
-                    return Ok((file, Self { path: part, replace, resumable, keep, synced }));
+                    return Ok((file, Self::new(part, replace)));
                 }
                 (false, _) => {}
             }
@@ -210,7 +248,7 @@ impl Part {
     /// Sees to it that what was written is not lost, if this is a file to go on with.
     fn keep(&mut self, file: &File) -> io::Result<()> {
         if self.resumable {
-            self.keep = true;
+            self.set_kept(true);
             if self.synced.elapsed() >= BETWEEN_SYNCS {
                 file.sync_data()?;
                 self.synced = Instant::now();
@@ -220,6 +258,7 @@ impl Part {
     }
 
     fn rename(&self, path: &Path) -> io::Result<()> {
+        let _whole = parts(); // no half of this, and nothing after all was abandoned
         if self.replace {
             return fs::rename(&self.path, path);
         }

@@ -1,7 +1,8 @@
 //! The manners that the programs share: common options, values of options, progress, exit codes.
 //!
 //! Standard output carries data or one JSON object; notes and progress go to standard error. `config` puts options of a file
-//! before those of the command line.
+//! before those of the command line, and `program` ends a program: with the exit code of an error, or at once when it is
+//! interrupted.
 
 mod advice;
 mod colours;

@@ -4,15 +4,18 @@ use super::config::Config;
 use super::{advice, note};
 use crate::error::{Error, Result};
 use crate::mapped;
+use crate::output::abandon;
 use clap::error::ErrorKind;
 use clap::{Command, Parser};
 use std::env;
 use std::ffi::OsString;
-use std::process::ExitCode;
+use std::io::{self, IsTerminal};
+use std::process::{self, ExitCode};
 
 /// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     mapped::explain_sigbus();
+    mapped::on_interrupt(end);
     let args: Vec<OsString> = env::args_os().collect();
     let config = match Config::read(&command::<A>(), &args) {
         Ok(config) => config,
@@ -35,6 +38,22 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
             code
         }
     }
+}
+
+/// Ends the program as a signal asks: what can be gone on with is kept, all else that is unfinished removed.
+fn end(signal: i32) {
+    if io::stderr().is_terminal() {
+        note(""); // a bar may be there
+    }
+    let kept = abandon();
+    note("error: interrupted");
+    for part in kept {
+        note(format_args!(
+            "{}: what is finished is kept; the same command with --resume goes on with it",
+            part.display()
+        ));
+    }
+    process::exit(128 + signal)
 }
 
 fn failed(error: &Error) -> ExitCode {

@@ -14,6 +14,7 @@ mod faults;
 mod formats_out;
 mod generated;
 mod help;
+mod interrupted;
 mod job;
 mod killed;
 mod manners;
