@@ -57,6 +57,16 @@ impl Layout {
         self
     }
 
+    /// The array without its slowest axes of which only one is meant, and how many samples come before it.
+    pub(super) fn meant(&self) -> (usize, Self) {
+        let (mut before, mut rest) = (0, self.clone());
+        while let Some(Axis { counts: Counts::Only(index), .. }) = rest.0.first().copied() {
+            rest.0.remove(0);
+            before += index * rest.0.iter().map(|axis| axis.len).product::<usize>();
+        }
+        (before, rest)
+    }
+
     /// Bytes of the whole array.
     pub(super) fn bytes(&self, size: usize) -> Parsed<usize> {
         let bytes = self.0.iter().try_fold(size, |bytes, axis| bytes.checked_mul(axis.len));
@@ -119,6 +129,13 @@ mod tests {
         }
         assert_eq!(layout.dims(), [3, 1, 4]);
         assert_eq!(layout.bytes(2), Ok(240));
+    }
+
+    #[test]
+    fn what_is_meant_comes_after_what_is_not() {
+        let axes = [(Counts::Only(1), 2), (Counts::Only(3), 4), (Counts::Frames, 5), (Counts::Only(0), 3)];
+        let layout = Layout(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec());
+        assert_eq!(layout.meant(), (4 * 5 * 3 + 3 * 5 * 3, Layout(layout.0[2..].to_vec())));
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub struct OpenOptions {
     pub big_endian: bool,
     /// Bytes before the first sample of each file; for headerless data alone.
     pub offset: u64,
-    /// Which array of a file is meant.
+    /// Which array of a file is meant, or which component of one: `velocity[0]`.
     pub variable: Option<String>,
     /// What the axes of an array count, the slowest first: letters of t z y x, or another for an axis beside these.
     pub axes: Option<String>,

@@ -27,6 +27,27 @@ pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usi
     }
 }
 
+/// Which component of a file's only array `--variable` means, and what that is called. An array without a name is called
+/// `samples` where it needs one.
+pub(in crate::source) fn of_only(
+    own: Option<&str>,
+    components: usize,
+    variable: Option<&str>,
+) -> Parsed<(usize, Option<String>)> {
+    let name = own.unwrap_or("samples");
+    let (asked, index) = match variable {
+        None => (name, None),
+        Some(text) if text == name => (name, None),
+        Some(text) => named(text),
+    };
+    if asked != name && !asked.is_empty() {
+        return Err(format!("has no array {asked}; its only one is called {name}"));
+    }
+    let index = chosen(name, components, index)?;
+    let called = if components > 1 { Some(format!("{name}[{index}]")) } else { own.map(String::from) };
+    Ok((index, called))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +60,17 @@ mod tests {
         assert_eq!(named("v[w]"), ("v[w]", None));
         assert_eq!((chosen("v", 1, None), chosen("v", 3, Some(2))), (Ok(0), Ok(2)));
         assert!(chosen("v", 3, None).is_err() && chosen("v", 3, Some(3)).is_err());
+    }
+
+    #[test]
+    fn the_only_array_may_go_unnamed() {
+        let found = |own, components, variable| of_only(own, components, variable).map_err(|_| ());
+        assert_eq!(found(None, 1, None), Ok((0, None)));
+        assert_eq!(found(Some("a[1]"), 1, Some("a[1]")), Ok((0, Some("a[1]".into()))));
+        assert_eq!(found(None, 3, Some("samples[z]")), Ok((2, Some("samples[2]".into()))));
+        assert_eq!(found(Some("v"), 3, Some("[1]")), Ok((1, Some("v[1]".into()))));
+        for refused in [found(None, 3, None), found(None, 1, Some("a")), found(Some("v"), 3, Some("w[0]"))] {
+            assert_eq!(refused, Err(()));
+        }
     }
 }

@@ -1,9 +1,12 @@
 //! Frames in one compressed stream, of gzip or zlib: taken one after another, from the beginning again if need be.
 
 use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::source::described::Decode;
+use crate::mapped::{Access, FileBytes, State};
+use crate::sample::SampleType;
+use crate::source::Parsed;
+use crate::source::described::{At, Decode, Part, Stored};
 use crate::source::held::{Held, read_some};
+use crate::source::layout::{Counts, Layout};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use std::fmt;
 use std::io::{self, BufReader, Read};
@@ -11,6 +14,7 @@ use std::ops::Range;
 use std::path::Path;
 
 const CHUNK: usize = 1 << 20; // bytes taken at a time
+const MOST: u64 = 1032; // bytes that one compressed byte can stand for
 
 /// How a stream is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,16 +39,53 @@ pub(in crate::source) struct Place {
     pub(in crate::source) frame_bytes: usize,
 }
 
+/// A compressed stream in a file, that an array is in.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::source) struct Stream {
+    pub(in crate::source) compression: Compression,
+    /// Where it starts in the file.
+    pub(in crate::source) start: u64,
+    /// Bytes of what it holds that come before the array; fewer than 2^63.
+    pub(in crate::source) skip: u64,
+}
+
+impl Stream {
+    /// The frames of the array: one after another where they lie so, else all together.
+    pub(in crate::source) fn part(
+        self,
+        (path, state): (&Path, State),
+        array: &Layout,
+        sample: SampleType,
+        big_endian: bool,
+    ) -> Parsed<Part> {
+        let Self { compression, start, skip } = self;
+        let all = array.bytes(sample.size())?;
+        check_room(state.len, skip.saturating_add(all as u64))?;
+        let (before, array) = array.meant();
+        let frames = array.len(Counts::Frames);
+        let in_turn = array.0.first().is_none_or(|axis| axis.counts == Counts::Frames);
+        let together = if in_turn { 1 } else { frames };
+        let (bytes, before) = (array.bytes(sample.size())?, before * sample.size());
+        let stored = Stored::new(&array.with_frames(together), sample, big_endian)?;
+        let skip = skip + before as u64;
+        let place = Place { compression, start, skip, together, frames, frame_bytes: bytes / frames };
+        let decoder = Deflated { after: (all - before - bytes) as u64, ..Deflated::new(place) };
+        Ok(Part { path: path.into(), state, frames, stored, at: At::Decoded(Box::new(decoder)) })
+    }
+}
+
 /// Decodes what is at such a place.
 pub(in crate::source) struct Deflated {
     place: Place,
+    /// Bytes that the stream holds after the last frame.
+    after: u64,
     /// What goes on, and the frame that it comes to next.
     reader: Option<(Box<dyn Read + Send>, usize)>,
 }
 
 impl Deflated {
     pub(in crate::source) fn new(place: Place) -> Self {
-        Self { place, reader: None }
+        Self { place, after: 0, reader: None }
     }
 
     /// A reader that comes to a frame next.
@@ -81,23 +122,15 @@ impl Decode for Deflated {
 
     fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
         let mut reader = self.reader_at(path, frames.start)?;
-        let bytes = frames.len() * self.place.frame_bytes;
-        let (mut got, mut chunk) = (0, vec![0; CHUNK.min(bytes)]);
-        while got < bytes {
-            let wanted = chunk.len().min(bytes - got);
-            let at = frames.start + got / self.place.frame_bytes;
-            let n = read_some(&mut reader, &mut chunk[..wanted]).map_err(|e| damaged(path, at, &e))?;
-            if n == 0 {
-                return Err(Error::input(
-                    path,
-                    format!("what it holds ends inside frame {at} of {}", self.place.frames),
-                ));
-            }
-            out.write_at(got as u64, &chunk[..n]).map_err(|e| Error::io(path, format!("holding frame {at}"), e))?;
-            got += n;
+        let Place { frame_bytes, frames: all, .. } = self.place;
+        let bytes = frames.len() * frame_bytes;
+        let at = |got: usize| frames.start + got / frame_bytes;
+        let got = hold(&mut reader, path, (0, bytes), out, |got, e| damaged(path, at(got), e))?;
+        if got < bytes {
+            return Err(Error::input(path, format!("what it holds ends inside frame {} of {all}", at(got))));
         }
         if frames.end == self.place.frames {
-            return expect_end(&mut reader, path);
+            return expect_end(&mut reader, path, self.after);
         }
         self.reader = Some((reader, frames.end));
         Ok(())
@@ -112,12 +145,44 @@ fn damaged(path: &Path, frame: usize, error: &io::Error) -> Error {
     Error::input(path, format!("frame {frame} cannot be decompressed: {error}"))
 }
 
-/// An error if anything comes; this also makes the checksum at the end be looked at.
-fn expect_end(reader: &mut dyn Read, path: &Path) -> Result<()> {
-    match read_some(reader, &mut [0]) {
-        Ok(0) => Ok(()),
-        Ok(_) => Err(Error::input(path, "holds more than its header says")),
-        Err(e) => Err(Error::input(path, format!("its compressed data do not end well: {e}"))),
+/// Refuses sizes that nothing compressed into so few bytes has.
+pub(super) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
+    if bytes <= compressed.saturating_mul(MOST) {
+        return Ok(());
+    }
+    Err(format!("expected {bytes} bytes of what it holds, but {compressed} compressed bytes cannot be so many"))
+}
+
+/// Puts what comes from a reader into its place, from `at` on up to `bytes`, and says how many came. `failed` makes an error
+/// of that of reading after some bytes.
+pub(super) fn hold(
+    reader: &mut dyn Read,
+    path: &Path,
+    (at, bytes): (u64, usize),
+    out: &mut Held,
+    failed: impl Fn(usize, &io::Error) -> Error,
+) -> Result<usize> {
+    let (mut got, mut chunk) = (0, vec![0; CHUNK.min(bytes)]);
+    while got < bytes {
+        let wanted = chunk.len().min(bytes - got);
+        let n = read_some(reader, &mut chunk[..wanted]).map_err(|e| failed(got, &e))?;
+        if n == 0 {
+            break;
+        }
+        out.write_at(at + got as u64, &chunk[..n]).map_err(|e| Error::io(path, "holding its frames", e))?;
+        got += n;
+    }
+    Ok(got)
+}
+
+/// An error unless just so many bytes come; this also makes the checksum at the end be looked at.
+pub(super) fn expect_end(reader: &mut dyn Read, path: &Path, after: u64) -> Result<()> {
+    let bad = |e| Error::input(path, format!("its compressed data do not end well: {e}"));
+    let passed = io::copy(&mut reader.take(after), &mut io::sink()).map_err(bad)?;
+    match read_some(reader, &mut [0]).map_err(bad)? {
+        0 if passed == after => Ok(()),
+        0 => Err(Error::input(path, "holds less than its header says")),
+        _ => Err(Error::input(path, "holds more than its header says")),
     }
 }
 
@@ -128,9 +193,9 @@ impl fmt::Debug for Deflated {
 }
 
 /// The bytes of a file one after another.
-struct FileReader {
-    file: FileBytes,
-    at: u64,
+pub(super) struct FileReader {
+    pub(super) file: FileBytes,
+    pub(super) at: u64,
 }
 
 impl Read for FileReader {

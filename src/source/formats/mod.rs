@@ -4,6 +4,8 @@ mod arrays;
 mod base64;
 mod component;
 mod deflated;
+mod directions;
+mod nifti;
 pub(in crate::source) mod npy;
 mod nrrd;
 pub(in crate::source) mod pvd;
@@ -21,13 +23,19 @@ use std::path::{Path, PathBuf};
 
 /// The formats that describe themselves, for messages.
 pub(in crate::source) const SUPPORTED: &str =
-    ".npy, .nrrd, .nhdr, .vti, .pvd, .nc, .h5, and headerless data of any name";
+    ".npy, .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .vti, .pvd, .nc, .h5, and headerless data of any name";
+
+const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
+
+/// Extensions of files that may be in gzip as a whole.
+const COMPRESSED: [&str; 3] = ["nii", "hdr", "img"];
 
 /// How a file of frames is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::source) enum Format {
     Npy,
     Nrrd,
+    Nifti,
     Vti,
     Hdf5,
     NetCdf,
@@ -45,6 +53,7 @@ impl Format {
         match extension(path).as_str() {
             "npy" => Some(Self::Npy),
             "nrrd" | "nhdr" => Some(Self::Nrrd),
+            "nii" | "nii.gz" | "hdr" | "hdr.gz" => Some(Self::Nifti),
             "vti" => Some(Self::Vti),
             "h5" | "hdf5" | "hdf" | "he5" | "vtkhdf" => Some(Self::Hdf5),
             "nc" | "nc4" | "nc3" | "cdf" | "netcdf" => Some(Self::NetCdf),
@@ -55,20 +64,17 @@ impl Format {
         }
     }
 
-    /// Whether a file may hold several arrays.
-    fn has_variables(self) -> bool {
-        matches!(self, Self::Vti | Self::Hdf5 | Self::NetCdf | Self::Zarr)
-    }
-
     fn by_content(path: &Path) -> Result<Option<Self>> {
-        let head = head(&FileBytes::open(path, Access::Read)?, 16)?;
+        let head = head(&FileBytes::open(path, Access::Read)?, FIRST_READ)?;
+        let is_nifti = nifti::is_nifti(&head) || nifti::header_of(path).is_some();
         let formats = [
-            (npy::MAGIC, Self::Npy),
-            (nrrd::MAGIC, Self::Nrrd),
-            (b"\x89HDF\r\n\x1a\n", Self::Hdf5),
-            (b"CDF", Self::NetCdf),
+            (head.starts_with(npy::MAGIC), Self::Npy),
+            (head.starts_with(nrrd::MAGIC), Self::Nrrd),
+            (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
+            (head.starts_with(b"CDF"), Self::NetCdf),
+            (is_nifti, Self::Nifti),
         ];
-        Ok(formats.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, format)| format))
+        Ok(formats.into_iter().find(|(is, _)| *is).map(|(_, format)| format))
     }
 }
 
@@ -78,9 +84,11 @@ pub(super) fn zarr_metadata(folder: &Path) -> Option<PathBuf> {
     names.map(|name| folder.join(name)).find(|path| path.is_file())
 }
 
-/// The extension in lower case, or nothing.
+/// The extension in lower case, or nothing. That of a compressed file says what is compressed: `nii.gz`.
 pub(in crate::source) fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+    let last = |path: &Path| path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let (own, inner) = (last(path), last(&path.with_extension("")));
+    if own == "gz" && COMPRESSED.contains(&inner.as_str()) { format!("{inner}.gz") } else { own }
 }
 
 /// Reads the header of a file of frames and checks its size.
@@ -95,7 +103,8 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
     }
     match format {
         Some(Format::Npy) => npy::describe(path),
-        Some(Format::Nrrd) => nrrd::describe(path),
+        Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
+        Some(Format::Nifti) => nifti::describe(path, options.variable.as_deref()),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
         Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
@@ -127,13 +136,14 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
         (options.sample.is_some(), "--dtype"),
         (options.big_endian, "--endian"),
         (options.offset > 0, "--offset"),
-        (options.variable.is_some() && !format.has_variables(), "--variable"),
+        (options.variable.is_some() && format == Format::Npy, "--variable"),
         (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "--axes"),
     ];
     match given.into_iter().find(|(given, _)| *given) {
-        Some((_, "--variable")) => {
-            Err(Error::usage(format!("{}: --variable is for files of several arrays; this has one", path.display())))
-        }
+        Some((_, "--variable")) => Err(Error::usage(format!(
+            "{}: --variable is for files that have names; this has one array",
+            path.display()
+        ))),
         Some((_, "--axes")) => {
             let what = "--axes is for HDF5, NetCDF and Zarr; this file says it itself";
             Err(Error::usage(format!("{}: {what}", path.display())))

@@ -1,11 +1,12 @@
-//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x).
+//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x), in C or Fortran order.
 
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{Described, Part, check_size};
+use crate::source::described::{At, Described, Part, Stored, check_size};
 use crate::source::frames::Shape;
+use crate::source::layout::Layout;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -49,25 +50,43 @@ pub struct ArrayHeader {
 /// A file that cannot be read, a damaged header, types of samples that are not supported, Fortran order.
 pub fn array_header(path: &Path) -> Result<ArrayHeader> {
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
-    any_header(&mut BufReader::with_capacity(256, file), path)
+    c_header(&mut BufReader::with_capacity(256, file), path)
 }
 
 /// Reads the header of one file and checks its size.
 pub(in crate::source) fn describe(path: &Path) -> Result<Described> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
-    let Array { shape, frames, big_endian, start } = read_header(&mut BufReader::with_capacity(256, file), path)?;
-    check_size(state.len, start, &shape, frames).map_err(|e| Error::input(path, e))?;
-    let part = Part::plain((path, state), (&shape, frames), big_endian, start).map_err(|e| Error::input(path, e))?;
+    let refused = |e| Error::input(path, e);
+    let (header, order) = any_header(&mut BufReader::with_capacity(256, file), path)?;
+    let Array { shape, frames, big_endian, start } = header.of_volumes().map_err(refused)?;
+    check_size(state.len, start, &shape, frames).map_err(refused)?;
+    let mut layout = Layout::plain(shape.dims(), frames);
+    if order == Order::Fortran {
+        layout.0.reverse();
+    }
+    let stored = Stored::new(&layout, shape.sample(), big_endian).map_err(refused)?;
+    let part = Part { path: path.into(), state, frames, stored, at: At::Byte(start) };
     Ok(Described::plain(shape, vec![part]))
 }
 
 /// Reads up to the first sample, and not a byte further.
 pub(in crate::source) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
-    any_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
+    c_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
 }
 
-fn any_header(reader: &mut impl Read, path: &Path) -> Result<ArrayHeader> {
+/// The header of an array in C order.
+fn c_header(reader: &mut impl Read, path: &Path) -> Result<ArrayHeader> {
+    match any_header(reader, path)? {
+        (header, Order::C) => Ok(header),
+        (_, Order::Fortran) => {
+            let what = "its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))";
+            Err(Error::input(path, what))
+        }
+    }
+}
+
+fn any_header(reader: &mut impl Read, path: &Path) -> Result<(ArrayHeader, Order)> {
     let bytes = header_bytes(reader).map_err(|e| match e.kind() {
         io::ErrorKind::UnexpectedEof => Error::input(path, "ends inside its npy header"),
         io::ErrorKind::InvalidData => Error::input(path, e.to_string()),
@@ -108,14 +127,12 @@ impl ArrayHeader {
     }
 }
 
-fn parse(bytes: &[u8]) -> Parsed<ArrayHeader> {
+fn parse(bytes: &[u8]) -> Parsed<(ArrayHeader, Order)> {
     check_harmless(&bytes[8..])?;
     let header = NpyHeader::from_reader(bytes).map_err(|e| format!("its npy header is damaged: {e}"))?;
     let (sample, big_endian) = sample_type(&header.dtype())?;
-    if header.order() == Order::Fortran {
-        return Err("its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))".into());
-    }
-    Ok(ArrayHeader { lengths: header.shape().to_vec(), sample, big_endian, start: bytes.len() as u64 })
+    let (lengths, start) = (header.shape().to_vec(), bytes.len() as u64);
+    Ok((ArrayHeader { lengths, sample, big_endian, start }, header.order()))
 }
 
 /// Stops text on which the parser would run out of stack or multiply beyond 64 bits.
@@ -230,8 +247,22 @@ mod tests {
         header("'<f4'", "(9223372036854775808, 2, 2)", "too large");
         header("'<f4'", "(99999999999999999999, 2, 2)", "too large");
         header(&"[".repeat(100_000)[..60_000], "(4, 4, 4)", "nested");
-        let fortran = dict("'<f4'", "(2, 2, 4)").replace("False", "True");
-        refused(&[folder.write("a.npy", npy(1, &fortran, &[0; 64]))], &OpenOptions::default(), "Fortran");
+    }
+
+    #[test]
+    fn arrays_in_fortran_order_are_read() {
+        let folder = Folder::new();
+        let plain = payload(SampleType::U16, 0..4, true);
+        let mut stored = Vec::new();
+        for (x, y, z) in (0..7).flat_map(|x| (0..5).flat_map(move |y| (0..3).map(move |z| (x, y, z)))) {
+            for t in 0..4 {
+                stored.extend(&plain[2 * (((t * 3 + z) * 5 + y) * 7 + x)..][..2]);
+            }
+        }
+        let dict = dict("'>u2'", "(4, 3, 5, 7)").replace("False", "True");
+        let file = folder.write("a.npy", npy(1, &dict, &stored));
+        check_inputs(std::slice::from_ref(&file), &OpenOptions::default(), SampleType::U16, 4);
+        assert!(array_header(&file).is_err_and(|e| e.to_string().contains("ascontiguousarray")));
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub(in crate::source) fn shape(options: &OpenOptions) -> Result<(Shape, Option<u
         return Err(Error::usage("--dims with 0 frames describes nothing"));
     }
     if options.variable.is_some() {
-        return Err(Error::usage("--variable is for .vti files; headerless data has one array"));
+        return Err(Error::usage("--variable is for files that have names; headerless data has one array"));
     }
     let shape = Shape::new(dims, sample).map_err(|e| Error::usage(format!("--dims: {e}")))?;
     Ok((shape, frames))

@@ -75,7 +75,7 @@ fn read(source: &mut dyn FrameSource) -> Option<Vec<u8>> {
 /// An input file by its name, beside another with a little data.
 pub fn inputs(data: &[u8]) {
     let mut input = Input::new(data);
-    let name = input.pick(&["a.nrrd", "a.nhdr", "a.vti", "a.pvd", "a.npy"]);
+    let name = input.pick(&["a.nrrd", "a.nhdr", "a.vti", "a.pvd", "a.npy", "a.nii", "a.nii.gz", "a.hdr"]);
     let variable = (input.below(8) == 7).then(|| "a".to_string());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, bytes: &[u8]| {
@@ -85,6 +85,7 @@ pub fn inputs(data: &[u8]) {
     };
     write("b.raw", &[7; 96]);
     write("b.npy", NPY);
+    write("a.img", &[7; 96]);
     let path = write(name, input.rest());
     let options = OpenOptions { access: Access::Read, variable, ..OpenOptions::default() };
     describe(&path, &options);

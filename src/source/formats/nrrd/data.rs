@@ -1,11 +1,15 @@
-//! Where the samples of a NRRD are: after the header, in another file, or in one file for each frame.
+//! Where the samples of a NRRD are: after the header, in another file, or in several.
 
+use super::Array;
+use super::files::Files;
+use super::gathered::{Gathered, Piece};
 use super::header::Header;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::described::{Part, check_size};
-use crate::source::frames::Shape;
+use crate::source::described::{At, Part, Stored, check_size};
+use crate::source::formats::deflated::{Compression, Stream, check_room};
+use crate::source::layout::{Counts, Layout};
 use std::path::Path;
 
 const PIECE: usize = 64 << 10; // bytes read at a time when lines are counted
@@ -17,33 +21,99 @@ struct Skip {
 }
 
 /// The files that hold the frames, checked for their size.
-pub(super) fn parts(
-    file: &FileBytes,
-    header: &Header,
-    shape: &Shape,
-    frames: usize,
-    big_endian: bool,
-) -> Result<Vec<Part>> {
+pub(super) fn parts(file: &FileBytes, header: &Header, array: &Array) -> Result<Vec<Part>> {
     let refused = |e| Error::input(file.path(), e);
     let skip = skip(header).map_err(refused)?;
-    let part = |data: &FileBytes, start, frames| {
-        let start = skip.start(data, start, shape, frames)?;
-        Part::plain((data.path(), data.state()), (shape, frames), big_endian, start).map_err(refused)
-    };
     let Some(named) = header.get("datafile") else {
         if !header.closed {
             return Err(refused("ends inside its header: no empty line comes before the samples".into()));
         }
-        return Ok(vec![part(file, header.len, frames)?]);
+        return Ok(vec![array.part(file, header.len, &skip, &array.layout)?]);
     };
     let folder = file.path().parent().unwrap_or(Path::new(""));
     let open = |name: &str| FileBytes::open(&folder.join(name), Access::Read);
-    match Files::parse(named, &header.list).map_err(refused)? {
-        Files::One(name) => Ok(vec![part(&open(&name)?, 0, frames)?]),
-        many => {
-            let names = many.one_for_each(header, frames).map_err(refused)?;
-            names.map(|name| part(&open(&name)?, 0, 1)).collect()
+    let files = match Files::parse(named, &header.list).map_err(refused)? {
+        Files::One(name) => return Ok(vec![array.part(&open(&name)?, 0, &skip, &array.layout)?]),
+        many => many,
+    };
+    let (count, whole) = array.split(&files).map_err(refused)?;
+    let names = files.names().map_err(refused)?;
+    if whole {
+        let frames = array.axes.len(array.axes.frames) / count;
+        let layout = array.layout.clone().with_frames(frames);
+        return names.map(|name| array.part(&open(&name)?, 0, &skip, &layout)).collect();
+    }
+    let bytes = array.layout.bytes(array.shape.sample().size()).map_err(refused)? / count;
+    let pieces = names.map(|name| array.piece(&open(&name)?, &skip, bytes)).collect::<Result<_>>()?;
+    Ok(vec![array.gathered(file, pieces, bytes).map_err(refused)?])
+}
+
+impl Array {
+    /// How many files there must be, and whether each holds whole frames.
+    fn split(&self, files: &Files) -> Parsed<(usize, bool)> {
+        let sizes = &self.axes.sizes;
+        let slowest = sizes.len() - 1;
+        let (axes, count) = (files.axes().unwrap_or(slowest), files.count()?);
+        if !(1..=sizes.len()).contains(&axes) {
+            return Err(format!("has data files of {axes} axes, but {} axes", sizes.len()));
         }
+        let wanted = sizes[axes..].iter().product::<usize>();
+        let fits = if axes > slowest { count > 0 && sizes[slowest].is_multiple_of(count) } else { count == wanted };
+        if !fits {
+            let wanted = if axes > slowest {
+                format!("one or several of the {}", sizes[slowest])
+            } else {
+                format!("one of the {wanted}")
+            };
+            return Err(format!("names {count} data files, of which each should hold {wanted} parts of {axes} axes"));
+        }
+        Ok((count, axes >= slowest && self.axes.frames == Some(slowest)))
+    }
+
+    /// Frames that are in one file.
+    fn part(&self, data: &FileBytes, header: u64, skip: &Skip, layout: &Layout) -> Result<Part> {
+        let refused = |e| Error::input(data.path(), e);
+        let (sample, file) = (self.shape.sample(), (data.path(), data.state()));
+        let bytes = layout.bytes(sample.size()).map_err(refused)?;
+        if self.gzip {
+            let (start, skip) = skip.compressed(data, header)?;
+            let stream = Stream { compression: Compression::Gzip, start, skip };
+            return stream.part(file, layout, sample, self.big_endian).map_err(refused);
+        }
+        let start = skip.start(data, header, bytes)?;
+        check_size(data.len(), start, &self.shape, bytes / self.shape.frame_bytes()).map_err(refused)?;
+        let stored = Stored::new(layout, sample, self.big_endian).map_err(refused)?;
+        let frames = layout.len(Counts::Frames);
+        Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: At::Byte(start) })
+    }
+
+    /// A file of less than a frame, or of some samples of every frame.
+    fn piece(&self, data: &FileBytes, skip: &Skip, bytes: usize) -> Result<Piece> {
+        let (path, state, gzip) = (data.path().into(), data.state(), self.gzip);
+        if gzip {
+            let (start, skip) = skip.compressed(data, 0)?;
+            let room = check_room(data.len(), skip.saturating_add(bytes as u64));
+            room.map_err(|e| Error::input(data.path(), e))?;
+            return Ok(Piece { path, state, start, skip, gzip });
+        }
+        let start = skip.start(data, 0, bytes)?;
+        if data.len().checked_sub(start) != Some(bytes as u64) {
+            let what =
+                format!("expected {bytes} bytes of samples after {start}, found {}", data.len().saturating_sub(start));
+            return Err(Error::input(path, what));
+        }
+        Ok(Piece { path, state, start, skip: 0, gzip })
+    }
+
+    /// Frames that are in several files: one after another, or all together.
+    fn gathered(&self, file: &FileBytes, pieces: Vec<Piece>, bytes: usize) -> Parsed<Part> {
+        let frames = self.axes.len(self.axes.frames);
+        let in_turn = frames == 1 || self.axes.frames == Some(self.axes.sizes.len() - 1);
+        let together = if in_turn { 1 } else { frames };
+        let layout = self.layout.clone().with_frames(together);
+        let stored = Stored::new(&layout, self.shape.sample(), self.big_endian)?;
+        let at = At::Decoded(Box::new(Gathered { pieces, bytes, together, frames }));
+        Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
     }
 }
 
@@ -57,20 +127,19 @@ fn skip(header: &Header) -> Parsed<Skip> {
 }
 
 impl Skip {
-    /// Where the samples start, and that they fill the rest of the file.
-    fn start(&self, file: &FileBytes, header: u64, shape: &Shape, frames: usize) -> Result<u64> {
-        let refused = |e| Error::input(file.path(), e);
-        let start = match self.bytes {
-            None => {
-                let payload = (shape.frame_bytes() as u64).saturating_mul(frames as u64);
-                file.len().saturating_sub(payload).max(header)
-            }
-            Some(n) => after_lines(file, header, self.lines)?
-                .checked_add(n)
-                .ok_or_else(|| refused("byte skip is too large".into()))?,
+    /// Where samples of so many bytes start.
+    fn start(&self, file: &FileBytes, header: u64, bytes: usize) -> Result<u64> {
+        let Some(skipped) = self.bytes else {
+            return Ok(file.len().saturating_sub(bytes as u64).max(header));
         };
-        check_size(file.len(), start, shape, frames).map_err(refused)?;
-        Ok(start)
+        let start = after_lines(file, header, self.lines)?.checked_add(skipped);
+        start.ok_or_else(|| Error::input(file.path(), "byte skip is too large"))
+    }
+
+    /// Where a compressed stream starts, and bytes to leave out of what it holds.
+    fn compressed(&self, file: &FileBytes, header: u64) -> Result<(u64, u64)> {
+        let skip = self.bytes.ok_or_else(|| Error::input(file.path(), "byte skip -1 is for raw samples alone"))?;
+        Ok((after_lines(file, header, self.lines)?, skip))
     }
 }
 
@@ -93,78 +162,4 @@ fn after_lines(file: &FileBytes, start: u64, lines: u64) -> Result<u64> {
         at += used as u64;
     }
     Ok(at)
-}
-
-/// What `data file` says.
-enum Files {
-    One(String),
-    Pattern { pattern: String, first: i64, last: i64, step: i64, axes: Option<usize> },
-    List { names: Vec<String>, axes: Option<usize> },
-}
-
-impl Files {
-    fn parse(text: &str, list: &[String]) -> Parsed<Self> {
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let axes = |word: Option<&&str>| {
-            word.map(|w| w.parse().map_err(|_| format!("{w:?} is no number of axes"))).transpose()
-        };
-        if words.first() == Some(&"LIST") {
-            return Ok(Self::List { names: list.to_vec(), axes: axes(words.get(1))? });
-        }
-        let numbers: Vec<i64> = words.iter().skip(1).map_while(|w| w.parse().ok()).collect();
-        match (words[..].first(), &numbers[..]) {
-            (Some(pattern), [first, last, step, ..]) if pattern.contains('%') && numbers.len() + 1 == words.len() => {
-                let (pattern, axes) = ((*pattern).into(), axes(words.get(4))?);
-                Ok(Self::Pattern { pattern, first: *first, last: *last, step: *step, axes })
-            }
-            _ => Ok(Self::One(text.into())),
-        }
-    }
-
-    /// The names of files that hold one frame each.
-    fn one_for_each(self, header: &Header, frames: usize) -> Parsed<Box<dyn Iterator<Item = String>>> {
-        let (axes, count) = match &self {
-            Self::List { names, axes } => (*axes, names.len()),
-            Self::Pattern { first, last, step, axes, .. } => (*axes, pattern_count(*first, *last, *step)?),
-            Self::One(_) => (None, 1),
-        };
-        if header.get("dimension") != Some("4") || axes.is_some_and(|a| a != 3) {
-            return Err(
-                "has several data files of less than a frame each; one for each frame of four axes is supported".into(),
-            );
-        }
-        if count != frames {
-            return Err(format!("names {count} data files for {frames} frames"));
-        }
-        Ok(match self {
-            Self::List { names, .. } => Box::new(names.into_iter()),
-            Self::One(name) => Box::new(std::iter::once(name)),
-            Self::Pattern { pattern, first, step, .. } => {
-                numbered(&pattern, first)?; // so that a wrong pattern is an error
-                Box::new((0..count as i64).filter_map(move |i| numbered(&pattern, first + i * step).ok()))
-            }
-        })
-    }
-}
-
-fn pattern_count(first: i64, last: i64, step: i64) -> Parsed<usize> {
-    let wrong = || format!("data file numbers from {first} to {last} in steps of {step} make no sense");
-    let span = last.checked_sub(first).ok_or_else(wrong)?;
-    let steps = span.checked_div(step).filter(|n| *n >= 0).ok_or_else(wrong)?;
-    usize::try_from(steps).ok().and_then(|n| n.checked_add(1)).ok_or_else(wrong)
-}
-
-/// A name from a printf pattern with one `%d`, perhaps with a width such as `%03d`.
-fn numbered(pattern: &str, number: i64) -> Parsed<String> {
-    let wrong = || format!("data file pattern {pattern:?} needs one number such as %d or %03d");
-    let (before, rest) = pattern.split_once('%').ok_or_else(wrong)?;
-    let end = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
-    let (digits, after) = rest.split_at(end);
-    let after = after.strip_prefix(['d', 'i', 'u']).filter(|a| !a.contains('%')).ok_or_else(wrong)?;
-    let width: usize = if digits.is_empty() { 0 } else { digits.parse().map_err(|_| wrong())? };
-    if width > 64 {
-        return Err(wrong());
-    }
-    let number = if digits.starts_with('0') { format!("{number:0width$}") } else { format!("{number:width$}") };
-    Ok(format!("{before}{number}{after}"))
 }

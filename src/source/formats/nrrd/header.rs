@@ -87,3 +87,24 @@ pub(super) fn numbers<T: FromStr>(text: &str, what: &str, count: usize) -> Parse
     };
     found.filter(|v| count == 0 || v.len() == count).ok_or_else(wrong)
 }
+
+/// Vectors such as `(1,0,0)`, of three numbers or with time of four, and `none` between them.
+pub(super) fn vectors(text: &str) -> Parsed<Vec<Option<Vec<f64>>>> {
+    let wrong = || format!("{text:?} is not made of vectors of three numbers such as (1,0,0)");
+    let (mut vectors, mut left) = (Vec::new(), text.trim_start());
+    while !left.is_empty() {
+        let Some((inside, rest)) = left.strip_prefix('(').and_then(|left| left.split_once(')')) else {
+            let (word, rest) = left.split_once(char::is_whitespace).unwrap_or((left, ""));
+            if !word.eq_ignore_ascii_case("none") {
+                return Err(wrong());
+            }
+            vectors.push(None);
+            left = rest.trim_start();
+            continue;
+        };
+        let vector: Option<Vec<f64>> = inside.split(',').map(|n| n.trim().parse().ok()).collect();
+        vectors.push(Some(vector.filter(|v| matches!(v.len(), 3 | 4)).ok_or_else(wrong)?));
+        left = rest.trim_start();
+    }
+    Ok(vectors)
+}

@@ -1,33 +1,43 @@
-//! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`): axes x y z or x y z t, raw encoding.
+//! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`), raw or in gzip: three axes of space, perhaps one of
+//! frames and one of components, in any order.
 
+mod axes;
 mod data;
+mod files;
+mod gathered;
 mod header;
 
 pub(in crate::source) use header::MAGIC;
 
+use super::component;
+use super::directions::Placed;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{Described, head};
 use crate::source::frames::Shape;
-use header::{Header, numbers};
+use crate::source::layout::{Axis, Counts, Layout};
+use axes::Axes;
+use header::Header;
 use std::path::Path;
 
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 const FIRST_READ: usize = 4 << 10;
 
-/// Reads the header and checks the size of every data file.
-pub(super) fn describe(path: &Path) -> Result<Described> {
+/// Reads the header and checks the size of every data file that is not compressed.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = read_header(&file)?;
-    let Geometry { shape, frames, big_endian } = geometry(&header).map_err(refused)?;
-    let mut notes = Vec::new();
-    let (spacing, origin) = grid(&header, &mut notes).map_err(refused)?;
-    let parts = data::parts(&file, &header, &shape, frames, big_endian)?;
-    let times = times(&header, frames).map_err(refused)?;
-    Ok(Described { spacing, origin, times, notes, ..Described::plain(shape, parts) })
+    let array = Array::new(&header, variable).map_err(refused)?;
+    let parts = data::parts(&file, &header, &array)?;
+    let times = array.axes.times(&header).map_err(refused)?;
+    let units = array.axes.units(&header);
+    let Array { shape, placed, variable, .. } = array;
+    let Placed { spacing, origin, note, .. } = placed;
+    let notes = note.into_iter().collect();
+    Ok(Described { spacing, origin, times, units, variable, notes, ..Described::plain(shape, parts) })
 }
 
 fn read_header(file: &FileBytes) -> Result<Header> {
@@ -45,30 +55,53 @@ fn read_header(file: &FileBytes) -> Result<Header> {
     }
 }
 
-struct Geometry {
+/// The samples that are meant.
+struct Array {
+    axes: Axes,
+    layout: Layout,
     shape: Shape,
-    frames: usize,
     big_endian: bool,
+    gzip: bool,
+    placed: Placed,
+    variable: Option<String>,
 }
 
-fn geometry(header: &Header) -> Parsed<Geometry> {
-    let encoding = header.required("encoding")?.to_lowercase();
-    if encoding != "raw" {
-        return Err(format!("encoding {encoding} is not supported; only raw is"));
+impl Array {
+    fn new(header: &Header, variable: Option<&str>) -> Parsed<Self> {
+        let gzip = is_gzip(header.required("encoding")?)?;
+        let axes = Axes::parse(header)?;
+        if axes.len(axes.frames) == 0 {
+            return Err("has 0 frames".into());
+        }
+        if axes.len(axes.components) == 0 {
+            return Err("has 0 components".into());
+        }
+        let (index, variable) = component::of_only(None, axes.len(axes.components), variable)?;
+        let placed =
+            axes.placed(header)?.placed(axes.voxels.map(|axis| axes.sizes[axis]), "space directions of the NRRD");
+        let layout = layout(&axes, &placed, index);
+        let sample = sample_type(header.required("type")?)?;
+        let shape = Shape::new(layout.dims(), sample)?;
+        layout.bytes(sample.size())?;
+        Ok(Self { layout, shape, big_endian: big_endian(header, sample)?, gzip, axes, placed, variable })
     }
-    let axes: usize = header.required("dimension")?.parse().map_err(|_| "dimension is no number")?;
-    if axes != 3 && axes != 4 {
-        return Err(format!("has {axes} dimension(s); supported are 3 (x y z) and 4 (x y z t)"));
+}
+
+fn is_gzip(encoding: &str) -> Parsed<bool> {
+    match encoding.to_lowercase().as_str() {
+        "raw" => Ok(false),
+        "gzip" | "gz" => Ok(true),
+        other => Err(format!("encoding {other} is not supported; only raw and gzip are")),
     }
-    let sizes: Vec<usize> = numbers(header.required("sizes")?, "sizes", axes)?;
-    check_kinds(header, axes)?;
-    let frames = sizes.get(3).copied().unwrap_or(1);
-    if frames == 0 {
-        return Err("has 0 frames".into());
-    }
-    let sample = sample_type(header.required("type")?)?;
-    let shape = Shape::new([sizes[0], sizes[1], sizes[2]], sample)?;
-    Ok(Geometry { shape, frames, big_endian: big_endian(header, sample)? })
+}
+
+fn layout(axes: &Axes, placed: &Placed, component: usize) -> Layout {
+    let axis = |(axis, len): (usize, &usize)| match axes.voxels.iter().position(|of| *of == axis) {
+        Some(of) => Axis { backwards: placed.axes[of].1, ..Axis::new(Counts::Voxels(placed.axes[of].0), *len) },
+        None if axes.frames == Some(axis) => Axis::new(Counts::Frames, *len),
+        None => Axis::new(Counts::Only(component), *len),
+    };
+    Layout(axes.sizes.iter().enumerate().map(axis).rev().collect())
 }
 
 fn big_endian(header: &Header, sample: SampleType) -> Parsed<bool> {
@@ -94,85 +127,6 @@ fn sample_type(name: &str) -> Parsed<SampleType> {
         "double" => SampleType::F64,
         _ => return Err(format!("type {name} is not supported; integers up to 32 bits, float and double are")),
     })
-}
-
-/// Refuses axes that are not x y z \[t\] in this order.
-fn check_kinds(header: &Header, axes: usize) -> Parsed<()> {
-    let kinds = header.get("kinds").unwrap_or_default();
-    for (axis, kind) in kinds.split_whitespace().enumerate() {
-        match kind.to_lowercase().as_str() {
-            "domain" | "space" | "none" | "???" => {}
-            "time" | "list" if axis == 3 => {}
-            "time" => {
-                return Err(format!("axis {axis} of {axes} is time; it must be the slowest of four axes, after x y z"));
-            }
-            _ => return Err(format!("axis {axis} is of kind {kind}: one scalar for each voxel is supported")),
-        }
-    }
-    let directions = header.get("spacedirections").unwrap_or_default();
-    match directions.split_whitespace().position(|d| d.eq_ignore_ascii_case("none")) {
-        Some(axis) if !directions.trim_end().to_lowercase().ends_with("none") => {
-            Err(format!("axis {axis} has no space direction: the axes must be x y z, then time"))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Spacing and origin of x, y, z.
-fn grid(header: &Header, notes: &mut Vec<String>) -> Parsed<([f64; 3], [f64; 3])> {
-    let spacing = spacing(header, notes)?;
-    if let Some(text) = header.get("spaceorigin") {
-        return Ok((spacing, vectors(text)?.first().copied().ok_or("space origin is no vector")?));
-    }
-    let mut origin = [0.0; 3];
-    if let Some(text) = header.get("axismins") {
-        let mins: Vec<f64> = numbers(text, "axis mins", 0)?;
-        let centers = header.get("centerings").or(header.get("centers")).unwrap_or_default().to_lowercase();
-        let cell = |axis| centers.split_whitespace().nth(axis) == Some("cell");
-        for (axis, (origin, min)) in origin.iter_mut().zip(&mins).enumerate().filter(|(_, (_, min))| min.is_finite()) {
-            *origin = min + if cell(axis) { spacing[axis] / 2.0 } else { 0.0 };
-        }
-    }
-    Ok((spacing, origin))
-}
-
-fn spacing(header: &Header, notes: &mut Vec<String>) -> Parsed<[f64; 3]> {
-    if let Some(text) = header.get("spacedirections") {
-        let vectors = vectors(text)?;
-        let [x, y, z] = vectors[..] else {
-            return Err(format!("space directions must be three vectors of three numbers, not {text:?}"));
-        };
-        let spacing = [x, y, z].map(|v| v.iter().map(|c| c * c).sum::<f64>().sqrt());
-        if [x[0], y[1], z[2]] != spacing {
-            notes.push("the space directions of the NRRD are not kept: axes are taken as those of the world".into());
-        }
-        return Ok(spacing);
-    }
-    let Some(text) = header.get("spacings") else { return Ok([1.0; 3]) };
-    let spacings: Vec<f64> = numbers(text, "spacings", 0)?;
-    Ok(std::array::from_fn(|a| spacings.get(a).copied().filter(|s| !s.is_nan()).unwrap_or(1.0)))
-}
-
-/// Vectors such as `(1,0,0) (0,1,0) none`, without the `none`.
-fn vectors(text: &str) -> Parsed<Vec<[f64; 3]>> {
-    let wrong = || format!("{text:?} is not made of vectors of three numbers such as (1,0,0)");
-    let inside = text.split('(').skip(1).map(|v| v.split(')').next().unwrap_or_default());
-    let vector = |v: &str| -> Option<[f64; 3]> {
-        let numbers: Option<Vec<f64>> = v.split(',').map(|n| n.trim().parse().ok()).collect();
-        numbers?.try_into().ok()
-    };
-    inside.map(|v| vector(v).ok_or_else(wrong)).collect()
-}
-
-/// Times where the fourth axis has a spacing.
-fn times(header: &Header, frames: usize) -> Parsed<Vec<f64>> {
-    let fourth = |field, what| -> Parsed<Option<f64>> {
-        let all: Vec<f64> = numbers(header.get(field).unwrap_or_default(), what, 0)?;
-        Ok(all.get(3).copied().filter(|n| n.is_finite()))
-    };
-    let Some(step) = fourth("spacings", "spacings")? else { return Ok(Vec::new()) };
-    let first = fourth("axismins", "axis mins")?.unwrap_or(0.0);
-    Ok((0..frames).map(|i| first + step * i as f64).collect())
 }
 
 #[cfg(test)]

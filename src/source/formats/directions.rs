@@ -1,0 +1,98 @@
+//! How the axes of an array go in the world: along the world's in any order and direction, or aslant.
+
+/// What is taken as straight: a part of a step so small does not show.
+const SLANT: f64 = 1e-3;
+
+/// Axes of voxels in the world.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::source) struct Directions {
+    /// From a voxel to the next along each axis of the array, the fastest first.
+    pub(in crate::source) steps: [[f64; 3]; 3],
+    /// World position of the voxel that is stored first.
+    pub(in crate::source) first: [f64; 3],
+}
+
+/// The axes of an array as those of a grid.
+#[derive(Debug, PartialEq)]
+pub(in crate::source) struct Placed {
+    /// Which axis of the grid each axis of the array is, the fastest first, and whether it is stored backwards.
+    pub(in crate::source) axes: [(usize, bool); 3],
+    /// World units between voxels along x, y, z of the grid.
+    pub(in crate::source) spacing: [f64; 3],
+    /// World position of its first voxel.
+    pub(in crate::source) origin: [f64; 3],
+    /// What a user should know.
+    pub(in crate::source) note: Option<String>,
+}
+
+impl Directions {
+    /// Turns an array of these lengths so that its axes ascend along x, y, z. One that is aslant stays as it is stored.
+    pub(in crate::source) fn placed(&self, lengths: [usize; 3], what: &str) -> Placed {
+        let norms = self.steps.map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
+        let Some(along) = self.straight(&norms) else {
+            let note = Some(format!("the {what} are not kept: axes are taken as those of the world"));
+            return Placed { axes: [0, 1, 2].map(|a| (a, false)), spacing: norms, origin: self.first, note };
+        };
+        let (mut spacing, mut origin) = (norms, self.first);
+        let axes = [0, 1, 2].map(|a| {
+            let backwards = self.steps[a][along[a]] < 0.0;
+            spacing[along[a]] = norms[a];
+            origin[along[a]] -= if backwards { norms[a] * lengths[a].saturating_sub(1) as f64 } else { 0.0 };
+            (along[a], backwards)
+        });
+        Placed { axes, spacing, origin, note: turned(&axes) }
+    }
+
+    /// The axis of the world that each axis of the array goes along.
+    fn straight(&self, norms: &[f64; 3]) -> Option<[usize; 3]> {
+        let mut along = [0; 3];
+        for ((along, step), norm) in along.iter_mut().zip(&self.steps).zip(norms) {
+            *along = (0..3).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()))?;
+            let slant = |a: usize| a != *along && step[a].abs() > SLANT * norm;
+            if !norm.is_finite() || *norm == 0.0 || (0..3).any(slant) {
+                return None;
+            }
+        }
+        (0..3).all(|axis| along.contains(&axis)).then_some(along)
+    }
+}
+
+/// Says what is turned, if anything.
+fn turned(axes: &[(usize, bool); 3]) -> Option<String> {
+    let stored =
+        axes.map(|(axis, backwards)| format!("{}{}", if backwards { '-' } else { '+' }, ["x", "y", "z"][axis]));
+    let stored = stored.join(" ");
+    let note = || format!("voxels are stored along {stored} of the world, and are turned to go along +x +y +z");
+    (stored != "+x +y +z").then(note)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn placed(steps: [[f64; 3]; 3]) -> Placed {
+        Directions { steps, first: [1.0, 2.0, 3.0] }.placed([7, 5, 3], "directions")
+    }
+
+    #[test]
+    fn straight_axes_are_turned() {
+        let plain = placed([[0.5, 0.0, 0.0], [0.0, 1.0, 1e-7], [0.0, 0.0, 2.0]]);
+        assert_eq!((plain.origin, plain.note), ([1.0, 2.0, 3.0], None));
+        assert_eq!(plain.axes, [(0, false), (1, false), (2, false)]);
+        let turned = placed([[0.0, 0.0, -0.5], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
+        assert_eq!((turned.spacing, turned.origin), ([4.0, 2.0, 0.5], [1.0, 2.0, 0.0]));
+        assert_eq!(turned.axes, [(2, true), (0, false), (1, false)]);
+        assert!(turned.note.expect("a note").contains("along -z +x +y of the world"));
+    }
+
+    #[test]
+    fn what_is_aslant_stays_as_it_is() {
+        let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]);
+        for steps in [[x, [0.0, 3.0, 4.0], z], [x, x, z], [x, [0.0; 3], z], [x, y, [f64::NAN; 3]]] {
+            let found = placed(steps);
+            assert_eq!(found.axes, [(0, false), (1, false), (2, false)]);
+            assert!(found.note.expect("a note").contains("directions are not kept"));
+        }
+        assert_eq!(placed([x, [0.0, 3.0, 4.0], z]).spacing, [1.0, 5.0, 1.0]);
+    }
+}

@@ -1,0 +1,246 @@
+//! NIfTI, versions 1 and 2: `.nii`, the pair `.hdr` and `.img`, each as it is or in gzip. Axes x y z, x y z t, and with
+//! several components x y z t v.
+
+mod header;
+
+pub(in crate::source) use header::is_nifti;
+
+use super::component;
+use super::deflated::{Compression, Stream};
+use crate::error::{Error, Result};
+use crate::mapped::{Access, FileBytes};
+use crate::sample::SampleType;
+use crate::source::Parsed;
+use crate::source::described::{At, Described, Part, Stored, Units, check_size, head};
+use crate::source::frames::Shape;
+use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::packing::Packing;
+use header::{Header, LONGEST};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+const GZIP: &[u8] = b"\x1f\x8b";
+
+/// Reads the header and checks the size of what is not compressed.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+    let path = &header_of(path).unwrap_or_else(|| path.into());
+    let refused = |e| Error::input(path, e);
+    let (bytes, compressed) = header_bytes(path)?;
+    let header = Header::parse(&bytes).map_err(refused)?;
+    let (data, compressed) = if header.pair { image_of(path)? } else { (path.clone(), compressed) };
+    let array = Array::new(&header, variable).map_err(refused)?;
+    let part = array.part(&header, &data, compressed)?;
+    Ok(array.described(&header, part))
+}
+
+/// The `.hdr` beside an `.img`.
+pub(super) fn header_of(image: &Path) -> Option<PathBuf> {
+    beside(image, "img", &["hdr", "hdr.gz"]).find(|path| path.is_file())
+}
+
+/// The `.img` beside a `.hdr`, and whether it is compressed.
+fn image_of(header: &Path) -> Result<(PathBuf, bool)> {
+    let image = beside(header, "hdr", &["img", "img.gz"]).find(|path| path.is_file());
+    let image = image.ok_or_else(|| Error::input(header, "has its samples in an .img, but there is none beside it"))?;
+    let compressed = super::extension(&image).ends_with("gz");
+    Ok((image, compressed))
+}
+
+/// The file with each of some extensions in place of its own, if that is `own`, perhaps in gzip; in capitals if it is.
+fn beside(path: &Path, own: &str, others: &'static [&'static str]) -> impl Iterator<Item = PathBuf> {
+    let bare = if super::extension(path).ends_with(".gz") { path.with_extension("") } else { path.to_path_buf() };
+    let written = bare.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+    let others = if written.eq_ignore_ascii_case(own) { others } else { &[] };
+    let capitals = written.chars().all(|c| c.is_ascii_uppercase());
+    others.iter().map(move |e| bare.with_extension(if capitals { e.to_uppercase() } else { (*e).to_string() }))
+}
+
+/// The first bytes of the file as they are when decompressed, and whether they were compressed.
+fn header_bytes(path: &Path) -> Result<(Vec<u8>, bool)> {
+    let bytes = head(&FileBytes::open(path, Access::Read)?, LONGEST)?;
+    if !bytes.starts_with(GZIP) {
+        return Ok((bytes, false));
+    }
+    let mut bytes = Vec::new();
+    let stream = Compression::Gzip.open(path, 0)?;
+    match stream.take(LONGEST as u64).read_to_end(&mut bytes) {
+        Ok(_) => Ok((bytes, true)),
+        Err(e) => Err(Error::input(path, format!("its header cannot be decompressed: {e}"))),
+    }
+}
+
+/// The samples that are meant.
+struct Array {
+    layout: Layout,
+    shape: Shape,
+    stored: SampleType,
+    packing: Option<Packing>,
+    components: usize,
+    /// What is known but not where the samples are.
+    known: Known,
+}
+
+/// The grid and the name.
+struct Known {
+    spacing: [f64; 3],
+    origin: [f64; 3],
+    variable: Option<String>,
+    notes: Vec<String>,
+}
+
+impl Array {
+    fn new(header: &Header, variable: Option<&str>) -> Parsed<Self> {
+        let [x, y, z, frames, components] = lengths(&header.dim)?;
+        let own = Some(header.intent_name.as_str()).filter(|name| !name.is_empty());
+        let (index, variable) = component::of_only(own, components, variable)?;
+        let placed = header.directions().placed([x, y, z], "directions of the NIfTI");
+        let voxels = [(2, z), (1, y), (0, x)].map(|(axis, len)| {
+            let (of, backwards) = placed.axes[axis];
+            Axis { backwards, ..Axis::new(Counts::Voxels(of), len) }
+        });
+        let slow = [Axis::new(Counts::Only(index), components), Axis::new(Counts::Frames, frames)];
+        let layout = Layout(slow.into_iter().chain(voxels).collect());
+        let stored = sample_type(header.datatype)?;
+        let packing = packing(header)?;
+        let sample = packing.as_ref().map_or(stored, |_| Packing::sample(stored));
+        let shape = Shape::new(layout.dims(), sample)?;
+        let known = Known {
+            spacing: placed.spacing,
+            origin: placed.origin,
+            variable,
+            notes: placed.note.into_iter().collect(),
+        };
+        Ok(Self { layout, shape, stored, packing, components, known })
+    }
+
+    fn part(&self, header: &Header, data: &Path, compressed: bool) -> Result<Part> {
+        let refused = |e| Error::input(data, e);
+        let file = FileBytes::open(data, Access::Read)?;
+        let start = start(header).map_err(refused)?;
+        let frames = self.layout.len(Counts::Frames);
+        let big_endian = header.big_endian;
+        let mut part = if compressed {
+            let stream = Stream { compression: Compression::Gzip, start: 0, skip: start };
+            stream.part((data, file.state()), &self.layout, self.stored, big_endian).map_err(refused)?
+        } else {
+            let stored = Stored::new(&self.layout, self.stored, big_endian).map_err(refused)?;
+            let whole = Shape::new(self.shape.dims(), self.stored).map_err(refused)?;
+            check_size(file.len(), start, &whole, frames * self.components).map_err(refused)?;
+            Part { path: data.into(), state: file.state(), frames, stored, at: At::Byte(start) }
+        };
+        part.stored.packing.clone_from(&self.packing);
+        Ok(part)
+    }
+
+    fn described(self, header: &Header, part: Part) -> Described {
+        let Known { spacing, origin, variable, notes } = self.known;
+        let times = times(header, part.frames);
+        let units = Units {
+            space: space_unit(header.units).map(String::from),
+            times: time_unit(header.units).filter(|_| !times.is_empty()).map(String::from),
+            samples: None,
+        };
+        Described { spacing, origin, times, variable, units, notes, ..Described::plain(self.shape, vec![part]) }
+    }
+}
+
+/// Lengths of x, y, z, time and components.
+fn lengths(dim: &[i64; 8]) -> Parsed<[usize; 5]> {
+    let [axes, all @ ..] = dim;
+    let axes = usize::try_from(*axes).ok().filter(|axes| (1..=7).contains(axes));
+    let axes = axes.ok_or_else(|| format!("dim[0] is {}, not a number of axes from 1 to 7", dim[0]))?;
+    if axes < 3 {
+        return Err(format!("has {axes} dimension(s); supported are 3 (x y z), 4 (x y z t) and 5 (x y z t v)"));
+    }
+    let mut lengths = [1; 7];
+    for (axis, (len, dim)) in lengths.iter_mut().zip(&all[..axes]).enumerate() {
+        let found = usize::try_from(*dim).ok().filter(|len| *len > 0);
+        *len = found.ok_or_else(|| format!("dim[{}] is {dim}: there are no samples", axis + 1))?;
+    }
+    let [x, y, z, t, v, rest @ ..] = lengths;
+    if rest != [1, 1] {
+        return Err(format!("has {axes} dimensions; supported are 3 (x y z), 4 (x y z t) and 5 (x y z t v)"));
+    }
+    Ok([x, y, z, t, v])
+}
+
+fn sample_type(datatype: i64) -> Parsed<SampleType> {
+    let name = match datatype {
+        2 => return Ok(SampleType::U8),
+        4 => return Ok(SampleType::I16),
+        8 => return Ok(SampleType::I32),
+        16 => return Ok(SampleType::F32),
+        64 => return Ok(SampleType::F64),
+        256 => return Ok(SampleType::I8),
+        512 => return Ok(SampleType::U16),
+        768 => return Ok(SampleType::U32),
+        1 => "single bits",
+        32 => "complex numbers of 2 x 32 bits",
+        128 => "colours of 3 x 8 bits",
+        1024 => "integers of 64 bits",
+        1280 => "unsigned integers of 64 bits",
+        1536 => "floats of 128 bits",
+        1792 => "complex numbers of 2 x 64 bits",
+        2048 => "complex numbers of 2 x 128 bits",
+        2304 => "colours of 4 x 8 bits",
+        _ => return Err(format!("datatype {datatype} is not known")),
+    };
+    Err(format!(
+        "its samples are {name} (datatype {datatype}); supported are integers up to 32 bits, float32 and float64"
+    ))
+}
+
+/// None if the stored numbers are the samples.
+fn packing(header: &Header) -> Parsed<Option<Packing>> {
+    let Header { slope, inter, .. } = *header;
+    if slope == 0.0 || !slope.is_finite() || (slope == 1.0 && inter == 0.0) {
+        return Ok(None);
+    }
+    if !inter.is_finite() {
+        return Err(format!("its scl_slope is {slope}, but its scl_inter {inter} is not finite"));
+    }
+    Ok(Some(Packing::scaled(slope, inter)))
+}
+
+/// Where the samples start in their file.
+fn start(header: &Header) -> Parsed<u64> {
+    let offset = header.vox_offset;
+    let least = if header.pair { 0 } else { header.len };
+    if offset.fract() != 0.0 || !(least as f64..9e15).contains(&offset) {
+        return Err(format!("its vox_offset {offset} is no place after its header of {least} bytes"));
+    }
+    Ok(offset as u64)
+}
+
+/// Times of several frames, if a step says how far they are apart.
+fn times(header: &Header, frames: usize) -> Vec<f64> {
+    let (first, step) = (header.toffset, header.pixdim[4]);
+    if frames == 1 || !(step.is_finite() && step > 0.0 && first.is_finite()) {
+        return Vec::new();
+    }
+    (0..frames).map(|i| first + step * i as f64).collect()
+}
+
+fn space_unit(code: i64) -> Option<&'static str> {
+    match code & 0x07 {
+        1 => Some("m"),
+        2 => Some("mm"),
+        3 => Some("um"),
+        _ => None,
+    }
+}
+
+fn time_unit(code: i64) -> Option<&'static str> {
+    match code & 0x38 {
+        8 => Some("s"),
+        16 => Some("ms"),
+        24 => Some("us"),
+        32 => Some("Hz"),
+        40 => Some("ppm"),
+        48 => Some("rad/s"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;
