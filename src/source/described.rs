@@ -9,9 +9,13 @@ use crate::error::{Error, Result};
 use crate::mapped::{FileBytes, State};
 use crate::sample::SampleType;
 use crate::volume::Grid;
+use std::cmp::Ordering;
 use std::fmt::Debug;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+const FIRST_READ: usize = 4 << 10; // bytes of a header
+const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 
 /// The files of an archive, in order.
 #[derive(Debug, Default)]
@@ -22,6 +26,22 @@ pub(super) struct Files {
     pub(super) times: Vec<f64>,
     /// What a user should know about how they were found.
     pub(super) notes: Vec<String>,
+}
+
+impl Files {
+    /// Checks what a list says of files and times. `kind` is what it is called.
+    pub(super) fn of_list(mut self, kind: &str) -> Parsed<Self> {
+        if !self.times.is_empty() && self.times.len() != self.paths.len() {
+            return Err("gives a time to some of its files only".into());
+        }
+        if let Some(at) = self.times.windows(2).position(|t| t[0] == t[1]) {
+            return Err(format!("lists two files for the time {}; one is supported", self.times[at]));
+        }
+        if self.times.windows(2).any(|t| t[1].partial_cmp(&t[0]) != Some(Ordering::Greater)) {
+            self.notes.push(format!("the times in the {kind} do not ascend; its files are taken in the order listed"));
+        }
+        Ok(self)
+    }
 }
 
 /// Some frames in one file.
@@ -195,4 +215,20 @@ pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
     let mut head = vec![0; len];
     file.read_at(0, &mut head).map_err(|e| Error::io(file.path(), "reading the header", e))?;
     Ok(head)
+}
+
+/// What a header says that ends somewhere: more is read until `parse`, which is told if it has the whole file, finds the end.
+pub(super) fn growing_head<T>(file: &FileBytes, parse: impl Fn(&[u8], bool) -> Parsed<Option<T>>) -> Result<T> {
+    let mut len = FIRST_READ;
+    loop {
+        let bytes = head(file, len)?;
+        let whole = bytes.len() as u64 == file.len();
+        if let Some(header) = parse(&bytes, whole).map_err(|e| Error::input(file.path(), e))? {
+            return Ok(header);
+        }
+        if len >= MAX_HEADER {
+            return Err(Error::input(file.path(), format!("its header does not end within {MAX_HEADER} bytes")));
+        }
+        len *= 4;
+    }
 }

@@ -1,7 +1,7 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
 use super::described::Files;
-use super::formats::{self, Format, SUPPORTED, pvd};
+use super::formats::{self, Format, SUPPORTED, file_series, pvd};
 use super::{OpenOptions, numbering};
 use crate::error::{Error, Result};
 use crate::output::STANDARD;
@@ -51,6 +51,7 @@ fn expand_one(input: &Path, options: &OpenOptions) -> Result<Files> {
     }
     match Format::by_name(input) {
         Some(Format::Pvd) => pvd::read(input),
+        Some(Format::FileSeries) => file_series::read(input),
         _ => Ok(Files { paths: vec![input.into()], ..Files::default() }),
     }
 }
@@ -110,26 +111,32 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
 fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
     let all = visible_files(folder)?;
     let of = |format| all.iter().filter(move |p| Format::by_name(p) == Some(format));
-    let lists: Vec<_> = of(Format::Pvd).collect();
+    let lists: Vec<_> = of(Format::Pvd).chain(of(Format::FileSeries)).collect();
     match lists[..] {
         [list] if options.dims.is_none() => return with_list(list),
-        [a, b, ..] if of(Format::Vti).next().is_none() => {
-            let what = format!("has several .pvd, {} and {}: name the one", name(a), name(b));
+        [a, b, ..] if of(Format::Vti).chain(of(Format::Vtk)).next().is_none() => {
+            let what = format!("has several lists of files, {} and {}: name the one", name(a), name(b));
             return Err(Error::usage(format!("{}: {what}", folder.display())));
         }
         _ => {}
     }
     let frames = |p: &&PathBuf| match Format::by_name(p) {
-        Some(Format::Pvd | Format::Coefficients) => false,
-        Some(_) => options.dims.is_none(),
+        Some(format) => options.dims.is_none() && format.holds_frames(),
         None => options.dims.is_some(),
     };
-    let paths = one_extension(folder, all.iter().filter(frames).cloned().collect())?;
+    let mut paths: Vec<PathBuf> = all.iter().filter(frames).cloned().collect();
+    if paths.iter().any(|p| formats::extension(p) == "pvti") {
+        paths.retain(|p| formats::extension(p) != "vti"); // the pieces
+    }
+    let paths = one_extension(folder, paths)?;
     Ok(Files { paths, ..Files::default() })
 }
 
 fn with_list(list: &Path) -> Result<Files> {
-    let mut files = pvd::read(list)?;
+    let mut files = match Format::by_name(list) {
+        Some(Format::FileSeries) => file_series::read(list)?,
+        _ => pvd::read(list)?,
+    };
     files.notes.push(format!("the frames and times are those of {}", list.display()));
     Ok(files)
 }

@@ -83,8 +83,8 @@ impl Default for OpenOptions {
     }
 }
 
-/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one `.pvd`, or `-` for standard
-/// input.
+/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`, `.series`), or
+/// `-` for standard input.
 ///
 /// The header and size of every file are checked here; samples are read by [`FrameSource::window`].
 ///

@@ -1,131 +1,54 @@
-//! VTK's base64 arrays: a byte count and the samples, each encoded or both together, perhaps broken by white space.
+//! VTK's base64: what some texts one after another encode, perhaps broken by white space.
 
-use crate::error::{Error, Result};
+use super::text::Characters;
 use crate::mapped::FileBytes;
-use crate::source::Parsed;
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
+use std::io::{self, ErrorKind, Read};
 
-const PIECE: usize = 64 << 10; // bytes read at a time
+const GROUP: usize = 4; // characters that are decoded together
 
-/// Where an encoded array is in its file.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::source) struct Place {
-    /// First byte of the text.
-    pub(in crate::source) start: u64,
-    /// How the byte count before the samples is stored.
-    pub(in crate::source) count: Count,
+/// The bytes that text encodes, from a place in a file up to the next `<`. An `=` ends one text; another may follow it.
+pub(in crate::source) struct Text {
+    characters: Characters,
+    left: Vec<u8>,    // characters of a group that is not whole yet
+    decoded: Vec<u8>, // bytes that are next
+    used: usize,      // of these
 }
 
-/// The byte count that VTK puts before the samples of an array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::source) struct Count {
-    /// Whether it has 64 bits, not 32.
-    pub(in crate::source) wide: bool,
-    /// Whether its most significant byte comes first.
-    pub(in crate::source) big_endian: bool,
-}
-
-impl Count {
-    /// Bytes of the count itself.
-    pub(in crate::source) fn size(self) -> usize {
-        if self.wide { 8 } else { 4 }
+impl Text {
+    pub(in crate::source) fn new(file: FileBytes, start: u64) -> Self {
+        Self { characters: Characters::new(file, start), left: Vec::new(), decoded: Vec::new(), used: 0 }
     }
 
-    /// Checks a stored count, whose bytes these are, against what it should be.
-    pub(in crate::source) fn check(self, stored: &[u8], expected: usize) -> Parsed<()> {
-        let mut bytes = [0; 8];
-        bytes[..stored.len()].copy_from_slice(stored);
-        if self.big_endian {
-            bytes[..stored.len()].reverse();
+    fn refill(&mut self) -> io::Result<()> {
+        (self.used, self.decoded) = (0, Vec::new());
+        while self.decoded.is_empty() && !self.characters.ended {
+            self.characters.read(&mut self.left)?;
+            self.left.retain(|c| !c.is_ascii_whitespace());
+            let whole = self.left.len() / GROUP * GROUP;
+            let groups: Vec<u8> = self.left.drain(..whole).collect();
+            let mut rest = groups.as_slice();
+            while !rest.is_empty() {
+                let padding = rest.iter().position(|c| *c == b'=');
+                let (text, after) = rest.split_at(padding.map_or(rest.len(), |at| (at / GROUP + 1) * GROUP));
+                let damaged = |e| io::Error::new(ErrorKind::InvalidData, format!("its base64 array is damaged: {e}"));
+                STANDARD.decode_vec(text, &mut self.decoded).map_err(damaged)?;
+                rest = after;
+            }
         }
-        match u64::from_le_bytes(bytes) {
-            n if n == expected as u64 => Ok(()),
-            n => Err(format!("its array has {n} bytes, but its extent and type need {expected}")),
-        }
+        Ok(())
     }
 }
 
-/// How the text of an array is laid out.
-struct Text {
-    separate: bool, // the count is encoded on its own
-    chars: usize,   // of the count and the samples, white space aside
-}
-
-impl Place {
-    /// Checks the count of an array of `expected` bytes, and that the file can hold its text; with `whole`, that it
-    /// does.
-    pub(in crate::source) fn check(&self, file: &FileBytes, expected: usize, whole: bool) -> Result<()> {
-        let text = self.text(file, expected)?;
-        if whole {
-            return take(file, self.start, text.chars).map(|_| ());
+impl Read for Text {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.used == self.decoded.len() {
+            self.refill()?;
         }
-        match self.start.checked_add(text.chars as u64) {
-            Some(end) if end <= file.len() => Ok(()),
-            _ => Err(ends_early(file, text.chars)),
-        }
+        let len = out.len().min(self.decoded.len() - self.used);
+        out[..len].copy_from_slice(&self.decoded[self.used..][..len]);
+        self.used += len;
+        Ok(len)
     }
-
-    /// The samples, `expected` bytes.
-    pub(in crate::source) fn decode(&self, file: &FileBytes, expected: usize) -> Result<Vec<u8>> {
-        let text = self.text(file, expected)?;
-        let mut chars = take(file, self.start, text.chars)?;
-        let mut count = self.count.size();
-        if text.separate {
-            chars.drain(..encoded(count));
-            count = 0;
-        }
-        let mut bytes = decode(file, &chars)?;
-        bytes.drain(..count.min(bytes.len()));
-        match bytes.len() {
-            n if n == expected => Ok(bytes),
-            n => Err(Error::input(file.path(), format!("its base64 array holds {n} bytes, not {expected}"))),
-        }
-    }
-
-    fn text(&self, file: &FileBytes, expected: usize) -> Result<Text> {
-        let count = self.count.size();
-        let chars = take(file, self.start, encoded(count))?;
-        let bytes = decode(file, &chars)?;
-        let stored = bytes.get(..count).ok_or_else(|| ends_early(file, encoded(count)))?;
-        self.count.check(stored, expected).map_err(|e| Error::input(file.path(), e))?;
-        let separate = bytes.len() == count; // together, the samples' first bytes fill the last group
-        let chars = if separate {
-            encoded(expected).checked_add(encoded(count))
-        } else {
-            expected.checked_add(count).map(encoded)
-        };
-        let chars = chars.ok_or_else(|| Error::input(file.path(), "its base64 array is too large"))?;
-        Ok(Text { separate, chars })
-    }
-}
-
-/// Characters that encode so many bytes.
-fn encoded(bytes: usize) -> usize {
-    bytes.div_ceil(3).saturating_mul(4)
-}
-
-fn decode(file: &FileBytes, chars: &[u8]) -> Result<Vec<u8>> {
-    STANDARD.decode(chars).map_err(|e| Error::input(file.path(), format!("its base64 array is damaged: {e}")))
-}
-
-/// The next characters of a file's text, white space aside.
-fn take(file: &FileBytes, start: u64, chars: usize) -> Result<Vec<u8>> {
-    let (mut text, mut at, mut piece) = (Vec::new(), start, vec![0; PIECE]);
-    while text.len() < chars {
-        let len = usize::try_from(file.len().saturating_sub(at)).unwrap_or(PIECE).min(PIECE);
-        let piece = &mut piece[..len];
-        file.read_at(at, piece).map_err(|e| Error::io(file.path(), "reading base64", e))?;
-        let end = piece.iter().position(|b| *b == b'<').unwrap_or(len);
-        text.extend(piece[..end].iter().filter(|b| !b.is_ascii_whitespace()).take(chars - text.len()));
-        if (end < len || len == 0) && text.len() < chars {
-            return Err(ends_early(file, chars));
-        }
-        at += len as u64;
-    }
-    Ok(text)
-}
-
-fn ends_early(file: &FileBytes, chars: usize) -> Error {
-    Error::input(file.path(), format!("its base64 array ends early: {chars} characters were expected"))
 }

@@ -17,6 +17,7 @@ pub(in crate::source) fn named(variable: &str) -> (&str, Option<usize>) {
 /// Which of some components is meant; an error that says how to say it.
 pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usize>) -> Parsed<usize> {
     match index {
+        _ if components == 0 => Err(format!("{name} has no component")),
         Some(index) if index < components => Ok(index),
         Some(index) => Err(format!("{name} has {components} component(s), none with number {index}")),
         None if components == 1 => Ok(0),
@@ -48,6 +49,46 @@ pub(in crate::source) fn of_only(
     Ok((index, called))
 }
 
+/// An array of some, and a component of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::source) struct Chosen {
+    /// Which of the arrays.
+    pub(in crate::source) array: usize,
+    /// Which of its components.
+    pub(in crate::source) component: usize,
+}
+
+/// The array that `--variable` names, else the active one, else the only one. Arrays have a name and some components.
+pub(in crate::source) fn choose(
+    arrays: &[(&str, usize)],
+    active: Option<usize>,
+    variable: Option<&str>,
+) -> Parsed<Chosen> {
+    let names = || arrays.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let find = |wanted: &str| arrays.iter().position(|(name, _)| *name == wanted);
+    let (array, index) = match (variable, active, arrays) {
+        (_, _, []) => return Err("has no point or cell array".into()),
+        (Some(variable), ..) => match (find(variable), named(variable)) {
+            (Some(array), _) => (array, None),
+            (None, (name, index)) => {
+                (find(name).ok_or_else(|| format!("has no array {name}; it has {}", names()))?, index)
+            }
+        },
+        (None, Some(array), _) => (array, None),
+        (None, None, [_]) => (0, None),
+        (None, None, _) => {
+            return Err(format!("has several arrays and none is active: --variable chooses one of {}", names()));
+        }
+    };
+    let (name, components) = arrays[array];
+    Ok(Chosen { array, component: chosen(name, components, index)? })
+}
+
+/// What a component is called: as its array, if this has no other.
+pub(in crate::source) fn label(name: &str, components: usize, component: usize) -> String {
+    if components == 1 { name.into() } else { format!("{name}[{component}]") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -59,7 +100,22 @@ mod tests {
         assert_eq!(named("a[1][y]"), ("a[1]", Some(1)));
         assert_eq!(named("v[w]"), ("v[w]", None));
         assert_eq!((chosen("v", 1, None), chosen("v", 3, Some(2))), (Ok(0), Ok(2)));
-        assert!(chosen("v", 3, None).is_err() && chosen("v", 3, Some(3)).is_err());
+        assert!(chosen("v", 3, None).is_err() && chosen("v", 3, Some(3)).is_err() && chosen("v", 0, None).is_err());
+        assert_eq!([label("v", 1, 0), label("v", 3, 1)], ["v", "v[1]"]);
+    }
+
+    #[test]
+    fn an_array_is_the_named_the_active_or_the_only_one() {
+        let arrays = [("p", 1), ("v", 3), ("v[1]", 1)];
+        let ok = |array, component| Ok(Chosen { array, component });
+        assert_eq!(choose(&arrays, Some(0), None), ok(0, 0));
+        assert_eq!(choose(&arrays, None, Some("v[z]")), ok(1, 2));
+        assert_eq!(choose(&arrays, None, Some("v[1]")), ok(2, 0));
+        assert_eq!(choose(&arrays[..1], None, None), ok(0, 0));
+        for (active, variable) in [(None, None), (Some(1), None), (None, Some("q")), (None, Some("v[3]"))] {
+            assert!(choose(&arrays, active, variable).is_err());
+        }
+        assert!(choose(&[], None, Some("p")).is_err());
     }
 
     #[test]

@@ -106,12 +106,25 @@ impl Deflated {
 impl Compression {
     /// What is decompressed of a file from this byte on.
     pub(in crate::source) fn open(self, path: &Path, start: u64) -> Result<Box<dyn Read + Send>> {
-        let reader =
-            BufReader::with_capacity(64 << 10, FileReader { file: FileBytes::open(path, Access::Read)?, at: start });
-        Ok(match self {
+        Ok(self.reader(FileReader::new(FileBytes::open(path, Access::Read)?, start)))
+    }
+
+    /// What is decompressed of a reader.
+    pub(in crate::source) fn reader(self, reader: impl Read + Send + 'static) -> Box<dyn Read + Send> {
+        let reader = BufReader::with_capacity(64 << 10, reader);
+        match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(reader)),
             Self::Zlib => Box::new(ZlibDecoder::new(reader)),
-        })
+        }
+    }
+
+    /// Gzip if a file says so at this byte, else zlib.
+    pub(in crate::source) fn at(file: &FileBytes, start: u64) -> Result<Self> {
+        let mut magic = [0; 2];
+        if file.len().checked_sub(start).is_some_and(|left| left >= 2) {
+            file.read_at(start, &mut magic).map_err(|e| Error::io(file.path(), "reading", e))?;
+        }
+        Ok(if magic == [0x1f, 0x8b] { Self::Gzip } else { Self::Zlib })
     }
 }
 
@@ -194,8 +207,14 @@ impl fmt::Debug for Deflated {
 
 /// The bytes of a file one after another.
 pub(super) struct FileReader {
-    pub(super) file: FileBytes,
-    pub(super) at: u64,
+    file: FileBytes,
+    at: u64,
+}
+
+impl FileReader {
+    pub(super) fn new(file: FileBytes, start: u64) -> Self {
+        Self { file, at: start }
+    }
 }
 
 impl Read for FileReader {

@@ -1,16 +1,23 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
 mod arrays;
+mod association;
 mod base64;
 mod component;
 mod deflated;
 mod directions;
+pub(in crate::source) mod file_series;
+mod metaimage;
 mod nifti;
 pub(in crate::source) mod npy;
 mod nrrd;
+mod pattern;
+mod pieces;
 pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
+mod text;
 mod vti;
+mod vtk;
 mod xml;
 
 pub use npy::{ArrayHeader, array_header};
@@ -22,8 +29,8 @@ use crate::source::described::{Described, head};
 use std::path::{Path, PathBuf};
 
 /// The formats that describe themselves, for messages.
-pub(in crate::source) const SUPPORTED: &str =
-    ".npy, .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .vti, .pvd, .nc, .h5, and headerless data of any name";
+pub(in crate::source) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .mha, .mhd, .vti, .pvti, .vtk, .pvd, .series, .nc, .h5, .vtkhdf, .zarr, \
+     and headerless data of any name";
 
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
 
@@ -36,13 +43,17 @@ pub(in crate::source) enum Format {
     Npy,
     Nrrd,
     Nifti,
+    MetaImage,
     Vti,
+    Vtk,
     Hdf5,
     NetCdf,
     /// A folder.
     Zarr,
     /// A list of files, not frames itself.
     Pvd,
+    /// As well.
+    FileSeries,
     /// A coefficient file, which is no input.
     Coefficients,
 }
@@ -54,14 +65,22 @@ impl Format {
             "npy" => Some(Self::Npy),
             "nrrd" | "nhdr" => Some(Self::Nrrd),
             "nii" | "nii.gz" | "hdr" | "hdr.gz" => Some(Self::Nifti),
-            "vti" => Some(Self::Vti),
+            "mha" | "mhd" => Some(Self::MetaImage),
+            "vti" | "pvti" => Some(Self::Vti),
+            "vtk" => Some(Self::Vtk),
             "h5" | "hdf5" | "hdf" | "he5" | "vtkhdf" => Some(Self::Hdf5),
             "nc" | "nc4" | "nc3" | "cdf" | "netcdf" => Some(Self::NetCdf),
-            "pvd" => Some(Self::Pvd),
             "zarr" => Some(Self::Zarr),
+            "pvd" => Some(Self::Pvd),
+            "series" => Some(Self::FileSeries),
             "wspl" => Some(Self::Coefficients),
             _ => None,
         }
+    }
+
+    /// Whether a file of it holds frames, and says itself what they are.
+    pub(in crate::source) fn holds_frames(self) -> bool {
+        !matches!(self, Self::Pvd | Self::FileSeries | Self::Coefficients)
     }
 
     fn by_content(path: &Path) -> Result<Option<Self>> {
@@ -70,6 +89,7 @@ impl Format {
         let formats = [
             (head.starts_with(npy::MAGIC), Self::Npy),
             (head.starts_with(nrrd::MAGIC), Self::Nrrd),
+            (head.starts_with(vtk::MAGIC), Self::Vtk),
             (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
             (head.starts_with(b"CDF"), Self::NetCdf),
             (is_nifti, Self::Nifti),
@@ -105,7 +125,9 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         Some(Format::Npy) => npy::describe(path),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
         Some(Format::Nifti) => nifti::describe(path, options.variable.as_deref()),
+        Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
+        Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
         Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
         Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
         #[cfg(feature = "zarr")]
@@ -115,7 +137,9 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
             let what = "Zarr is not built in; cargo build --release --features zarr does that";
             Err(Error::input(path, what))
         }
-        Some(Format::Pvd) => Err(Error::usage(format!("{}: a .pvd must be the only input", path.display()))),
+        Some(Format::Pvd | Format::FileSeries) => {
+            Err(Error::usage(format!("{}: a list of files must be the only input", path.display())))
+        }
         Some(Format::Coefficients) => {
             Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
         }
@@ -148,7 +172,7 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
             let what = "--axes is for HDF5, NetCDF and Zarr; this file says it itself";
             Err(Error::usage(format!("{}: {what}", path.display())))
         }
-        Some((_, name)) if !matches!(format, Format::Pvd | Format::Coefficients) => {
+        Some((_, name)) if format.holds_frames() => {
             let what = format!("says itself what it holds; {name} is for headerless data, leave it out");
             Err(Error::usage(format!("{}: {what}", path.display())))
         }

@@ -49,23 +49,14 @@ fn element(e: &BytesStart<'_>, folder: &Path, files: &mut Files, sets: &mut Hash
     }
 }
 
-fn finish(mut files: Files, sets: usize) -> Parsed<Files> {
+fn finish(files: Files, sets: usize) -> Parsed<Files> {
     if files.paths.is_empty() {
         return Err("lists no DataSet".into());
     }
     if sets > 1 {
         return Err("lists several parts or groups; one file for each time is supported".into());
     }
-    if !files.times.is_empty() && files.times.len() != files.paths.len() {
-        return Err("gives a timestep to some of its files only".into());
-    }
-    if let Some(at) = files.times.windows(2).position(|t| t[0] == t[1]) {
-        return Err(format!("lists two files for the time {}; one is supported", files.times[at]));
-    }
-    if files.times.windows(2).any(|t| t[1].partial_cmp(&t[0]) != Some(std::cmp::Ordering::Greater)) {
-        files.notes.push("the times in the .pvd do not ascend; its files are taken in the order listed".into());
-    }
-    Ok(files)
+    files.of_list(".pvd")
 }
 
 #[cfg(test)]
@@ -112,7 +103,7 @@ mod tests {
         list(r#"<DataSet timestep="1"/>"#, "has no file");
         list(r#"<DataSet timestep="1" file="a"/><DataSet timestep="2" file="./a"/>"#, "given twice");
         list(r#"<DataSet timestep="1" file="a.vtu"/>"#, "a.vtu: opening");
-        list(r#"<DataSet timestep="1" file="list.pvd"/>"#, "must be the only input");
+        list(r#"<DataSet timestep="1" file="list.pvd"/>"#, "a list of files must be the only input");
         list("</oops>", "not well-formed");
         let other = folder.write("list.pvd", r#"<VTKFile type="ImageData"/>"#);
         refused(&[other], &OpenOptions::default(), "not a VTK collection");
@@ -128,6 +119,6 @@ mod tests {
         let source = open(&[list], &OpenOptions::default()).expect("opening");
         assert!(source.archive().notes[0].contains("do not ascend"));
         folder.write("y.pvd", pvd(sets));
-        refused(&[folder.path("")], &OpenOptions::default(), "several .pvd, x.pvd and y.pvd");
+        refused(&[folder.path("")], &OpenOptions::default(), "several lists of files, x.pvd and y.pvd");
     }
 }

@@ -72,10 +72,29 @@ fn read(source: &mut dyn FrameSource) -> Option<Vec<u8>> {
     Some(found)
 }
 
+/// Names of input files; more come after these, which the corpus says by their number.
+const NAMES: [&str; 15] = [
+    "a.nrrd",
+    "a.nhdr",
+    "a.vti",
+    "a.pvd",
+    "a.npy",
+    "a.mha",
+    "a.mhd",
+    "a.vtk",
+    "a.pvti",
+    "a.vti.series",
+    "a.nii",
+    "a.nii.gz",
+    "a.hdr",
+    "a.nc",
+    "a.h5",
+];
+
 /// An input file by its name, beside another with a little data.
 pub fn inputs(data: &[u8]) {
     let mut input = Input::new(data);
-    let name = input.pick(&["a.nrrd", "a.nhdr", "a.vti", "a.pvd", "a.npy", "a.nii", "a.nii.gz", "a.hdr"]);
+    let name = input.pick(&NAMES);
     let variable = (input.below(8) == 7).then(|| "a".to_string());
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, bytes: &[u8]| {

@@ -1,6 +1,7 @@
 //! The names of the data files of a NRRD.
 
 use crate::source::Parsed;
+use crate::source::formats::pattern;
 
 /// What `data file` says.
 pub(super) enum Files {
@@ -40,7 +41,7 @@ impl Files {
     pub(super) fn count(&self) -> Parsed<usize> {
         match self {
             Self::One(_) => Ok(1),
-            Self::Pattern { first, last, step, .. } => pattern_count(*first, *last, *step),
+            Self::Pattern { first, last, step, .. } => pattern::count(*first, *last, *step),
             Self::List { names, .. } => Ok(names.len()),
         }
     }
@@ -52,31 +53,9 @@ impl Files {
             Self::List { names, .. } => Box::new(names.into_iter()),
             Self::One(name) => Box::new(std::iter::once(name)),
             Self::Pattern { pattern, first, step, .. } => {
-                numbered(&pattern, first)?; // so that a wrong pattern is an error
-                Box::new((0..count as i64).filter_map(move |i| numbered(&pattern, first + i * step).ok()))
+                pattern::numbered(&pattern, first)?; // so that a wrong pattern is an error
+                Box::new((0..count as i64).filter_map(move |i| pattern::numbered(&pattern, first + i * step).ok()))
             }
         })
     }
-}
-
-fn pattern_count(first: i64, last: i64, step: i64) -> Parsed<usize> {
-    let wrong = || format!("data file numbers from {first} to {last} in steps of {step} make no sense");
-    let span = last.checked_sub(first).ok_or_else(wrong)?;
-    let steps = span.checked_div(step).filter(|n| *n >= 0).ok_or_else(wrong)?;
-    usize::try_from(steps).ok().and_then(|n| n.checked_add(1)).ok_or_else(wrong)
-}
-
-/// A name from a printf pattern with one `%d`, perhaps with a width such as `%03d`.
-fn numbered(pattern: &str, number: i64) -> Parsed<String> {
-    let wrong = || format!("data file pattern {pattern:?} needs one number such as %d or %03d");
-    let (before, rest) = pattern.split_once('%').ok_or_else(wrong)?;
-    let end = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
-    let (digits, after) = rest.split_at(end);
-    let after = after.strip_prefix(['d', 'i', 'u']).filter(|a| !a.contains('%')).ok_or_else(wrong)?;
-    let width: usize = if digits.is_empty() { 0 } else { digits.parse().map_err(|_| wrong())? };
-    if width > 64 {
-        return Err(wrong());
-    }
-    let number = if digits.starts_with('0') { format!("{number:0width$}") } else { format!("{number:width$}") };
-    Ok(format!("{before}{number}{after}"))
 }

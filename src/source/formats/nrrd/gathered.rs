@@ -57,7 +57,7 @@ impl Piece {
         let mut reader: Box<dyn Read> = if self.gzip {
             Box::new(Compression::Gzip.open(path, self.start)?)
         } else {
-            Box::new(FileReader { file, at: self.start })
+            Box::new(FileReader::new(file, self.start))
         };
         let skipped = io::copy(&mut reader.by_ref().take(self.skip), &mut io::sink()).map_err(|e| failed(&e))?;
         let got = hold(&mut reader, path, (at, bytes), out, |_, e| failed(e))?;

@@ -15,21 +15,18 @@ use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{Described, head};
+use crate::source::described::{Described, growing_head};
 use crate::source::frames::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use axes::Axes;
 use header::Header;
 use std::path::Path;
 
-const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
-const FIRST_READ: usize = 4 << 10;
-
 /// Reads the header and checks the size of every data file that is not compressed.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
-    let header = read_header(&file)?;
+    let header = growing_head(&file, Header::parse)?;
     let array = Array::new(&header, variable).map_err(refused)?;
     let parts = data::parts(&file, &header, &array)?;
     let times = array.axes.times(&header).map_err(refused)?;
@@ -38,21 +35,6 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let Placed { spacing, origin, note, .. } = placed;
     let notes = note.into_iter().collect();
     Ok(Described { spacing, origin, times, units, variable, notes, ..Described::plain(shape, parts) })
-}
-
-fn read_header(file: &FileBytes) -> Result<Header> {
-    let mut len = FIRST_READ;
-    loop {
-        let bytes = head(file, len)?;
-        let whole = bytes.len() as u64 == file.len();
-        if let Some(header) = Header::parse(&bytes, whole).map_err(|e| Error::input(file.path(), e))? {
-            return Ok(header);
-        }
-        if len >= MAX_HEADER {
-            return Err(Error::input(file.path(), format!("its header does not end within {MAX_HEADER} bytes")));
-        }
-        len *= 4;
-    }
 }
 
 /// The samples that are meant.

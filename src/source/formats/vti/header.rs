@@ -1,18 +1,11 @@
-//! What the XML of a `.vti` says.
+//! What the XML of a `.vti` or a `.pvti` says.
 
+use super::extent::Extent;
 use crate::source::Parsed;
+use crate::source::formats::association::Association;
 use crate::source::formats::xml::{attribute, numbers, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-
-/// What an array has one sample for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Association {
-    /// Each point of the lattice.
-    Points,
-    /// Each cell between points.
-    Cells,
-}
 
 /// One `<DataArray>`, as it is written.
 #[derive(Debug)]
@@ -21,71 +14,98 @@ pub(super) struct Array {
     pub(super) name: String,
     pub(super) ty: String,
     pub(super) format: String,
-    pub(super) components: String,
+    pub(super) components: usize,
     /// Where it starts in the appended data.
     pub(super) offset: Option<u64>,
-    /// Where its text starts in the file, if it is inline.
+    /// Where its text starts in the XML, if it is inline.
     pub(super) text: u64,
+}
+
+/// One `<Piece>`: a box of the lattice.
+#[derive(Debug)]
+pub(super) struct Piece {
+    pub(super) extent: Extent,
+    /// The file that it is in, if this file is a list of pieces.
+    pub(super) source: Option<String>,
+    pub(super) arrays: Vec<Array>,
 }
 
 /// The file, as it is written; what it leaves out has the value that VTK gives it.
 #[derive(Debug)]
 pub(super) struct Header {
+    /// Whether it lists pieces that are files of their own.
+    pub(super) parallel: bool,
     pub(super) big_endian: bool,
     /// Whether counts before arrays have 64 bits.
     pub(super) wide: bool,
-    whole: [i64; 6],
+    /// Whether arrays are compressed, by zlib.
+    pub(super) compressed: bool,
     /// First and last point along x, y, z.
-    pub(super) extent: [i64; 6],
+    pub(super) whole: Extent,
     pub(super) spacing: [f64; 3],
     pub(super) origin: [f64; 3],
     pub(super) direction: [f64; 9],
-    pub(super) arrays: Vec<Array>,
+    pub(super) pieces: Vec<Piece>,
+    /// The arrays of every piece of a list.
+    declared: Vec<Array>,
     /// Names of the active arrays, those of points first.
     pub(super) scalars: Vec<(Association, String)>,
+    /// The time that the file is of.
+    pub(super) time: Option<Array>,
     /// Of the appended data.
     pub(super) encoding: Option<String>,
-    pieces: usize,
-    inside: Option<Association>,
+    inside: Inside,
+}
+
+/// What arrays that come are of.
+#[derive(Debug, Clone, Copy)]
+enum Inside {
+    Nothing,
+    FieldData,
+    Samples(Association),
 }
 
 impl Header {
     fn new() -> Self {
         Self {
+            parallel: false,
             big_endian: false,
             wide: false,
-            whole: [0; 6],
-            extent: [0; 6],
+            compressed: false,
+            whole: Extent::default(),
             spacing: [1.0; 3],
             origin: [0.0; 3],
             direction: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            arrays: Vec::new(),
+            pieces: Vec::new(),
+            declared: Vec::new(),
             scalars: Vec::new(),
+            time: None,
             encoding: None,
-            pieces: 0,
-            inside: None,
+            inside: Inside::Nothing,
         }
     }
 
-    /// Points along x, y, z.
-    pub(super) fn points(&self) -> Parsed<[usize; 3]> {
-        let mut points = [0; 3];
-        for (points, ends) in points.iter_mut().zip(self.extent.as_chunks::<2>().0) {
-            let last = ends[1].checked_sub(ends[0]).and_then(|n| n.checked_add(1));
-            let last = last.filter(|n| *n > 0).and_then(|n| usize::try_from(n).ok());
-            *points = last.ok_or_else(|| format!("extent {:?} is empty", self.extent))?;
+    /// The arrays that every piece has, as the first of them has them, or the list of pieces says.
+    pub(super) fn arrays(&self) -> &[Array] {
+        let first = self.pieces.iter().find(|piece| !piece.extent.is_empty()).or(self.pieces.first());
+        match first {
+            Some(piece) if !self.parallel => &piece.arrays,
+            _ => &self.declared,
         }
-        Ok(points)
     }
 
     fn element(&mut self, e: &BytesStart<'_>, text: u64) -> Parsed<()> {
         match e.name().as_ref() {
             "VTKFile" => self.file(e),
-            "ImageData" => self.image(e),
+            "ImageData" | "PImageData" => self.image(e),
             "Piece" => self.piece(e),
-            "PointData" => self.section(e, Association::Points),
-            "CellData" => self.section(e, Association::Cells),
-            "DataArray" => self.array(e, text),
+            "PointData" | "PPointData" => self.section(e, Association::Points),
+            "CellData" | "PCellData" => self.section(e, Association::Cells),
+            "FieldData" => {
+                self.inside = Inside::FieldData;
+                Ok(())
+            }
+            "DataArray" | "PDataArray" => self.array(e, text),
             "AppendedData" => {
                 self.encoding = Some(attribute(e, "encoding")?.unwrap_or_else(|| "base64".into()));
                 Ok(())
@@ -95,15 +115,19 @@ impl Header {
     }
 
     fn file(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        let ty = required(e, "type")?;
-        if ty != "ImageData" {
-            return Err(format!("is a VTK file of type {ty}; ImageData is supported"));
-        }
-        if let Some(compressor) = attribute(e, "compressor")? {
-            return Err(format!(
-                "is compressed by {compressor}, which is not supported; write it without a compressor"
-            ));
-        }
+        self.parallel = match required(e, "type")?.as_str() {
+            "ImageData" => false,
+            "PImageData" => true,
+            ty => return Err(format!("is a VTK file of type {ty}; ImageData and PImageData are supported")),
+        };
+        self.compressed = match attribute(e, "compressor")?.as_deref() {
+            None | Some("") => false,
+            Some("vtkZLibDataCompressor") => true,
+            Some(other) => {
+                let hint = "write it with vtkZLibDataCompressor or without a compressor";
+                return Err(format!("is compressed by {other}, which is not supported; {hint}"));
+            }
+        };
         self.big_endian = match attribute(e, "byte_order")?.as_deref() {
             Some("BigEndian") => true,
             Some("LittleEndian") | None => false,
@@ -118,7 +142,7 @@ impl Header {
     }
 
     fn image(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        self.whole = numbers(&required(e, "WholeExtent")?, "WholeExtent")?;
+        self.whole = Extent(numbers(&required(e, "WholeExtent")?, "WholeExtent")?);
         if let Some(text) = attribute(e, "Spacing")? {
             self.spacing = numbers(&text, "Spacing")?;
         }
@@ -132,19 +156,17 @@ impl Header {
     }
 
     fn piece(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        self.pieces += 1;
-        self.extent = numbers(&required(e, "Extent")?, "Extent")?;
-        if self.pieces > 1 {
-            return Err("has several pieces; files of one piece are supported".into());
+        let extent = Extent(numbers(&required(e, "Extent")?, "Extent")?);
+        let source = attribute(e, "Source")?;
+        if self.parallel && source.is_none() {
+            return Err("has a <Piece> without a Source".into());
         }
-        if self.extent != self.whole {
-            return Err(format!("has the piece {:?} of the whole {:?} only", self.extent, self.whole));
-        }
+        self.pieces.push(Piece { extent, source, arrays: Vec::new() });
         Ok(())
     }
 
     fn section(&mut self, e: &BytesStart<'_>, of: Association) -> Parsed<()> {
-        self.inside = Some(of);
+        self.inside = Inside::Samples(of);
         if let Some(name) = attribute(e, "Scalars")? {
             self.scalars.push((of, name));
         }
@@ -152,28 +174,35 @@ impl Header {
     }
 
     fn array(&mut self, e: &BytesStart<'_>, text: u64) -> Parsed<()> {
-        let Some(of) = self.inside else { return Ok(()) }; // field data
         let name = attribute(e, "Name")?.unwrap_or_default();
-        if name == "vtkGhostType" {
-            return Ok(()); // VTK's own marks
-        }
-        let offset = attribute(e, "offset")?;
-        let offset = offset.map(|o| o.parse().map_err(|_| format!("array {name}: offset {o:?} is no number")));
-        self.arrays.push(Array {
+        let of = match self.inside {
+            Inside::Samples(of) if name != "vtkGhostType" => of, // VTK's own marks
+            Inside::FieldData if name == "TimeValue" => Association::Points,
+            _ => return Ok(()),
+        };
+        let number = |attribute: &str, text: String| format!("array {name}: {attribute} {text:?} is no number");
+        let offset = attribute(e, "offset")?.map(|o| o.parse().map_err(|_| number("offset", o)));
+        let components = attribute(e, "NumberOfComponents")?.unwrap_or_else(|| "1".into());
+        let array = Array {
             of,
             ty: required(e, "type")?,
-            format: required(e, "format")?,
-            components: attribute(e, "NumberOfComponents")?.unwrap_or_else(|| "1".into()),
+            format: attribute(e, "format")?.unwrap_or_else(|| "ascii".into()),
+            components: components.parse().map_err(|_| number("NumberOfComponents", components))?,
             offset: offset.transpose()?,
             text,
             name,
-        });
+        };
+        match (self.inside, self.pieces.last_mut()) {
+            (Inside::FieldData, _) => self.time = Some(array),
+            (_, Some(piece)) if !self.parallel => piece.arrays.push(array),
+            _ => self.declared.push(array),
+        }
         Ok(())
     }
 
     fn end(&mut self, name: &str) {
-        if matches!(name, "PointData" | "CellData") {
-            self.inside = None;
+        if matches!(name, "PointData" | "CellData" | "PPointData" | "PCellData" | "FieldData") {
+            self.inside = Inside::Nothing;
         }
     }
 }
@@ -195,7 +224,7 @@ pub(super) fn parse(text: &str) -> Parsed<Header> {
             _ => {}
         }
     }
-    if header.pieces == 0 {
+    if header.pieces.is_empty() {
         return Err("is no VTK image: it has no <Piece>".into());
     }
     header.scalars.sort_by_key(|(of, _)| *of == Association::Cells);

@@ -1,10 +1,13 @@
 //! Tests of `.vti` files.
 
-use super::*;
-use crate::source::testing::{Folder, check_inputs, payload, refused, survives_damage};
+use super::encoded::Count;
+use crate::sample::SampleType;
+use crate::source::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
 use crate::source::{OpenOptions, open};
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
+use flate2::write::ZlibEncoder;
+use std::io::Write;
 
 /// A file to be varied: its tag, its arrays, and what comes after the image.
 struct Vti {
@@ -117,12 +120,12 @@ fn the_array_is_the_named_the_active_or_the_only_one() {
     let folder = Folder::new();
     let samples = payload(SampleType::U8, 0..1, false);
     let mut vti = raw(TAGS[0], "UInt8", &samples);
-    let other = "<DataArray type=\"UInt8\" Name=\"K\" format=\"ascii\">1</DataArray>";
+    let other = "<DataArray type=\"UInt8\" Name=\"K\" format=\"hex\">1</DataArray>";
     vti.arrays = vti.arrays.replace("</PointData>", &format!("{other}</PointData>"));
     let active = folder.write("a.vti", vti.bytes());
     check_inputs(std::slice::from_ref(&active), &OpenOptions::default(), SampleType::U8, 1);
     let named = |name: &str| OpenOptions { variable: Some(name.into()), ..OpenOptions::default() };
-    refused(std::slice::from_ref(&active), &named("K"), "format \"ascii\" is not supported");
+    refused(std::slice::from_ref(&active), &named("K"), "format \"hex\" is not supported");
     refused(&[active], &named("L"), "has no array L; it has J, K");
     vti.arrays = vti.arrays.replace(" Scalars=\"J\"", "");
     let none_active = [folder.write("a.vti", vti.bytes())];
@@ -146,15 +149,21 @@ fn what_is_not_supported_is_named() {
         let bytes = [text.as_bytes(), &good[cut + 33..]].concat();
         refused(&[folder.write("a.vti", bytes)], &OpenOptions::default(), words);
     };
-    with("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order", "compressed by vtkZLibDataCompressor");
+    with("byte_order", "compressor=\"vtkLZ4DataCompressor\" byte_order", "compressed by vtkLZ4DataCompressor");
+    with("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order", "but its extent and type need 105");
     with("LittleEndian", "MixedEndian", "byte_order \"MixedEndian\"");
     with("byte_order", "header_type=\"UInt16\" byte_order", "header_type \"UInt16\"");
     with("type=\"ImageData\"", "type=\"RectilinearGrid\"", "of type RectilinearGrid");
     with("type=\"UInt8\"", "type=\"Int64\"", "type Int64 is not supported");
     with("type=\"UInt8\"", "type=\"UInt16\"", "its array has 105 bytes, but its extent and type need 210");
     with("Name=\"J\"", "Name=\"J\" NumberOfComponents=\"3\"", "3 components");
-    with("</Piece>", "</Piece><Piece Extent=\"2 8 0 4 0 2\"></Piece>", "several pieces");
-    with("Piece Extent=\"2 8", "Piece Extent=\"2 7", "only");
+    with("</Piece>", "</Piece><Piece Extent=\"2 8 0 4 0 2\"></Piece>", "has a piece without the array J");
+    with("Piece Extent=\"2 8", "Piece Extent=\"2 7", "its array has 105 bytes, but");
+    with("Piece Extent=\"2 8", "Piece Extent=\"2 9", "outside of the whole");
+    with("<Piece Extent=\"2 8 0 4 0 2\">", "<Piece Extent=\"2 2 0 4 0 2\">", "leave some of the whole");
+    with("</Piece>", "", "not well-formed");
+    with("Name=\"J\"", "Name=\"J\" NumberOfComponents=\"x\"", "NumberOfComponents \"x\" is no number");
+    with("type=\"ImageData\"", "type=\"PImageData\"", "without a Source");
     with("offset=\"3\"", "offset=\"18446744073709551615\"", "too large");
     with("offset=\"3\"", "offset=\"999\"", "cut short");
     with("offset=\"3\"", "offset=\"-3\"", "is no number");
@@ -188,6 +197,7 @@ fn damaged_base64_is_an_error() {
         (text.replacen('A', "*", 1), "is damaged"),
         (text.replacen("aQAA", "agAA", 1), "its array has 106 bytes"),
         (String::new(), "ends early"),
+        ("AAA".to_string(), "ends early"),
     ] {
         let arrays = points(&array("UInt8", "format=\"binary\"", &bad));
         let vti = Vti { tag: TAGS[0].0.into(), arrays, appended: Vec::new() };
@@ -228,4 +238,218 @@ fn a_direction_is_noted_and_frames_must_agree() {
     let renamed = Vti { arrays: vti.arrays.replace("\"J\"", "\"K\""), ..vti };
     let c = folder.write("c.vti", renamed.bytes());
     refused(&[a, b, c], &OpenOptions::default(), "c.vti: has the array K, but the first frame");
+}
+
+/// An array as VTK compresses it, in blocks of so many bytes: what stands before them, and all of them.
+fn zlib(samples: &[u8], count: Count, block: usize) -> [Vec<u8>; 2] {
+    let blocks: Vec<Vec<u8>> = samples
+        .chunks(block)
+        .map(|block| {
+            let mut packed = ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+            packed.write_all(block).expect("packing");
+            packed.finish().expect("packing")
+        })
+        .collect();
+    let sizes = blocks.iter().map(Vec::len);
+    let before = [blocks.len(), block, samples.len() % block].into_iter().chain(sizes);
+    [before.flat_map(|n| stored_count(n, count)).collect(), blocks.concat()]
+}
+
+fn compressed(tag: &str) -> String {
+    format!("{tag} compressor=\"vtkZLibDataCompressor\"")
+}
+
+fn appended(tag: &str, ty: &str, encoding: &str, data: &[u8]) -> Vti {
+    let arrays = points(&array(ty, "format=\"appended\" offset=\"0\"", ""));
+    let appended = [format!("<AppendedData encoding=\"{encoding}\">_").as_bytes(), data, b"</AppendedData>"].concat();
+    Vti { tag: tag.into(), arrays, appended }
+}
+
+fn inline(tag: &str, ty: &str, format: &str, text: &str) -> Vti {
+    let arrays = points(&array(ty, &format!("format=\"{format}\""), text));
+    Vti { tag: tag.into(), arrays, appended: Vec::new() }
+}
+
+#[test]
+fn compressed_arrays_are_read() {
+    let folder = Folder::new();
+    for (ty, name) in [(SampleType::U8, "UInt8"), (SampleType::F64, "Float64")] {
+        for ((tag, count), block) in TAGS.into_iter().flat_map(|tag| [(tag, 1 << 15), (tag, 35), (tag, 64)]) {
+            let [before, blocks] = zlib(&payload(ty, 0..1, count.big_endian), count, block);
+            let tag = compressed(tag);
+            let text = STANDARD.encode(&before) + &STANDARD.encode(&blocks);
+            for vti in [
+                appended(&tag, name, "raw", &[before, blocks].concat()),
+                appended(&tag, name, "base64", text.as_bytes()),
+                inline(&tag, name, "binary", &text),
+            ] {
+                check_inputs(&[folder.write("a.vti", vti.bytes())], &OpenOptions::default(), ty, 1);
+            }
+        }
+    }
+}
+
+#[test]
+fn damaged_blocks_are_errors() {
+    let folder = Folder::new();
+    let count = TAGS[0].1;
+    let samples = payload(SampleType::U8, 0..1, false);
+    let [_, blocks] = zlib(&samples, count, 64);
+    let with = |before: &[u8], blocks: &[u8], words: &str| {
+        let vti = appended(&compressed(TAGS[0].0), "UInt8", "raw", &[before, blocks].concat());
+        let file = folder.write("a.vti", vti.bytes());
+        let failed = open(&[file], &OpenOptions::default()).and_then(|mut source| source.window(0, 1).map(|_| ()));
+        let message = crate::source::testing::message(failed);
+        assert!(message.contains(words), "{words:?} is not in {message:?}");
+    };
+    let counts = |counts: &[usize]| counts.iter().flat_map(|n| stored_count(*n, count)).collect::<Vec<_>>();
+    with(&counts(&[2, 64, 42]), &blocks, "has 106 bytes");
+    with(&counts(&[0, 64, 41]), &blocks, "has too many bytes");
+    with(&counts(&[105, 1, 0]), &[], "it has 105 blocks");
+    with(&counts(&[0xffff_ffff, 0, 105]), &blocks, "it has 4294967295 blocks");
+    with(&counts(&[2, 64, 41, 9, 0xffff_ffff]), &blocks, "is cut short: its array ends at byte");
+    with(&counts(&[2, 64, 41, 4, 4]), &blocks, "cannot be decoded");
+    let [before, _] = zlib(&samples, count, 1 << 15);
+    with(&before, &blocks, "block 0 holds less");
+    let [_, long] = zlib(&[7; 106], count, 1 << 15);
+    with(&counts(&[1, 105, 0, long.len()]), &long, "block 0 holds more");
+}
+
+#[test]
+fn numbers_as_text_are_read() {
+    let folder = Folder::new();
+    for (ty, name, tag) in [(SampleType::I16, "Int16", TAGS[0].0), (SampleType::F32, "Float32", TAGS[2].0)] {
+        let text: String = (0..105).map(|i| format!("{}\n ", value(ty, 0, i))).collect();
+        check_inputs(
+            &[folder.write("a.vti", inline(tag, name, "ascii", &text).bytes())],
+            &OpenOptions::default(),
+            ty,
+            1,
+        );
+    }
+    for (text, words) in [("1 2 3", "end early"), ("1 x", "\"x\" is no number"), ("256", "\"256\" is no number")] {
+        let file = folder.write("a.vti", inline(TAGS[0].0, "UInt8", "ascii", text).bytes());
+        let mut source = open(&[file], &OpenOptions::default()).expect("opening");
+        let message = crate::source::testing::message(source.window(0, 1));
+        assert!(message.contains(words), "{words:?} is not in {message:?}");
+    }
+}
+
+#[test]
+fn one_component_of_several_is_read() {
+    let folder = Folder::new();
+    let ty = SampleType::U16;
+    let [a, b] = [0, 1].map(|t| payload(ty, t..t + 1, false));
+    let both: Vec<u8> = a.chunks(2).zip(b.chunks(2)).flat_map(|(a, b)| [a, b].concat()).collect();
+    let [before, blocks] = zlib(&both, TAGS[1].1, 100);
+    let tag = compressed(TAGS[1].0);
+    let vectors = |mut vti: Vti| {
+        vti.arrays = vti.arrays.replace("Name=", "NumberOfComponents=\"2\" Name=");
+        [folder.write("a.vti", vti.bytes())]
+    };
+    let named = |name: &str| OpenOptions { variable: Some(name.into()), ..OpenOptions::default() };
+    for vti in [raw(TAGS[0], "UInt16", &both), appended(&tag, "UInt16", "raw", &[before, blocks].concat())] {
+        let file = vectors(vti);
+        refused(&file, &OpenOptions::default(), "J has 2 components: --variable 'J[0]' takes the first, up to [1]");
+        refused(&file, &named("J[2]"), "none with number 2");
+        check_inputs(&file, &named("J[x]"), ty, 1);
+        let mut source = open(&file, &named("J[1]")).expect("opening");
+        check_window(&*source.window(0, 1).expect("window"), ty, 1);
+        assert_eq!(source.archive().variable.as_deref(), Some("J[1]"));
+    }
+}
+
+/// The samples of a box of frame 0.
+fn part(ty: SampleType, from: [usize; 3], to: [usize; 3]) -> Vec<u8> {
+    let all = payload(ty, 0..1, false);
+    let voxels = crate::volume::Region { start: from, end: to };
+    voxels.iter().flat_map(|[x, y, z]| all[((z * 5 + y) * 7 + x) * ty.size()..][..ty.size()].to_vec()).collect()
+}
+
+fn piece(extent: &str, samples: &[u8]) -> String {
+    let text = text(samples, TAGS[0].1, false);
+    format!("<Piece Extent=\"{extent}\">{}</Piece>", points(&array("Float32", "format=\"binary\"", &text)))
+}
+
+#[test]
+fn pieces_make_up_a_frame() {
+    let folder = Folder::new();
+    let ty = SampleType::F32;
+    let boxes = [
+        ("2 5 0 4 0 2", [0, 0, 0], [4, 5, 3]),
+        ("5 8 0 2 0 2", [3, 0, 0], [7, 3, 3]),
+        ("5 8 2 4 0 2", [3, 2, 0], [7, 5, 3]),
+    ];
+    let pieces = boxes.map(|(extent, from, to)| piece(extent, &part(ty, from, to)));
+    let image = |ty: &str, image: &str, inside: &str| {
+        let more = "WholeExtent=\"2 8 0 4 0 2\" Origin=\"1 2 3\" Spacing=\"0.5 1 2\"";
+        format!("<VTKFile type=\"{ty}\" {}><{image} {more}>{inside}</{image}></VTKFile>", TAGS[0].0)
+    };
+    let empty = "<Piece Extent=\"0 -1 0 -1 0 -1\"></Piece>";
+    let whole = folder.write("a.vti", image("ImageData", "ImageData", &(empty.to_string() + &pieces.concat())));
+    check_inputs(std::slice::from_ref(&whole), &OpenOptions::default(), ty, 1);
+    check_inputs(&[whole], &OpenOptions { memory: 0, ..OpenOptions::default() }, ty, 1);
+    refused(
+        &[folder.write("b.vti", image("ImageData", "ImageData", &pieces[..2].concat()))],
+        &OpenOptions::default(),
+        "leave some",
+    );
+    let other = pieces[2].replace("\"J\"", "\"K\"");
+    let mixed = [pieces[0].as_str(), &pieces[1], &other].concat();
+    refused(
+        &[folder.write("b.vti", image("ImageData", "ImageData", &mixed))],
+        &OpenOptions::default(),
+        "without the array J",
+    );
+
+    let mut list = "<PPointData Scalars=\"J\"><PDataArray type=\"Float32\" Name=\"J\"/></PPointData>".to_string();
+    for (i, piece) in pieces.iter().enumerate() {
+        let (extent, ..) = boxes[i];
+        folder.write(
+            &format!("p{i}.vti"),
+            image("ImageData", "ImageData", piece)
+                .replace("WholeExtent=\"2 8 0 4 0 2\"", &format!("WholeExtent=\"{extent}\"")),
+        );
+        list += &format!("<Piece Extent=\"{extent}\" Source=\"p{i}.vti\"/>");
+    }
+    let list = image("PImageData", "PImageData", &list);
+    let file = folder.write("a.pvti", &list);
+    check_inputs(std::slice::from_ref(&file), &OpenOptions::default(), ty, 1);
+    let grid = open(&[file], &OpenOptions::default()).expect("opening").archive().grid;
+    assert_eq!((grid.spacing, grid.origin), ([0.5, 1.0, 2.0], [2.0, 2.0, 3.0]));
+    for (from, to, words) in [
+        ("p1.vti", "a.pvti", "a list of pieces among"),
+        ("p1.vti", "gone.vti", "gone.vti: opening"),
+        ("p1.vti", "p0.vti", "overlap"),
+        ("Float32", "Float64", "without the array J of 1 Float64"),
+        ("Extent=\"5 8 0 2 0 2\"", "Extent=\"5 4 0 2 0 2\"", "leave some"),
+    ] {
+        refused(&[folder.write("a.pvti", list.replace(from, to))], &OpenOptions::default(), words);
+    }
+}
+
+#[test]
+fn the_time_of_a_file_is_that_of_its_frame() {
+    let folder = Folder::new();
+    let time = |t: f64, format: &str| match format {
+        "ascii" => format!("{t}"),
+        _ => text(&t.to_le_bytes(), TAGS[0].1, false),
+    };
+    let files = [(0, "ascii"), (1, "binary")].map(|(t, format)| {
+        let vti = raw(TAGS[0], "UInt8", &payload(SampleType::U8, t..t + 1, false)).bytes();
+        let at = vti.windows(7).position(|w| w == b"<Piece ").expect("piece");
+        let value = time(0.25 + t as f64, format);
+        let field = format!("<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" format=\"{format}\">{value}</DataArray></FieldData>");
+        folder.write(&format!("f{t}.vti"), [&vti[..at], field.as_bytes(), &vti[at..]].concat())
+    });
+    check_inputs(&files, &OpenOptions::default(), SampleType::U8, 2);
+    assert_eq!(open(&files, &OpenOptions::default()).expect("opening").archive().times, [0.25, 1.25]);
+}
+
+#[test]
+fn no_damage_of_compressed_arrays_panics() {
+    let [before, blocks] = zlib(&[7; 105], TAGS[0].1, 64);
+    let good = appended(&compressed(TAGS[0].0), "UInt8", "raw", &[before, blocks].concat()).bytes();
+    let data = good.windows(5).position(|w| w == b"raw\">").expect("tag") + 5;
+    crate::source::testing::survives_damage_in(data..good.len(), "a.vti", &good);
 }

@@ -1,0 +1,119 @@
+//! Frames that are put together from pieces: boxes of voxels, each of which is decoded from its first byte to its last.
+
+use super::deflated::{Compression, FileReader, expect_end};
+use crate::error::{Error, Result};
+use crate::mapped::{Access, FileBytes, State};
+use crate::source::described::Decode;
+use crate::source::held::{Held, read_some};
+use std::fmt::Debug;
+use std::io::{self, Read};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+const CHUNK: usize = 1 << 20; // bytes taken at a time
+
+/// The samples of a piece in their file.
+pub(in crate::source) trait Packed: Debug + Send {
+    /// All of them, x fastest.
+    fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>>;
+}
+
+/// Samples from a byte of a file, as they are or compressed.
+#[derive(Debug)]
+pub(in crate::source) struct Stream {
+    pub(in crate::source) start: u64,
+    pub(in crate::source) bytes: usize,
+    pub(in crate::source) compression: Option<Compression>,
+}
+
+impl Packed for Stream {
+    fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>> {
+        let reader = FileReader::new(file, self.start);
+        Ok(match self.compression {
+            Some(compression) => compression.reader(reader),
+            None => Box::new(reader.take(self.bytes as u64)),
+        })
+    }
+}
+
+/// A box of a frame.
+#[derive(Debug)]
+pub(in crate::source) struct Piece {
+    /// The file that has its samples.
+    pub(in crate::source) path: PathBuf,
+    /// The file's state when it was checked.
+    pub(in crate::source) state: State,
+    /// Its first voxel.
+    pub(in crate::source) start: [usize; 3],
+    /// Its voxels along x, y, z.
+    pub(in crate::source) dims: [usize; 3],
+    /// Where its samples are.
+    pub(in crate::source) samples: Box<dyn Packed>,
+}
+
+/// Decodes frames piece by piece.
+#[derive(Debug)]
+pub(in crate::source) struct Pieces {
+    /// Voxels of a frame along x, y, z.
+    pub(in crate::source) dims: [usize; 3],
+    /// Bytes of a voxel, all components together.
+    pub(in crate::source) voxel: usize,
+    /// The pieces of each frame, all within its dimensions.
+    pub(in crate::source) frames: Vec<Vec<Piece>>,
+}
+
+impl Decode for Pieces {
+    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+        self.frames[frames.start].iter().try_for_each(|piece| self.copy(piece, out))
+    }
+}
+
+impl Pieces {
+    fn copy(&self, piece: &Piece, out: &mut Held) -> Result<()> {
+        let path = &piece.path;
+        let file = FileBytes::open(path, Access::Read)?;
+        piece.state.check(path, &file.state())?;
+        let mut reader = piece.samples.open(file).map_err(|e| damaged(path, e))?;
+        let (run, starts) = self.runs(piece);
+        let mut chunk = vec![0; CHUNK.min(run)];
+        for start in starts {
+            copy_run(&mut *reader, path, &mut chunk, start..start + run, out)?;
+        }
+        expect_end(&mut *reader, path, 0)
+    }
+
+    /// Bytes of a piece that lie together in a frame, and where these start there.
+    fn runs(&self, piece: &Piece) -> (usize, impl Iterator<Item = usize>) {
+        let ([x, y, _], [i, j, k]) = (self.dims, piece.dims);
+        let (run, rows, planes) = match (i == x, j == y) {
+            (true, true) => (i * j * k, 1, 1),
+            (true, false) => (i * j, 1, k),
+            (false, _) => (i, j, k),
+        };
+        let (voxel, [first, row, plane]) = (self.voxel, piece.start);
+        let start = move |(k, j): (usize, usize)| (((plane + k) * y + row + j) * x + first) * voxel;
+        (run * voxel, (0..planes).flat_map(move |k| (0..rows).map(move |j| (k, j))).map(start))
+    }
+}
+
+fn copy_run(reader: &mut dyn Read, path: &Path, chunk: &mut [u8], run: Range<usize>, out: &mut Held) -> Result<()> {
+    let mut at = run.start;
+    while at < run.end {
+        let wanted = chunk.len().min(run.end - at);
+        match read_some(reader, &mut chunk[..wanted]).map_err(|e| damaged(path, e))? {
+            0 => return Err(Error::input(path, "its samples end early")),
+            n => {
+                out.write_at(at as u64, &chunk[..n]).map_err(|e| Error::io(path, "holding its samples", e))?;
+                at += n;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn damaged(path: &Path, error: io::Error) -> Error {
+    match error.raw_os_error() {
+        Some(_) => Error::io(path, "reading its samples", error),
+        None => Error::input(path, format!("its samples cannot be decoded: {error}")),
+    }
+}

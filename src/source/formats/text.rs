@@ -1,0 +1,103 @@
+//! Samples as text: numbers with white space between them.
+
+use crate::mapped::FileBytes;
+use crate::sample::{self, SampleType, swap_endian};
+use std::io::{self, ErrorKind, Read};
+
+const PIECE: usize = 64 << 10; // bytes read at a time
+
+/// The characters of a text in a file, up to the next `<`.
+pub(in crate::source) struct Characters {
+    file: FileBytes,
+    at: u64,
+    /// Whether a `<` or the end of the file came.
+    pub(in crate::source) ended: bool,
+}
+
+impl Characters {
+    pub(in crate::source) fn new(file: FileBytes, start: u64) -> Self {
+        Self { file, at: start, ended: false }
+    }
+
+    /// Appends some more of them.
+    pub(in crate::source) fn read(&mut self, text: &mut Vec<u8>) -> io::Result<()> {
+        let len = usize::try_from(self.file.len().saturating_sub(self.at)).unwrap_or(PIECE).min(PIECE);
+        let before = text.len();
+        text.resize(before + len, 0);
+        self.file.read_at(self.at, &mut text[before..])?;
+        self.at += len as u64;
+        let end = text[before..].iter().position(|c| *c == b'<');
+        text.truncate(before + end.unwrap_or(len));
+        self.ended |= end.is_some() || len == 0;
+        Ok(())
+    }
+}
+
+/// The bytes of samples that are written as numbers.
+pub(in crate::source) struct Numbers {
+    characters: Characters,
+    sample: SampleType,
+    big_endian: bool, // the bytes that are read
+    left: Vec<u8>,    // characters of a number that is not whole yet
+    samples: Vec<u8>, // bytes that are next
+    used: usize,      // of these
+}
+
+impl Numbers {
+    pub(in crate::source) fn new(file: FileBytes, start: u64, sample: SampleType, big_endian: bool) -> Self {
+        let characters = Characters::new(file, start);
+        Self { characters, sample, big_endian, left: Vec::new(), samples: Vec::new(), used: 0 }
+    }
+
+    fn refill(&mut self) -> io::Result<()> {
+        (self.used, self.samples) = (0, Vec::new());
+        while self.samples.is_empty() && !self.characters.ended {
+            self.characters.read(&mut self.left)?;
+            let space = self.left.iter().rposition(u8::is_ascii_whitespace);
+            let whole = if self.characters.ended { self.left.len() } else { space.unwrap_or(0) };
+            let text: Vec<u8> = self.left.drain(..whole).collect();
+            let words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+            let values: Vec<f64> = words.map(|word| self.value(word)).collect::<io::Result<_>>()?;
+            if self.left.len() > PIECE {
+                return Err(no_number(&self.left));
+            }
+            self.samples.resize(values.len() * self.sample.size(), 0);
+            sample::store(self.sample, &values, &mut self.samples);
+            if self.big_endian {
+                swap_endian(self.sample, &mut self.samples);
+            }
+        }
+        Ok(())
+    }
+
+    /// A number that samples of this type can be.
+    fn value(&self, word: &[u8]) -> io::Result<f64> {
+        let text = std::str::from_utf8(word).map_err(|_| no_number(word))?;
+        if self.sample == SampleType::F32 {
+            return text.parse::<f32>().map(f64::from).map_err(|_| no_number(word));
+        }
+        let value: f64 = text.parse().map_err(|_| no_number(word))?;
+        let (mut bytes, mut stored) = (vec![0; self.sample.size()], [value]);
+        sample::store(self.sample, &stored, &mut bytes);
+        sample::load(self.sample, &bytes, &mut stored);
+        let held = self.sample.is_float() || stored[0] == value;
+        if held { Ok(value) } else { Err(no_number(word)) }
+    }
+}
+
+fn no_number(word: &[u8]) -> io::Error {
+    let word = String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned();
+    io::Error::new(ErrorKind::InvalidData, format!("{word:?} is no number that its type can hold"))
+}
+
+impl Read for Numbers {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.used == self.samples.len() {
+            self.refill()?;
+        }
+        let len = out.len().min(self.samples.len() - self.used);
+        out[..len].copy_from_slice(&self.samples[self.used..][..len]);
+        self.used += len;
+        Ok(len)
+    }
+}

@@ -1,0 +1,108 @@
+//! The pieces of an image, in one file or in files of their own, as one frame.
+
+use super::Wanted;
+use super::encoded::Encoded;
+use super::extent::{Extent, check_pieces};
+use super::header::{Array, Piece};
+use super::image::Image;
+use crate::error::{Error, Result};
+use crate::source::described::{At, Part};
+use crate::source::formats::pieces::{self, Pieces};
+use crate::source::frames::Shape;
+use std::path::Path;
+
+const MOST: usize = 1 << 14; // pieces: each is compared with every other one
+
+/// Where the array of an image is, checked to be all there, and the time that its files say.
+pub(super) fn part(image: &Image, wanted: &Wanted<'_>) -> Result<(Part, Option<f64>)> {
+    let path = image.file.path();
+    let refused = |e| Error::input(path, e);
+    let found = if image.header.parallel { listed(image, wanted)? } else { Found::of(image, wanted)? };
+    let extents: Vec<Extent> = found.pieces.iter().map(|located| located.extent).collect();
+    check_pieces(&image.header.whole, &extents).map_err(refused)?;
+    let stored = wanted.stored(found.big_endian).map_err(refused)?;
+    if let [only] = &found.pieces[..]
+        && let Some(start) = only.encoded.plain()
+    {
+        let pieces::Piece { path, state, .. } = &only.piece;
+        return Ok((Part { path: path.clone(), state: *state, frames: 1, stored, at: At::Byte(start) }, found.time));
+    }
+    let frames = vec![found.pieces.into_iter().map(|located| located.piece).collect()];
+    let at = At::Decoded(Box::new(Pieces { dims: wanted.shape.dims(), voxel: wanted.voxel, frames }));
+    Ok((Part { path: path.into(), state: image.file.state(), frames: 1, stored, at }, found.time))
+}
+
+/// The pieces that one file has.
+struct Found {
+    pieces: Vec<Located>,
+    big_endian: bool,
+    time: Option<f64>,
+}
+
+/// A piece, and where its samples are.
+struct Located {
+    extent: Extent,
+    encoded: Encoded,
+    piece: pieces::Piece,
+}
+
+impl Found {
+    fn of(image: &Image, wanted: &Wanted<'_>) -> Result<Self> {
+        let refused = |what: String| Err(Error::input(image.file.path(), what));
+        if image.header.parallel {
+            return refused("is a list of pieces among the pieces of another".into());
+        }
+        if image.header.pieces.len() > MOST {
+            return refused(format!("has {} pieces; up to {MOST} are supported", image.header.pieces.len()));
+        }
+        let pieces = image.header.pieces.iter().filter(|piece| !piece.extent.is_empty());
+        let pieces = pieces.map(|piece| locate(image, piece, wanted)).collect::<Result<Vec<_>>>()?;
+        let (big_endian, time) = (image.header.big_endian, image.time()?);
+        Ok(Self { pieces: pieces.into_iter().flatten().collect(), big_endian, time })
+    }
+}
+
+/// The pieces of the files that a file lists.
+fn listed(image: &Image, wanted: &Wanted<'_>) -> Result<Found> {
+    let folder = image.file.path().parent().unwrap_or(Path::new(""));
+    let sources = image.header.pieces.iter().filter(|piece| !piece.extent.is_empty());
+    let mut all: Option<Found> = None;
+    for source in sources.filter_map(|piece| piece.source.as_deref()).take(MOST) {
+        let path = folder.join(source);
+        let found = Found::of(&Image::open(&path)?, wanted)?;
+        let Some(before) = &mut all else {
+            all = Some(found);
+            continue;
+        };
+        if before.big_endian != found.big_endian {
+            return Err(Error::input(&path, "has another byte_order than the piece before it"));
+        }
+        before.pieces.extend(found.pieces);
+    }
+    all.ok_or_else(|| Error::input(image.file.path(), "lists no piece that holds anything"))
+}
+
+/// The array in a piece; none if it has no cell of the whole.
+fn locate(image: &Image, piece: &Piece, wanted: &Wanted<'_>) -> Result<Option<Located>> {
+    let refused = |e| Error::input(image.file.path(), e);
+    let (extent, whole, sample) = (piece.extent, &wanted.whole, wanted.shape.sample());
+    let Some(start) = extent.start_in(whole) else {
+        return Err(refused(format!("has the piece {:?} outside of the whole {:?}", extent.0, whole.0)));
+    };
+    if !extent.has_cells(whole) {
+        return Ok(None);
+    }
+    let Array { of, name, ty, components, .. } = wanted.array;
+    let same = |a: &&Array| a.of == *of && a.name == *name && a.ty == *ty && a.components == *components;
+    let Some(array) = piece.arrays.iter().find(same) else {
+        return Err(refused(format!("has a piece without the array {name} of {components} {ty}")));
+    };
+    let dims = of.dims(extent.points().map_err(refused)?);
+    let shape = Shape::new(dims, sample).map_err(refused)?;
+    let bytes = (shape.frame_bytes() / sample.size()).checked_mul(wanted.voxel);
+    let bytes = bytes.ok_or_else(|| refused("its array is too large".into()))?;
+    let encoded = image.encoded(array, sample, bytes)?;
+    let (path, state) = (image.file.path().into(), image.file.state());
+    let piece = pieces::Piece { path, state, start, dims, samples: Box::new(encoded) };
+    Ok(Some(Located { extent, encoded, piece }))
+}

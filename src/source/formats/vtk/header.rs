@@ -1,0 +1,280 @@
+//! What the text of a legacy VTK file says, and where its arrays are.
+
+use super::lines::Lines;
+use crate::error::{Error, Result};
+use crate::mapped::FileBytes;
+use crate::sample::{self, SampleType};
+use crate::source::Parsed;
+use crate::source::formats::association::Association;
+use std::str::FromStr;
+
+/// How every such file starts.
+pub(in crate::source) const MAGIC: &[u8] = b"# vtk DataFile";
+
+/// One array of points or cells.
+#[derive(Debug)]
+pub(super) struct Array {
+    pub(super) of: Association,
+    pub(super) name: String,
+    /// The type by its name in the file.
+    pub(super) ty: String,
+    pub(super) components: usize,
+    /// How many have so many components.
+    pub(super) tuples: usize,
+    /// Its first byte.
+    pub(super) start: u64,
+}
+
+/// The file, as it is written.
+#[derive(Debug)]
+pub(super) struct Header {
+    /// Points along x, y, z.
+    pub(super) points: [usize; 3],
+    pub(super) spacing: [f64; 3],
+    pub(super) origin: [f64; 3],
+    pub(super) arrays: Vec<Array>,
+    /// Which of them are scalars.
+    pub(super) scalars: Vec<usize>,
+    pub(super) time: Option<f64>,
+    /// What the arrays that come are of, and how many tuples these have.
+    inside: Option<(Association, usize)>,
+}
+
+impl Header {
+    /// Goes through the whole file, from array to array.
+    pub(super) fn read(file: &FileBytes) -> Result<Self> {
+        let mut lines = Lines { file, at: 0 };
+        let refused = |e| Error::input(file.path(), e);
+        start(&mut lines)?;
+        let (points, spacing, origin) = ([0; 3], [1.0; 3], [0.0; 3]);
+        let mut header =
+            Self { points, spacing, origin, arrays: Vec::new(), scalars: Vec::new(), time: None, inside: None };
+        while let Some(words) = lines.words()? {
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            if !header.geometry(&words).map_err(refused)? {
+                header.attribute(&words, &mut lines)?;
+            }
+        }
+        if header.points == [0; 3] {
+            return Err(refused("does not say its DIMENSIONS".into()));
+        }
+        Ok(header)
+    }
+
+    /// Whether a line says something of the lattice, or what arrays are of.
+    fn geometry(&mut self, words: &[&str]) -> Parsed<bool> {
+        match (words[0].to_uppercase().as_str(), &words[1..]) {
+            ("DATASET", [kind]) if kind.eq_ignore_ascii_case("STRUCTURED_POINTS") => {}
+            ("DATASET", kind) => {
+                return Err(format!("is a {}: only STRUCTURED_POINTS are supported", kind.join(" ").to_uppercase()));
+            }
+            ("DIMENSIONS", sizes) => self.points = numbers(sizes, "DIMENSIONS")?,
+            ("SPACING" | "ASPECT_RATIO", sizes) => self.spacing = numbers(sizes, "SPACING")?,
+            ("ORIGIN", place) => self.origin = numbers(place, "ORIGIN")?,
+            ("POINT_DATA", count) => {
+                self.inside = Some((Association::Points, numbers::<_, 1>(count, "POINT_DATA")?[0]));
+            }
+            ("CELL_DATA", count) => self.inside = Some((Association::Cells, numbers::<_, 1>(count, "CELL_DATA")?[0])),
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Takes note of the arrays that a line begins.
+    fn attribute(&mut self, words: &[&str], lines: &mut Lines<'_>) -> Result<()> {
+        let refused = |e| Error::input(lines.file.path(), e);
+        let keyword = words[0].to_uppercase();
+        let tuples = self.inside.map_or(0, |(_, tuples)| tuples);
+        let mut array = |name: &str, ty: &str, components: usize| self.array(name, ty, (components, tuples), lines);
+        match (keyword.as_str(), &words[1..]) {
+            ("SCALARS", [name, ty, rest @ ..]) => {
+                let components = rest.first().map_or(Ok(1), |n| number(n, "components of SCALARS")).map_err(refused)?;
+                self.scalars.push(self.arrays.len());
+                skip_table(lines)?;
+                self.array(name, ty, (components, tuples), lines)
+            }
+            ("COLOR_SCALARS", [name, components]) => {
+                let components = number(components, "components of COLOR_SCALARS").map_err(refused)?;
+                self.scalars.push(self.arrays.len());
+                self.array(name, "unsigned_char", (components, tuples), lines)
+            }
+            ("VECTORS" | "NORMALS", [name, ty]) => array(name, ty, 3),
+            ("TENSORS", [name, ty]) => array(name, ty, 9),
+            ("TENSORS6", [name, ty]) => array(name, ty, 6),
+            ("GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", [name, ty]) => array(name, ty, 1),
+            ("TEXTURE_COORDINATES", [name, components, ty]) => {
+                let components = number(components, "components of TEXTURE_COORDINATES").map_err(refused)?;
+                array(name, ty, components)
+            }
+            ("LOOKUP_TABLE", [_, size]) => {
+                let size: usize = number(size, "size of a LOOKUP_TABLE").map_err(refused)?;
+                pass(lines, size.checked_mul(4)).map(|_| ())
+            }
+            ("FIELD", [_, count]) => self.field(number(count, "arrays of a FIELD").map_err(refused)?, lines),
+            ("METADATA", _) => skip_metadata(lines),
+            _ => Err(refused(format!(
+                "has {:?} where a keyword of VTK was expected, before byte {}",
+                shortened(words[0]),
+                lines.at
+            ))),
+        }
+    }
+
+    fn field(&mut self, count: usize, lines: &mut Lines<'_>) -> Result<()> {
+        for _ in 0..count {
+            let words = loop {
+                match lines.words()? {
+                    Some(words) if words[0].eq_ignore_ascii_case("METADATA") => skip_metadata(lines)?,
+                    words => break words,
+                }
+            };
+            let words = words.unwrap_or_default();
+            let [name, components, tuples, ty] = &words[..] else {
+                let what = format!("has a FIELD of {count} arrays, but not so many follow");
+                return Err(Error::input(lines.file.path(), what));
+            };
+            let [components, tuples] = [components, tuples].map(|n| number(n, "size of an array of a FIELD"));
+            let refused = |e| Error::input(lines.file.path(), e);
+            let size = (components.map_err(refused)?, tuples.map_err(refused)?);
+            self.array(name, ty, size, lines)?;
+        }
+        Ok(())
+    }
+
+    /// An array that begins at the next byte.
+    fn array(
+        &mut self,
+        name: &str,
+        ty: &str,
+        (components, tuples): (usize, usize),
+        lines: &mut Lines<'_>,
+    ) -> Result<()> {
+        let name = decoded(name);
+        let Some(bytes) = bytes_of(ty, components, tuples) else {
+            let what = format!("array {name}: type {ty} is not supported, nor what comes after it");
+            return Err(Error::input(lines.file.path(), what));
+        };
+        let start = pass(lines, bytes)?;
+        match self.inside {
+            Some((of, _)) => self.arrays.push(Array { of, name, ty: ty.into(), components, tuples, start }),
+            None if is_time(&name) && (components, tuples) == (1, 1) => self.time = time(lines.file, start, ty)?,
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// The three lines that every file has.
+fn start(lines: &mut Lines<'_>) -> Result<()> {
+    let refused = |what: &str| Err(Error::input(lines.file.path(), what));
+    if !lines.peek(MAGIC.len())?.starts_with(MAGIC) {
+        return refused("does not start as a legacy VTK file does");
+    }
+    let mut next = || Result::Ok(lines.line()?.unwrap_or_default());
+    let (_version, _title, encoding) = (next()?, next()?, next()?);
+    match encoding.trim().to_uppercase().as_str() {
+        "BINARY" => Ok(()),
+        "ASCII" => refused("has its samples as text (ASCII), which is not supported; write it as BINARY, or as .vti"),
+        _ => refused("says neither BINARY nor ASCII in its third line"),
+    }
+}
+
+/// The name of the colours of SCALARS, which come before these.
+fn skip_table(lines: &mut Lines<'_>) -> Result<()> {
+    if lines.peek(12)?.eq_ignore_ascii_case(b"LOOKUP_TABLE") {
+        lines.line()?;
+    }
+    Ok(())
+}
+
+/// What VTK says of an array after it: lines up to an empty one.
+fn skip_metadata(lines: &mut Lines<'_>) -> Result<()> {
+    while lines.line()?.is_some_and(|line| !line.trim().is_empty()) {}
+    Ok(())
+}
+
+/// Goes past bytes that must be there, and says where they start.
+fn pass(lines: &mut Lines<'_>, bytes: Option<usize>) -> Result<u64> {
+    let start = lines.at;
+    let end = bytes.and_then(|bytes| start.checked_add(bytes as u64));
+    let len = lines.file.len();
+    match end {
+        Some(end) if end <= len => lines.at = end,
+        Some(end) => {
+            let what = format!("is cut short: an array ends at byte {end}, the file at {len}");
+            return Err(Error::input(lines.file.path(), what));
+        }
+        None => return Err(Error::input(lines.file.path(), "an array's size is too large for any file")),
+    }
+    Ok(start)
+}
+
+/// The bytes of an array, none inside if they are too many; none if its type says nothing of them.
+fn bytes_of(ty: &str, components: usize, tuples: usize) -> Option<Option<usize>> {
+    let values = components.checked_mul(tuples);
+    let size = match ty.to_lowercase().as_str() {
+        "bit" => return Some(values.map(|n| n.div_ceil(8))),
+        "long" | "unsigned_long" | "vtktypeint64" | "vtktypeuint64" => 8,
+        "vtkidtype" => 4,
+        ty => sample_type(ty)?.size(),
+    };
+    Some(values.and_then(|n| n.checked_mul(size)))
+}
+
+/// The type of samples that a name stands for.
+pub(super) fn sample_type(name: &str) -> Option<SampleType> {
+    Some(match name.to_lowercase().as_str() {
+        "unsigned_char" => SampleType::U8,
+        "char" | "signed_char" => SampleType::I8,
+        "unsigned_short" => SampleType::U16,
+        "short" => SampleType::I16,
+        "unsigned_int" => SampleType::U32,
+        "int" => SampleType::I32,
+        "float" => SampleType::F32,
+        "double" => SampleType::F64,
+        _ => return None,
+    })
+}
+
+fn is_time(name: &str) -> bool {
+    ["time", "timevalue"].iter().any(|time| name.eq_ignore_ascii_case(time))
+}
+
+/// A stored number, if its type is that of samples.
+fn time(file: &FileBytes, start: u64, ty: &str) -> Result<Option<f64>> {
+    let Some(ty) = sample_type(ty) else { return Ok(None) };
+    let mut bytes = vec![0; ty.size()];
+    file.read_at(start, &mut bytes).map_err(|e| Error::io(file.path(), "reading its time", e))?;
+    sample::swap_endian(ty, &mut bytes);
+    let mut value = [0.0];
+    sample::load(ty, &bytes, &mut value);
+    Ok(Some(value[0]))
+}
+
+/// A name in which VTK has written some characters as `%20`.
+fn decoded(name: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = name.as_bytes();
+    while let [first, after @ ..] = rest {
+        let code = after.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
+        let byte = code.and_then(|hex| u8::from_str_radix(hex, 16).ok()).filter(|_| *first == b'%');
+        bytes.push(byte.unwrap_or(*first));
+        rest = if byte.is_some() { &after[2..] } else { after };
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+fn number<T: FromStr>(text: &str, what: &str) -> Parsed<T> {
+    text.parse().map_err(|_| format!("the {what} {:?} is no number", shortened(text)))
+}
+
+fn numbers<T: FromStr + Copy, const N: usize>(words: &[&str], what: &str) -> Parsed<[T; N]> {
+    let found: Option<Vec<T>> = words.iter().map(|n| n.parse().ok()).collect();
+    let wrong = || format!("{what} must be {N} number(s), not {:?}", shortened(&words.join(" ")));
+    found.and_then(|v| v.try_into().ok()).ok_or_else(wrong)
+}
+
+/// The start of what may be anything.
+fn shortened(text: &str) -> String {
+    text.chars().take(40).collect()
+}

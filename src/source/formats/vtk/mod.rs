@@ -1,0 +1,53 @@
+//! VTK's legacy files, `.vtk`: one array of STRUCTURED_POINTS, binary.
+
+mod header;
+mod lines;
+
+pub(in crate::source) use header::MAGIC;
+
+use super::component::{self, Chosen};
+use crate::error::{Error, Result};
+use crate::mapped::{Access, FileBytes};
+use crate::source::Parsed;
+use crate::source::described::{At, Described, Part, Stored};
+use crate::source::frames::Shape;
+use crate::source::layout::{Axis, Counts, Layout};
+use header::{Array, Header, sample_type};
+use std::path::Path;
+
+/// Goes through the text of one file and finds the array.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+    let refused = |e| Error::input(path, e);
+    let file = FileBytes::open(path, Access::Read)?;
+    let header = Header::read(&file)?;
+    let arrays: Vec<_> = header.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
+    let chosen = component::choose(&arrays, header.scalars.first().copied(), variable).map_err(refused)?;
+    let array = &header.arrays[chosen.array];
+    let (shape, stored) = stored(&header, array, chosen).map_err(refused)?;
+    let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at: At::Byte(array.start) };
+    let mut described = Described::plain(shape, vec![part]);
+    described.spacing = header.spacing;
+    described.origin = array.of.origin(header.points, header.origin, header.spacing);
+    described.times = header.time.into_iter().collect();
+    described.variable = Some(component::label(&array.name, array.components, chosen.component));
+    Ok(described)
+}
+
+fn stored(header: &Header, array: &Array, chosen: Chosen) -> Parsed<(Shape, Stored)> {
+    let refused = |what: String| format!("array {}: {what}", array.name);
+    let Some(sample) = sample_type(&array.ty) else {
+        let types = "unsigned_char to int, float and double are";
+        return Err(refused(format!("type {} is not supported; {types}", array.ty)));
+    };
+    let shape = Shape::new(array.of.dims(header.points), sample)?;
+    let samples = shape.frame_bytes() / sample.size();
+    if array.tuples != samples {
+        return Err(refused(format!("has {} samples, but DIMENSIONS need {samples}", array.tuples)));
+    }
+    let mut layout = Layout::plain(shape.dims(), 1);
+    layout.0.push(Axis::new(Counts::Only(chosen.component), array.components));
+    Ok((shape, Stored::new(&layout, sample, true)?))
+}
+
+#[cfg(test)]
+mod tests;
