@@ -92,6 +92,7 @@ fn slices_may_be_files() {
     }
     let packed = header(3, &format!("CompressedData = True\n{fields}"), "z%03d.raw 0 2 1");
     check_inputs(&[folder.write("a.mhd", packed)], &options(), SampleType::F32, 1);
+    check_inputs(&[folder.path("")], &options(), SampleType::F32, 1);
     folder.write("s001.raw", "short");
     refused(&[folder.write("a.mhd", header(3, fields, "s%03d.raw 0 2 1"))], &options(), "s001.raw: expected 140 bytes");
 }

@@ -414,7 +414,9 @@ fn pieces_make_up_a_frame() {
     }
     let list = image("PImageData", "PImageData", &list);
     let file = folder.write("a.pvti", &list);
-    check_inputs(std::slice::from_ref(&file), &OpenOptions::default(), ty, 1);
+    for input in [&file, &folder.path("")] {
+        check_inputs(std::slice::from_ref(input), &OpenOptions::default(), ty, 1);
+    }
     let grid = open(&[file], &OpenOptions::default()).expect("opening").archive().grid;
     assert_eq!((grid.spacing, grid.origin), ([0.5, 1.0, 2.0], [2.0, 2.0, 3.0]));
     for (from, to, words) in [
