@@ -81,8 +81,15 @@ impl InputArgs {
         Access::unless(self.no_mmap)
     }
 
-    /// Opens an archive.
+    /// Opens an archive, with notes on how it is read.
     pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
+        let source = self.open_quietly(inputs, common)?;
+        source.archive().notes.iter().for_each(|n| common.note(n));
+        Ok(source)
+    }
+
+    /// Opens an archive without a word.
+    pub fn open_quietly(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
         let options = OpenOptions {
             access: self.access(),
             dims: self.dims.as_ref().map(|d| d.0.clone()),
@@ -96,9 +103,7 @@ impl InputArgs {
             allow_gaps: self.allow_gaps,
             memory: common.stream_memory(),
         };
-        let source = source::open(inputs, &options)?;
-        source.archive().notes.iter().for_each(|n| common.note(n));
-        Ok(source)
+        source::open(inputs, &options)
     }
 }
 

@@ -16,6 +16,7 @@
 //! without the kill, since what one window tells the next is in its record.
 
 mod choose;
+pub mod estimate;
 mod gather;
 mod learn;
 mod record;

@@ -152,6 +152,8 @@ impl Units {
 /// What the header of one input file says.
 #[derive(Debug)]
 pub(super) struct Described {
+    /// What the file is, by name.
+    pub(super) format: &'static str,
     /// Voxels and sample type of every frame.
     pub(super) shape: Shape,
     /// World units between voxels along x, y, z.
@@ -177,7 +179,7 @@ impl Described {
     pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
-        Self { shape, spacing, origin, times, variable: None, units, missing: None, notes, parts }
+        Self { format: "headerless", shape, spacing, origin, times, variable: None, units, missing: None, notes, parts }
     }
 
     /// The lattice of every frame.

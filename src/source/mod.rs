@@ -112,6 +112,8 @@ pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -
 /// What an archive holds, known before any frame is read.
 #[derive(Debug, Clone)]
 pub struct Archive {
+    /// What the files are, by name.
+    pub format: &'static str,
     /// The lattice of every frame.
     pub grid: Grid,
     /// The type of every sample.
@@ -136,7 +138,8 @@ impl Archive {
     /// Frames of which no more is known.
     pub fn new(grid: Grid, sample: SampleType, frames: Option<usize>) -> Self {
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
-        Self { grid, sample, frames, times, variable: None, units, missing: None, memory: 0, notes }
+        let format = "frames";
+        Self { format, grid, sample, frames, times, variable: None, units, missing: None, memory: 0, notes }
     }
 
     /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the files.

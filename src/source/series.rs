@@ -50,6 +50,7 @@ impl Series {
             variable: first.variable.clone(),
             units: first.units.clone(),
             missing: first.missing,
+            format: first.format,
             ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
         override_grid(&mut archive.grid, options);

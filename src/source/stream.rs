@@ -49,7 +49,7 @@ impl<R: Read> Stream<R> {
         override_grid(&mut grid, options);
         check_grid(&grid, options, Path::new(STANDARD))?;
         let memory = options.memory;
-        let archive = Archive { memory, ..Archive::new(grid, shape.sample(), frames) };
+        let archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
         let stored = Stored::plain(&shape, 1, big_endian).map_err(|e| Error::input(STANDARD, e))?;
         Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader })
     }

@@ -83,6 +83,23 @@ impl Format {
         !matches!(self, Self::Pvd | Self::FileSeries | Self::Coefficients)
     }
 
+    /// What people call it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Npy => "NumPy array",
+            Self::Nrrd => "NRRD",
+            Self::Nifti => "NIfTI",
+            Self::MetaImage => "MetaImage",
+            Self::Vti => "VTK image data (.vti)",
+            Self::Vtk => "legacy VTK",
+            Self::Hdf5 => "HDF5",
+            Self::NetCdf => "NetCDF",
+            Self::Zarr => "Zarr",
+            Self::Pvd | Self::FileSeries => "list of files",
+            Self::Coefficients => "coefficient file",
+        }
+    }
+
     fn by_content(path: &Path) -> Result<Option<Self>> {
         let head = head(&FileBytes::open(path, Access::Read)?, FIRST_READ)?;
         let is_nifti = nifti::is_nifti(&head) || nifti::header_of(path).is_some();
@@ -121,6 +138,11 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
     if let Some(format) = format {
         refuse_options(path, format, options)?;
     }
+    let described = of_format(format, path, options)?;
+    Ok(Described { format: format.map_or("headerless data", Format::name), ..described })
+}
+
+fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<Described> {
     match format {
         Some(Format::Npy) => npy::describe(path),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),

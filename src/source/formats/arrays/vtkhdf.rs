@@ -75,7 +75,8 @@ impl Image {
             return Ok(Vec::new());
         }
         let Ok(offsets) = file.numbers(&path) else { return Ok(Vec::new()) };
-        let offsets: Vec<usize> = offsets.into_iter().map(|n| n as usize).collect();
+        // VTK itself writes one more than there are steps.
+        let offsets: Vec<usize> = offsets.into_iter().take(self.times.len()).map(|n| n as usize).collect();
         match offsets.len() == self.times.len() && offsets.iter().all(|n| *n < frames) {
             true => Ok(offsets),
             false => Err(format!("{path} leads to steps that {} does not have", variable.path)),

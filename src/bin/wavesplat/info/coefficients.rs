@@ -1,34 +1,15 @@
-//! `wavesplat info`
+//! What a coefficient file holds.
 
-use clap::Args;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::PathBuf;
 use wavesplat::bound::Bound;
 use wavesplat::cli::{CommonArgs, print};
 use wavesplat::convert::options;
 use wavesplat::error::Result;
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
 use wavesplat::report::{PromiseReport, WindowReport};
 use wavesplat::source::CHANNELS;
-
-/// Say what a coefficient file holds, promises and reached
-#[derive(Debug, Args)]
-#[command(before_help = "\
-Examples:
-  wavesplat info run.wspl
-  wavesplat info run.wspl --json | jq .windows")]
-pub(crate) struct InfoArgs {
-    /// Coefficient file
-    file: PathBuf,
-    /// Read the file instead of mapping it
-    #[arg(long)]
-    no_mmap: bool,
-    #[command(flatten)]
-    common: CommonArgs,
-}
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]
@@ -63,14 +44,12 @@ struct Info {
     program: String,
 }
 
-pub(crate) fn run(args: &InfoArgs) -> Result<()> {
-    let access = Access::unless(args.no_mmap);
-    let file = CoefficientFile::open(&args.file, access)?;
-    let info = Info::of(&file);
-    if args.common.json {
-        return args.common.report(&info, false);
+pub(super) fn run(file: &CoefficientFile, common: &CommonArgs) -> Result<()> {
+    let info = Info::of(file);
+    if common.json {
+        return common.report(&info, false);
     }
-    print(&info.text(file.metadata().bound, args.common.verbose))
+    print(&info.text(file.metadata().bound, common.verbose))
 }
 
 impl Info {

@@ -1,0 +1,120 @@
+//! What an archive of frames holds.
+
+use super::InfoArgs;
+use serde::Serialize;
+use std::fmt::Write;
+use wavesplat::cli::{narrow, print};
+use wavesplat::convert::estimate::{Estimate, estimate};
+use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
+use wavesplat::error::Result;
+use wavesplat::source::Archive;
+
+/// Tolerance and window of a conversion that says nothing of them.
+const TOLERANCE: f64 = 0.01;
+const WINDOW: usize = 32;
+
+/// The keys of `--json`.
+#[derive(Debug, Serialize)]
+struct Info<'a> {
+    format: &'static str,
+    /// Whether frames are decoded a window at a time; else they are read where they are.
+    decoded: bool,
+    dims: [usize; 3],
+    spacing: [f64; 3],
+    origin: [f64; 3],
+    sample: &'static str,
+    frames: Option<usize>,
+    times: &'a [f64],
+    variable: Option<&'a str>,
+    units: Option<&'a str>,
+    time_units: Option<&'a str>,
+    space_units: Option<&'a str>,
+    /// What stands for missing samples: a number, or "NaN".
+    missing_value: Option<String>,
+    raw_bytes: Option<u64>,
+    notes: &'a [String],
+    estimate: Option<Estimate>,
+}
+
+pub(super) fn run(args: &InfoArgs) -> Result<()> {
+    let source = args.input.open_quietly(&args.inputs, &args.common)?;
+    let mut source = narrow(source, args.frames, args.region)?;
+    let archive = source.archive().clone();
+    let estimated = match args.estimate {
+        true => Some(estimate(source.as_mut(), &config(args, &archive), &args.common.progress("estimate", "blocks"))?),
+        false => None,
+    };
+    let info = Info::of(&archive, estimated);
+    if args.common.json {
+        return args.common.report(&info, false);
+    }
+    print(&info.text())
+}
+
+/// How `convert` goes about it by default.
+fn config(args: &InfoArgs, archive: &Archive) -> ConvertConfig {
+    let plain = ConvertConfig::new(Coding::AUTO, WINDOW, args.tolerance.unwrap_or(TOLERANCE), args.common.memory.0);
+    ConvertConfig { missing: MissingPolicy::Mask, missing_value: archive.missing_value(None), ..plain }
+}
+
+impl<'a> Info<'a> {
+    fn of(archive: &'a Archive, estimate: Option<Estimate>) -> Self {
+        let frame = (archive.grid.whole().voxels() * archive.sample.size()) as u64;
+        Self {
+            format: archive.format,
+            decoded: archive.memory > 0,
+            dims: archive.grid.dims,
+            spacing: archive.grid.spacing,
+            origin: archive.grid.origin,
+            sample: archive.sample.name(),
+            frames: archive.frames,
+            times: &archive.times,
+            variable: archive.variable.as_deref(),
+            units: archive.units.samples.as_deref(),
+            time_units: archive.units.times.as_deref(),
+            space_units: archive.units.space.as_deref(),
+            missing_value: archive.missing.map(|value| value.to_string()),
+            raw_bytes: archive.frames.and_then(|frames| frame.checked_mul(frames as u64)),
+            notes: &archive.notes,
+            estimate,
+        }
+    }
+
+    fn text(&self) -> String {
+        let [x, y, z] = self.dims;
+        let with = |unit: Option<&str>, before: &str| unit.map(|unit| format!("{before}{unit}")).unwrap_or_default();
+        let how = if self.decoded { "decoded a window at a time" } else { "read where it is" };
+        let (space, unit) = (with(self.space_units, " "), with(self.units, " in "));
+        let frames =
+            self.frames.map_or("frames to the end of the stream".into(), |frames| format!("{frames} frame(s)"));
+        let mut text = format!(
+            "format     {}, {how}\n\
+             volume     {x} x {y} x {z} voxels, spacing {:?}{space}, origin {:?}{space}\n\
+             samples    {} ({}{unit}), {frames}\n",
+            self.format,
+            self.spacing,
+            self.origin,
+            self.sample,
+            self.variable.unwrap_or("unnamed"),
+        );
+        if let [first, .., last] | [first @ last] = self.times {
+            let _ = writeln!(text, "times      {first} to {last}{}", with(self.time_units, " "));
+        }
+        if let Some(value) = &self.missing_value {
+            let _ = writeln!(text, "missing    {value} stands for missing samples");
+        }
+        if let Some(bytes) = self.raw_bytes {
+            let _ = writeln!(text, "size       {bytes} bytes of samples");
+        }
+        if let Some(e) = &self.estimate {
+            let _ = writeln!(
+                text,
+                "estimate   about {} bytes as a coefficient file, {:.1}x smaller, at a tolerance of {} of the range {:.4e} to {:.4e} \
+                 (by {} blocks of {} windows)",
+                e.bytes, e.ratio, e.tolerance, e.range.0, e.range.1, e.blocks, e.windows
+            );
+        }
+        self.notes.iter().for_each(|note| text += &format!("note       {note}\n"));
+        text
+    }
+}

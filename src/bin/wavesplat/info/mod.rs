@@ -1,0 +1,80 @@
+//! `wavesplat info`
+
+mod archive;
+mod coefficients;
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RegionSpec, share};
+use wavesplat::error::{Error, Result};
+use wavesplat::file::CoefficientFile;
+
+/// Say what a coefficient file holds, promises and reached; or what an archive holds, and how it is read
+#[derive(Debug, Args)]
+#[command(before_help = "\
+Examples:
+  wavesplat info run.wspl
+  wavesplat info run.wspl --json | jq .windows
+  wavesplat info run.nc
+  wavesplat info frames/ --estimate --tolerance 0.001")]
+pub(crate) struct InfoArgs {
+    /// A coefficient file; or frames, as convert takes them
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Of frames: convert a few blocks, and say about how large the coefficient file would be
+    #[arg(long)]
+    estimate: bool,
+    /// With --estimate: the tolerance of that file [default: 0.01]
+    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, requires = "estimate")]
+    tolerance: Option<f64>,
+    /// Of frames: only these, a:b or a:b:step, the end left out
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
+    frames: Option<FrameRange>,
+    /// Of frames: only these voxels, x0:x1,y0:y1,z0:z1
+    #[arg(long, value_name = "BOX", help_heading = "Input")]
+    region: Option<RegionSpec>,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &InfoArgs) -> Result<()> {
+    args.common.start()?;
+    match args.coefficients()? {
+        Some(file) => coefficients::run(&file, &args.common),
+        None => archive::run(args),
+    }
+}
+
+impl InfoArgs {
+    /// The coefficient file that is meant; none if frames are.
+    fn coefficients(&self) -> Result<Option<CoefficientFile>> {
+        let [only] = self.inputs.as_slice() else { return Ok(None) };
+        let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");
+        if !named_so && !only.is_file() {
+            return Ok(None);
+        }
+        let foreign =
+            |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
+        match CoefficientFile::open(only, self.input.access()) {
+            Err(e) if !named_so && foreign(&e) => Ok(None),
+            file => {
+                let file = file?;
+                self.refuse_for_coefficients(only)?;
+                Ok(Some(file))
+            }
+        }
+    }
+
+    fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
+        let given =
+            [(self.estimate, "--estimate"), (self.frames.is_some(), "--frames"), (self.region.is_some(), "--region")];
+        match given.into_iter().find(|(given, _)| *given) {
+            Some((_, name)) => {
+                Err(Error::usage(format!("{}: is a coefficient file; {name} is for frames", path.display())))
+            }
+            None => self.input.refuse_for_coefficients(),
+        }
+    }
+}
