@@ -33,9 +33,11 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     Ok(array.described(&header, part))
 }
 
-/// The `.hdr` beside an `.img`.
+/// The `.hdr` beside an `.img`, which other formats have too.
 pub(super) fn header_of(image: &Path) -> Option<PathBuf> {
-    beside(image, "img", &["hdr", "hdr.gz"]).find(|path| path.is_file())
+    let first = |path: &Path| head(&FileBytes::open(path, Access::Read)?, LONGEST);
+    let is_header = |path: &Path| first(path).is_ok_and(|bytes| is_nifti(&bytes) || bytes.starts_with(GZIP));
+    beside(image, "img", &["hdr", "hdr.gz"]).find(|path| is_header(path))
 }
 
 /// The `.img` beside a `.hdr`, and whether it is compressed.

@@ -140,6 +140,9 @@ fn samples_may_be_in_a_file_beside() {
     for inputs in [head, named, folder.path("")] {
         check_inputs(&[inputs], &options(), SampleType::U16, 4);
     }
+    folder.write("other.hdr", "ENVI");
+    refused(&[folder.write("other.img", &samples)], &options(), "is of no known format");
+    std::fs::remove_file(folder.path("other.hdr")).expect("removing");
     folder.write("B.HDR", &header.bytes[..FIRST]);
     check_inputs(&[folder.write("B.IMG", [&[9; 16], samples.as_slice()].concat())], &options(), SampleType::U16, 4);
 }
