@@ -27,6 +27,8 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let parts = data::parts(&file, &header, &samples)?;
     let mut described = Described::plain(samples.shape, parts);
     (described.spacing, described.origin, described.times) = grid(&header, &samples).map_err(refused)?;
+    let (components, component) = samples.components;
+    described.variable = (components > 1).then(|| component::label("", components, component));
     described.notes = notes(&header, samples.axes).map_err(refused)?;
     Ok(described)
 }

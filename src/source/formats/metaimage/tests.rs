@@ -109,6 +109,7 @@ fn one_component_of_several_is_read() {
         let file = [folder.write("a.mha", local(&fields, &bytes))];
         check_inputs(&file, &named("[0]"), ty, 4);
         let mut source = open(&file, &named("[y]")).expect("opening");
+        assert_eq!(source.archive().variable.as_deref(), Some("[1]"));
         crate::source::testing::check_window(&*source.window(0, 4).expect("window"), ty, 1);
         refused(&file, &options(), "a.mha: has 2 components: --variable '[0]' takes the first, up to [1]");
         refused(&file, &named("[2]"), "none with number 2");
