@@ -1,5 +1,6 @@
 //! Samples as text: numbers with white space between them.
 
+use super::pieces::Packed;
 use crate::mapped::FileBytes;
 use crate::sample::{self, SampleType, swap_endian};
 use std::io::{self, ErrorKind, Read};
@@ -33,31 +34,54 @@ impl Characters {
     }
 }
 
+/// Samples from a place in a file, read as bytes with the most significant one first.
+#[derive(Debug)]
+pub(in crate::source) struct Words {
+    pub(in crate::source) start: u64,
+    pub(in crate::source) count: usize,
+    pub(in crate::source) sample: SampleType,
+}
+
+impl Packed for Words {
+    fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>> {
+        Ok(Box::new(Numbers::new(file, self.start, self.count, self.sample, true)))
+    }
+}
+
 /// The bytes of samples that are written as numbers.
 pub(in crate::source) struct Numbers {
     characters: Characters,
     sample: SampleType,
     big_endian: bool, // the bytes that are read
+    count: usize,     // numbers that may come
     left: Vec<u8>,    // characters of a number that is not whole yet
     samples: Vec<u8>, // bytes that are next
     used: usize,      // of these
 }
 
 impl Numbers {
-    pub(in crate::source) fn new(file: FileBytes, start: u64, sample: SampleType, big_endian: bool) -> Self {
+    /// The first `count` numbers from a place in a file.
+    pub(in crate::source) fn new(
+        file: FileBytes,
+        start: u64,
+        count: usize,
+        sample: SampleType,
+        big_endian: bool,
+    ) -> Self {
         let characters = Characters::new(file, start);
-        Self { characters, sample, big_endian, left: Vec::new(), samples: Vec::new(), used: 0 }
+        Self { characters, sample, big_endian, count, left: Vec::new(), samples: Vec::new(), used: 0 }
     }
 
     fn refill(&mut self) -> io::Result<()> {
         (self.used, self.samples) = (0, Vec::new());
-        while self.samples.is_empty() && !self.characters.ended {
+        while self.samples.is_empty() && self.count > 0 && !self.characters.ended {
             self.characters.read(&mut self.left)?;
             let space = self.left.iter().rposition(u8::is_ascii_whitespace);
             let whole = if self.characters.ended { self.left.len() } else { space.unwrap_or(0) };
             let text: Vec<u8> = self.left.drain(..whole).collect();
-            let words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+            let words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take(self.count);
             let values: Vec<f64> = words.map(|word| self.value(word)).collect::<io::Result<_>>()?;
+            self.count -= values.len();
             if self.left.len() > PIECE {
                 return Err(no_number(&self.left));
             }

@@ -122,7 +122,10 @@ impl Encoded {
         match self.form {
             Form::Raw => Box::new(FileReader::new(file, self.start)),
             Form::Base64 | Form::AppendedBase64 => Box::new(Text::new(file, self.start)),
-            Form::Ascii => Box::new(Numbers::new(file, self.start, self.sample, self.count.big_endian)),
+            Form::Ascii => {
+                let count = self.bytes / self.sample.size() + 1; // one too many is noticed
+                Box::new(Numbers::new(file, self.start, count, self.sample, self.count.big_endian))
+            }
         }
     }
 

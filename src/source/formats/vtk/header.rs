@@ -2,10 +2,13 @@
 
 use super::lines::Lines;
 use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
+use crate::mapped::{Access, FileBytes};
 use crate::sample::{self, SampleType};
 use crate::source::Parsed;
 use crate::source::formats::association::Association;
+use crate::source::formats::pieces::Packed;
+use crate::source::formats::text::Words;
+use std::io::Read;
 use std::str::FromStr;
 
 /// How every such file starts.
@@ -28,6 +31,8 @@ pub(super) struct Array {
 /// The file, as it is written.
 #[derive(Debug)]
 pub(super) struct Header {
+    /// Whether its arrays are text.
+    pub(super) ascii: bool,
     /// Points along x, y, z.
     pub(super) points: [usize; 3],
     pub(super) spacing: [f64; 3],
@@ -45,10 +50,10 @@ impl Header {
     pub(super) fn read(file: &FileBytes) -> Result<Self> {
         let mut lines = Lines { file, at: 0 };
         let refused = |e| Error::input(file.path(), e);
-        start(&mut lines)?;
+        let ascii = start(&mut lines)?;
         let (points, spacing, origin) = ([0; 3], [1.0; 3], [0.0; 3]);
         let mut header =
-            Self { points, spacing, origin, arrays: Vec::new(), scalars: Vec::new(), time: None, inside: None };
+            Self { ascii, points, spacing, origin, arrays: Vec::new(), scalars: Vec::new(), time: None, inside: None };
         while let Some(words) = lines.words()? {
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             if !header.geometry(&words).map_err(refused)? {
@@ -96,7 +101,8 @@ impl Header {
             ("COLOR_SCALARS", [name, components]) => {
                 let components = number(components, "components of COLOR_SCALARS").map_err(refused)?;
                 self.scalars.push(self.arrays.len());
-                self.array(name, "unsigned_char", (components, tuples), lines)
+                let ty = if self.ascii { "of colours as text" } else { "unsigned_char" };
+                self.array(name, ty, (components, tuples), lines)
             }
             ("VECTORS" | "NORMALS", [name, ty]) => array(name, ty, 3),
             ("TENSORS", [name, ty]) => array(name, ty, 9),
@@ -108,7 +114,7 @@ impl Header {
             }
             ("LOOKUP_TABLE", [_, size]) => {
                 let size: usize = number(size, "size of a LOOKUP_TABLE").map_err(refused)?;
-                pass(lines, size.checked_mul(4)).map(|_| ())
+                self.pass(lines, size.checked_mul(4), 8).map(|_| ())
             }
             ("FIELD", [_, count]) => self.field(number(count, "arrays of a FIELD").map_err(refused)?, lines),
             ("METADATA", _) => skip_metadata(lines),
@@ -150,22 +156,58 @@ impl Header {
         lines: &mut Lines<'_>,
     ) -> Result<()> {
         let name = decoded(name);
-        let Some(bytes) = bytes_of(ty, components, tuples) else {
+        let Some(bits) = bits_of(ty) else {
             let what = format!("array {name}: type {ty} is not supported, nor what comes after it");
             return Err(Error::input(lines.file.path(), what));
         };
-        let start = pass(lines, bytes)?;
+        let start = self.pass(lines, components.checked_mul(tuples), bits)?;
         match self.inside {
             Some((of, _)) => self.arrays.push(Array { of, name, ty: ty.into(), components, tuples, start }),
-            None if is_time(&name) && (components, tuples) == (1, 1) => self.time = time(lines.file, start, ty)?,
+            None if is_time(&name) && (components, tuples) == (1, 1) => self.time = self.time(lines.file, start, ty)?,
             None => {}
         }
         Ok(())
     }
+
+    /// Goes past numbers of so many bits that must be there, and says where they start.
+    fn pass(&self, lines: &mut Lines<'_>, numbers: Option<usize>, bits: usize) -> Result<u64> {
+        let (start, len) = (lines.at, lines.file.len());
+        let refused = |what: String| Err(Error::input(lines.file.path(), what));
+        let bits = numbers.and_then(|numbers| numbers.checked_mul(bits));
+        let (Some(numbers), Some(end)) = (numbers, bits.and_then(|n| start.checked_add(n.div_ceil(8) as u64))) else {
+            return refused("an array's size is too large for any file".into());
+        };
+        if self.ascii {
+            return lines.skip_words(numbers).map(|()| start);
+        }
+        if end > len {
+            return refused(format!("is cut short: an array ends at byte {end}, the file at {len}"));
+        }
+        lines.at = end;
+        Ok(start)
+    }
+
+    /// A stored number, if its type is that of samples.
+    fn time(&self, file: &FileBytes, start: u64, ty: &str) -> Result<Option<f64>> {
+        let Some(ty) = sample_type(ty) else { return Ok(None) };
+        let failed = |e| Error::io(file.path(), "reading its time", e);
+        let mut bytes = vec![0; ty.size()];
+        if self.ascii {
+            let words = Words { start, count: 1, sample: ty };
+            let file = FileBytes::open(file.path(), Access::Read)?;
+            words.open(file).and_then(|mut reader| reader.read_exact(&mut bytes)).map_err(failed)?;
+        } else {
+            file.read_at(start, &mut bytes).map_err(failed)?;
+        }
+        sample::swap_endian(ty, &mut bytes);
+        let mut value = [0.0];
+        sample::load(ty, &bytes, &mut value);
+        Ok(Some(value[0]))
+    }
 }
 
-/// The three lines that every file has.
-fn start(lines: &mut Lines<'_>) -> Result<()> {
+/// The three lines that every file has, and whether they say that its arrays are text.
+fn start(lines: &mut Lines<'_>) -> Result<bool> {
     let refused = |what: &str| Err(Error::input(lines.file.path(), what));
     if !lines.peek(MAGIC.len())?.starts_with(MAGIC) {
         return refused("does not start as a legacy VTK file does");
@@ -173,8 +215,8 @@ fn start(lines: &mut Lines<'_>) -> Result<()> {
     let mut next = || Result::Ok(lines.line()?.unwrap_or_default());
     let (_version, _title, encoding) = (next()?, next()?, next()?);
     match encoding.trim().to_uppercase().as_str() {
-        "BINARY" => Ok(()),
-        "ASCII" => refused("has its samples as text (ASCII), which is not supported; write it as BINARY, or as .vti"),
+        "BINARY" => Ok(false),
+        "ASCII" => Ok(true),
         _ => refused("says neither BINARY nor ASCII in its third line"),
     }
 }
@@ -193,32 +235,14 @@ fn skip_metadata(lines: &mut Lines<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Goes past bytes that must be there, and says where they start.
-fn pass(lines: &mut Lines<'_>, bytes: Option<usize>) -> Result<u64> {
-    let start = lines.at;
-    let end = bytes.and_then(|bytes| start.checked_add(bytes as u64));
-    let len = lines.file.len();
-    match end {
-        Some(end) if end <= len => lines.at = end,
-        Some(end) => {
-            let what = format!("is cut short: an array ends at byte {end}, the file at {len}");
-            return Err(Error::input(lines.file.path(), what));
-        }
-        None => return Err(Error::input(lines.file.path(), "an array's size is too large for any file")),
-    }
-    Ok(start)
-}
-
-/// The bytes of an array, none inside if they are too many; none if its type says nothing of them.
-fn bytes_of(ty: &str, components: usize, tuples: usize) -> Option<Option<usize>> {
-    let values = components.checked_mul(tuples);
-    let size = match ty.to_lowercase().as_str() {
-        "bit" => return Some(values.map(|n| n.div_ceil(8))),
-        "long" | "unsigned_long" | "vtktypeint64" | "vtktypeuint64" => 8,
-        "vtkidtype" => 4,
-        ty => sample_type(ty)?.size(),
-    };
-    Some(values.and_then(|n| n.checked_mul(size)))
+/// The bits of a number of a type; none if its name says nothing of them.
+fn bits_of(ty: &str) -> Option<usize> {
+    Some(match ty.to_lowercase().as_str() {
+        "bit" => 1,
+        "long" | "unsigned_long" | "vtktypeint64" | "vtktypeuint64" => 64,
+        "vtkidtype" => 32,
+        ty => 8 * sample_type(ty)?.size(),
+    })
 }
 
 /// The type of samples that a name stands for.
@@ -238,17 +262,6 @@ pub(super) fn sample_type(name: &str) -> Option<SampleType> {
 
 fn is_time(name: &str) -> bool {
     ["time", "timevalue"].iter().any(|time| name.eq_ignore_ascii_case(time))
-}
-
-/// A stored number, if its type is that of samples.
-fn time(file: &FileBytes, start: u64, ty: &str) -> Result<Option<f64>> {
-    let Some(ty) = sample_type(ty) else { return Ok(None) };
-    let mut bytes = vec![0; ty.size()];
-    file.read_at(start, &mut bytes).map_err(|e| Error::io(file.path(), "reading its time", e))?;
-    sample::swap_endian(ty, &mut bytes);
-    let mut value = [0.0];
-    sample::load(ty, &bytes, &mut value);
-    Ok(Some(value[0]))
 }
 
 /// A name in which VTK has written some characters as `%20`.

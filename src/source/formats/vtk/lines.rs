@@ -49,6 +49,29 @@ impl Lines<'_> {
         }
     }
 
+    /// Goes past words, as many as must be there.
+    pub(super) fn skip_words(&mut self, count: usize) -> Result<()> {
+        let (mut left, mut inside) = (count, false);
+        while left > 0 {
+            let piece = self.peek(LONGEST)?;
+            if piece.is_empty() && (left > 1 || !inside) {
+                return Err(Error::input(
+                    self.file.path(),
+                    format!("is cut short: {left} of {count} numbers are missing"),
+                ));
+            }
+            for byte in piece.iter().chain(piece.is_empty().then_some(&b'\n')) {
+                left -= usize::from(inside && byte.is_ascii_whitespace());
+                if left == 0 {
+                    return Ok(());
+                }
+                inside = !byte.is_ascii_whitespace();
+                self.at += 1;
+            }
+        }
+        Ok(())
+    }
+
     /// The next bytes, fewer at the end.
     pub(super) fn peek(&self, bytes: usize) -> Result<Vec<u8>> {
         let left = usize::try_from(self.file.len().saturating_sub(self.at)).unwrap_or(bytes);

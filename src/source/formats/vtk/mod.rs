@@ -1,4 +1,4 @@
-//! VTK's legacy files, `.vtk`: one array of STRUCTURED_POINTS, binary.
+//! VTK's legacy files, `.vtk`: one array of STRUCTURED_POINTS, binary or as text.
 
 mod header;
 mod lines;
@@ -6,6 +6,8 @@ mod lines;
 pub(in crate::source) use header::MAGIC;
 
 use super::component::{self, Chosen};
+use super::pieces::{Piece, Pieces};
+use super::text::Words;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::Parsed;
@@ -24,13 +26,23 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let chosen = component::choose(&arrays, header.scalars.first().copied(), variable).map_err(refused)?;
     let array = &header.arrays[chosen.array];
     let (shape, stored) = stored(&header, array, chosen).map_err(refused)?;
-    let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at: At::Byte(array.start) };
+    let at = if header.ascii { text(&file, array, shape) } else { At::Byte(array.start) };
+    let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at };
     let mut described = Described::plain(shape, vec![part]);
     described.spacing = header.spacing;
     described.origin = array.of.origin(header.points, header.origin, header.spacing);
     described.times = header.time.into_iter().collect();
     described.variable = Some(component::label(&array.name, array.components, chosen.component));
     Ok(described)
+}
+
+/// An array as text: all of it is one piece.
+fn text(file: &FileBytes, array: &Array, shape: Shape) -> At {
+    let (dims, sample) = (shape.dims(), shape.sample());
+    let samples = Words { start: array.start, count: array.components * array.tuples, sample };
+    let (path, state) = (file.path().into(), file.state());
+    let piece = Piece { path, state, start: [0; 3], dims, samples: Box::new(samples) };
+    At::Decoded(Box::new(Pieces { dims, voxel: array.components * sample.size(), frames: vec![vec![piece]] }))
 }
 
 fn stored(header: &Header, array: &Array, chosen: Chosen) -> Parsed<(Shape, Stored)> {

@@ -1,7 +1,7 @@
 //! Tests of legacy VTK files.
 
 use crate::sample::SampleType;
-use crate::source::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage};
+use crate::source::testing::{Folder, check_inputs, check_window, message, payload, refused, survives_damage, value};
 use crate::source::{OpenOptions, open};
 
 const DIMS: &str = "DIMENSIONS 7 5 3\nSPACING 0.5 1 2\nORIGIN 1 2 3\n";
@@ -90,6 +90,30 @@ fn one_array_of_several_is_read() {
 }
 
 #[test]
+fn numbers_as_text_are_read() {
+    let folder = Folder::new();
+    let (ty, start) = (SampleType::F32, "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n");
+    let numbers = |t: usize| (0..105).map(|i| format!("{} \n", value(ty, t, i))).collect::<String>();
+    let both: String = (0..105).map(|i| format!("{} {}\n", value(ty, 1, i), value(ty, 0, i))).collect();
+    let [a, b] = [numbers(0), numbers(1)];
+    let text = format!(
+        "{start}FIELD f 1\nTIME 1 1 double\n0.5\n{DIMS}POINT_DATA 105\nSCALARS a float\nLOOKUP_TABLE t\n{a}\nMETADATA\n\n\
+         FIELD f 2\nb 1 105 float\n{b}v 2 105 float\n{both}"
+    );
+    let file = [folder.write("a.vtk", &text)];
+    check_inputs(&file, &options(), ty, 1);
+    check_inputs(&file, &named("v[1]"), ty, 1);
+    let mut source = open(&file, &named("b")).expect("opening");
+    check_window(&*source.window(0, 1).expect("window"), ty, 1);
+    assert_eq!(source.archive().times, [0.5]);
+    check_inputs(&[folder.write("a.vtk", text.trim_end())], &named("v[y]"), ty, 1);
+    let mut source = open(&[folder.write("a.vtk", text.replacen("-2.5", "-2,5", 1))], &options()).expect("opening");
+    assert!(message(source.window(0, 1)).contains("\"-2,5\" is no number"));
+    let colours = text.replacen("SCALARS a float", "COLOR_SCALARS a 1", 1);
+    refused(&[folder.write("a.vtk", colours)], &options(), "type of colours as text is not supported");
+}
+
+#[test]
 fn cells_lie_between_points() {
     let folder = Folder::new();
     let text = "DIMENSIONS 8 6 4\nASPECT_RATIO 0.5 1 2\nCELL_DATA 105\nCOLOR_SCALARS J 1\n";
@@ -111,7 +135,7 @@ fn what_is_not_supported_is_named() {
         refused(&[folder.write("a.vtk", good.replacen(from, to, 1))], &options(), words);
     };
     with("# vtk", "# VTK", "does not start as");
-    with("BINARY", "ASCII", "as text (ASCII)");
+    with("BINARY", "ASCII", "is cut short: 104 of 105 numbers are missing");
     with("BINARY", "HEX", "neither BINARY nor ASCII");
     with("STRUCTURED_POINTS", "STRUCTURED_GRID", "is a STRUCTURED_GRID: only STRUCTURED_POINTS");
     with("float", "vtkIdType", "type vtkIdType is not supported");
