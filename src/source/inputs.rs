@@ -111,7 +111,10 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
 fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
     let all = visible_files(folder)?;
     let of = |format| all.iter().filter(move |p| Format::by_name(p) == Some(format));
-    let lists: Vec<_> = of(Format::Pvd).chain(of(Format::FileSeries)).collect();
+    let mut lists: Vec<_> = of(Format::Pvd).collect();
+    if lists.is_empty() {
+        lists.extend(of(Format::FileSeries));
+    }
     match lists[..] {
         [list] if options.dims.is_none() => return with_list(list),
         [a, b, ..] if of(Format::Vti).chain(of(Format::Vtk)).next().is_none() => {

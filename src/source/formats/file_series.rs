@@ -63,6 +63,10 @@ mod tests {
             check_inputs(std::slice::from_ref(&input), &OpenOptions::default(), SampleType::I8, 3);
             assert_eq!(open(&[input], &OpenOptions::default()).expect("opening").archive().times, [0.0, 0.25, 0.5]);
         }
+        let pvd = "<VTKFile type=\"Collection\"><DataSet timestep=\"7\" file=\"a.vtk\"/></VTKFile>";
+        folder.write("a.pvd", pvd);
+        let source = open(&[folder.path("")], &OpenOptions::default()).expect("opening");
+        assert_eq!(source.archive().times, [7.0], "a .pvd comes first");
         let files = [folder.path("a.vtk.series"), folder.path("a.vtk")];
         refused(&files, &OpenOptions::default(), "a list of files must be the only input");
     }
