@@ -5,14 +5,16 @@ use crate::error::{Error, Result};
 use crate::progress::{Progress, Silent};
 use crate::scan::{Scan, join_ranges, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, open_stream};
-use crate::volume::{Grid, Region};
+use crate::volume::{BlockGrid, Grid, Region};
 use serde::Serialize;
 use std::io::{self, Cursor};
 use std::path::Path;
 
 /// Blocks that are coded of a window, and windows.
-const BLOCKS: usize = 12;
+const BLOCKS: usize = 24;
 const WINDOWS: usize = 3;
+/// Of what may be allocated, the samples of these blocks have this part.
+const SHARE: usize = 4;
 
 /// What an archive would come to.
 #[derive(Debug, Clone, Serialize)]
@@ -42,7 +44,9 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     };
     let task = Task::new(config, &archive);
     let plan = Plan::new(&task.config, &task.archive, None)?;
-    let regions = spread(plan.blocks.len(), BLOCKS).map(|block| plan.blocks.region(block)).collect::<Vec<_>>();
+    let block = plan.blocks.region(0).voxels() * archive.sample.size() * config.window;
+    let most = (config.memory / SHARE / block).clamp(1, BLOCKS);
+    let regions = spread(plan.blocks.len(), most).map(|block| whole_block(&plan, block)).collect::<Vec<_>>();
     let firsts = windows(frames, config.window);
     progress.start(Some(firsts.len() as u64));
     let range = config.range.map_or_else(|| range(source, &archive, task.config.missing_value, &firsts), Ok)?;
@@ -50,11 +54,9 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     let (mut coded, mut samples) = (0, 0);
     for first in &firsts {
         let window = source.window(*first, config.window.min(frames - first))?;
-        for together in regions.chunk_by(|a, b| can_be_stacked(a, b, plan.blocks.edge)) {
-            let mut stack = stacked(window.as_ref(), &archive, together)?;
-            samples += stack.archive().grid.whole().voxels() * window.frames();
-            coded += convert(stack.as_mut(), &config, Path::new("estimate"), io::sink(), &Silent)?.output_bytes;
-        }
+        let mut stack = stacked(window.as_ref(), &archive, &regions)?;
+        samples += stack.archive().grid.whole().voxels() * window.frames();
+        coded += convert(stack.as_mut(), &config, Path::new("estimate"), io::sink(), &Silent)?.output_bytes;
         progress.advance(1);
     }
     progress.finish();
@@ -93,25 +95,35 @@ fn range(
     Ok(if seen.0 <= seen.1 { seen } else { (0.0, 0.0) })
 }
 
-/// Whether two blocks of `edge` voxels a side are still blocks where one lies upon the other.
-fn can_be_stacked(a: &Region, b: &Region, edge: usize) -> bool {
-    a.dims() == b.dims() && a.dims()[2] == edge
+/// A block, moved inwards if it is cut at a far face: all are of one size then.
+fn whole_block(plan: &Plan<'_>, block: usize) -> Region {
+    let (Region { start, .. }, BlockGrid { dims, edge }) = (plan.blocks.region(block), plan.blocks);
+    let start: [usize; 3] = std::array::from_fn(|axis| start[axis].min(dims[axis].saturating_sub(edge)));
+    Region { start, end: std::array::from_fn(|axis| (start[axis] + edge).min(dims[axis])) }
 }
 
-/// Blocks of a window, one upon the other, as an archive of their own.
+/// Blocks of a window side by side, as an archive of their own: along the volume's longest axis, which is cut into whole ones.
 fn stacked(window: &dyn FrameWindow, archive: &Archive, blocks: &[Region]) -> Result<Box<dyn FrameSource>> {
-    let [x, y, z] = blocks[0].dims();
-    let grid = Grid::unit([x, y, z * blocks.len()]);
-    let block = x * y * z * archive.sample.size();
-    let mut samples = vec![0; block * blocks.len() * window.frames()];
-    for (frame, samples) in samples.chunks_exact_mut(block * blocks.len()).enumerate() {
-        for (region, samples) in blocks.iter().zip(samples.chunks_exact_mut(block)) {
-            window.read_box(frame, region, samples)?;
+    let (dims, size) = (blocks[0].dims(), archive.sample.size());
+    let axis = (0..3).max_by_key(|axis| archive.grid.dims[*axis]).unwrap_or_default();
+    let mut grid = Grid::unit(dims);
+    grid.dims[axis] *= blocks.len();
+    let (whole, block) = (grid.whole(), Grid::unit(dims).whole());
+    let frame_bytes = whole.voxels() * size;
+    let mut samples = vec![0; frame_bytes * window.frames()];
+    let mut of_block = vec![0; block.voxels() * size];
+    for (frame, samples) in samples.chunks_exact_mut(frame_bytes).enumerate() {
+        for (number, region) in blocks.iter().enumerate() {
+            window.read_box(frame, region, &mut of_block)?;
+            for ((y, z), row) in block.rows().zip(of_block.chunks_exact(dims[0] * size)) {
+                let mut voxel = [0, y, z];
+                voxel[axis] += number * dims[axis];
+                samples[whole.index(voxel) * size..][..row.len()].copy_from_slice(row);
+            }
         }
     }
     let dims = grid.dims.into_iter().chain([window.frames()]).collect();
-    let (memory, sample) = (samples.len(), Some(archive.sample));
-    let options = OpenOptions { dims: Some(dims), sample, memory, ..OpenOptions::default() };
+    let options = OpenOptions { dims: Some(dims), sample: Some(archive.sample), memory: 0, ..OpenOptions::default() };
     open_stream(Cursor::new(samples), &options)
 }
 

@@ -141,7 +141,7 @@ impl<R: Read + Send> FrameSource for Stream<R> {
         };
         self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
-        let bytes = count.checked_mul(self.shape.frame_bytes()).unwrap_or(usize::MAX);
+        let bytes = count.saturating_mul(self.shape.frame_bytes());
         let mut data = Held::new(bytes, self.memory, Path::new(STANDARD))?;
         let held = self.copy(count, Some(&mut data))?;
         let frames = (0..held).map(|i| self.frame(i, first)).collect();

@@ -73,7 +73,7 @@ impl<'a> Info<'a> {
             units: archive.units.samples.as_deref(),
             time_units: archive.units.times.as_deref(),
             space_units: archive.units.space.as_deref(),
-            missing_value: archive.missing.map(|value| value.to_string()),
+            missing_value: archive.missing.map(|value| format!("{value:?}")),
             raw_bytes: archive.frames.and_then(|frames| frame.checked_mul(frames as u64)),
             notes: &archive.notes,
             estimate,

@@ -111,7 +111,7 @@ fn listed(all: &[Choice<'_>]) -> String {
     for Choice { path, arrays, .. } in all.iter().take(MOST_LISTED) {
         let of = |(n, dim): (&usize, &String)| if dim.is_empty() { n.to_string() } else { format!("{dim} {n}") };
         let axes: Vec<_> = arrays[0].lengths.iter().zip(&arrays[0].dims).map(of).collect();
-        let what = arrays[0].sample.as_ref().map_or_else(Clone::clone, |sample| sample.to_string());
+        let what = arrays[0].sample.as_ref().map_or_else(Clone::clone, ToString::to_string);
         let _ = write!(text, "\n  {path}: {what} ({})", axes.join(", "));
         if let Some(unit) = arrays[0].text("units") {
             let _ = write!(text, " in {unit}");
