@@ -57,7 +57,10 @@ fn for_a_word(word: &str) -> Option<String> {
 }
 
 /// Endings of frames.
-const FRAMES: [&str; 7] = ["npy", "nrrd", "nhdr", "vti", "pvd", "raw", "bin"];
+const FRAMES: [&str; 19] = [
+    "npy", "nrrd", "nhdr", "nii", "gz", "mha", "mhd", "vti", "pvti", "vtk", "pvd", "series", "h5", "hdf5", "vtkhdf",
+    "nc", "zarr", "raw", "bin",
+];
 
 /// Who takes an option that a command does not know.
 fn owner(command: &Command, option: &str) -> Option<String> {
@@ -81,6 +84,7 @@ const ELSEWHERE: [(&str, &[&str]); 2] = [
             "background",
             "center",
             "colormap",
+            "depth",
             "error",
             "error-image",
             "fps",
@@ -93,6 +97,7 @@ const ELSEWHERE: [(&str, &[&str]); 2] = [
             "quantity",
             "roll",
             "scale",
+            "sidecar",
             "sigma",
             "size",
             "slabs",

@@ -73,9 +73,10 @@ fn spread(all: usize, most: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |i| (2 * i + 1) * all / (2 * count))
 }
 
-/// The first frames of some windows: of whole ones, unless there is none.
+/// The first frames of some windows: of all if they are few, else of whole ones.
 fn windows(frames: usize, window: usize) -> Vec<usize> {
-    spread((frames / window).max(1), WINDOWS).map(|index| index * window).collect()
+    let all = frames.div_ceil(window);
+    spread(if all <= WINDOWS { all } else { frames / window }, WINDOWS).map(|index| index * window).collect()
 }
 
 /// The range of some whole frames: the first one of each window, and the very last one.
@@ -136,8 +137,8 @@ mod tests {
         assert_eq!(spread(3, 12).collect::<Vec<_>>(), [0, 1, 2]);
         assert_eq!(spread(100, 4).collect::<Vec<_>>(), [12, 37, 62, 87]);
         assert_eq!(
-            [windows(5, 32), windows(100, 32), windows(640, 32)],
-            [vec![0], vec![0, 32, 64], vec![96, 320, 512]]
+            [windows(70, 32), windows(100, 32), windows(640, 32)],
+            [vec![0, 32, 64], vec![0, 32, 64], vec![96, 320, 512]]
         );
     }
 }

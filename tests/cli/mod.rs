@@ -1,6 +1,7 @@
 //! The programs as programs: arguments, files, pipes, messages and exit codes.
 
 mod along;
+mod archives;
 mod ceilings;
 mod channels;
 mod colours;

@@ -3,10 +3,12 @@
 use super::InfoArgs;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 use wavesplat::cli::{narrow, print};
 use wavesplat::convert::estimate::{Estimate, estimate};
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
-use wavesplat::error::Result;
+use wavesplat::error::{Error, Result};
+use wavesplat::output::STANDARD;
 use wavesplat::source::Archive;
 
 /// Tolerance and window of a conversion that says nothing of them.
@@ -37,6 +39,9 @@ struct Info<'a> {
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
+    if args.estimate && args.inputs == [Path::new(STANDARD)] {
+        return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
+    }
     let source = args.input.open_quietly(&args.inputs, &args.common)?;
     let mut source = narrow(source, args.frames, args.region)?;
     let archive = source.archive().clone();

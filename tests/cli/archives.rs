@@ -1,0 +1,114 @@
+//! Archives as others write them, from the outside: one command converts, one makes pictures, and what files say goes along.
+
+use super::render::decode_png;
+use super::{Archive, Work};
+use std::collections::HashSet;
+
+/// A file or folder of `tests/golden/inputs`.
+fn input(name: &str) -> String {
+    format!("{}/tests/golden/inputs/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn every_kind_of_archive_becomes_a_picture_by_two_commands() {
+    for name in
+        ["netcdf/era5.nc", "netcdf/maps.nc", "vti/series", "nifti/4d.nii.gz", "metaimage/itk_4d.mha", "hdf5/gzip.h5"]
+    {
+        let work = Work::new();
+        work.wavesplat(&format!("convert {} -o a.wspl", input(name))).ok();
+        work.render("a.wspl -o a_%d.png --size 64x48").ok();
+        let pixels = decode_png(&work.read("a_3.png"));
+        let colours: HashSet<&[u8; 3]> = pixels.as_chunks::<3>().0.iter().collect();
+        assert!(colours.len() > 20, "{name}: {} colours", colours.len());
+    }
+}
+
+#[test]
+fn places_times_and_units_go_from_file_to_file() {
+    let work = Work::new();
+    let told = |name: &str| {
+        let told = work.wavesplat(&format!("info {name} --json")).ok().json();
+        ["dims", "spacing", "origin", "times", "variable", "sample"].map(|key| told[key].clone())
+    };
+    let units = |name: &str| {
+        let told = work.wavesplat(&format!("info {name} --json")).ok().json();
+        ["units", "time_units", "space_units"].map(|key| told[key].clone())
+    };
+    let source = input("netcdf/netcdf4.nc");
+    work.wavesplat(&format!("convert {source} -o a.wspl --tolerance 0")).ok();
+    work.wavesplat("extract a.wspl -o b.nc").ok();
+    assert_eq!(told("a.wspl"), told(&source));
+    assert_eq!(told("b.nc"), told(&source));
+    assert_eq!(units("b.nc"), units(&source));
+    assert_eq!(units(&source)[0], "kg m-3");
+    work.wavesplat(&format!("verify a.wspl --against {source}")).ok();
+    work.wavesplat("verify a.wspl --against b.nc").ok();
+    work.render("a.wspl -o a.npy --splat-error 0 --size 40x30").ok();
+    work.render(&format!("{source} --method direct -o b.npy --splat-error 0 --size 40x30")).ok();
+    assert!(work.read("a.npy") == work.read("b.npy"));
+}
+
+#[test]
+fn what_files_declare_missing_is_missing_unasked() {
+    for name in ["fill_1e20", "fill_nan", "packed_i16", "missing_value"] {
+        let (work, source) = (Work::new(), input(&format!("netcdf/{name}.nc")));
+        work.wavesplat(&format!("convert {source} -o a.wspl")).ok();
+        let told = work.wavesplat("info a.wspl --json").ok().json();
+        assert_eq!(told["missing"], 3, "{name}");
+        assert!(told["value_range"][1].as_f64().unwrap() < 30.0, "{name}");
+        work.wavesplat(&format!("convert {source} -o b.wspl --missing error")).fails(3, &["has a missing value"]);
+    }
+}
+
+#[test]
+fn what_is_ambiguous_is_listed_and_chosen() {
+    let (work, source) = (Work::new(), input("netcdf/several.nc"));
+    let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
+    work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
+    work.wavesplat(&format!("info {source}")).fails(3, &listed);
+    work.wavesplat(&format!("convert {source} -o a.wspl --variable density")).ok();
+    work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // it remembers which
+    work.wavesplat(&format!("convert {source} -o b.wspl --variable nothing")).fails(3, &["has no variable nothing"]);
+    let order = input("hdf5/axes_xyzt.h5");
+    work.wavesplat(&format!("convert {order} -o c.wspl --axes xyzt")).ok();
+    work.wavesplat(&format!("verify c.wspl --against {order}")).ok();
+    work.wavesplat(&format!("convert {order} -o d.wspl --axes xyz")).fails(3, &["--axes xyz names 3"]);
+}
+
+#[test]
+fn info_tells_of_frames_and_how_large_they_would_become() {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([50, 40, 30], 40).npy());
+    let told = work.wavesplat("info a.npy").ok();
+    for words in ["NumPy array, read where it is", "50 x 40 x 30 voxels", "f32 (unnamed), 40 frame(s)", "9600000 bytes"]
+    {
+        assert!(told.text().contains(words), "{words}: {}", told.text());
+    }
+    for tolerance in ["0.01", "0.0001"] {
+        let told = work.wavesplat(&format!("info a.npy --estimate --tolerance {tolerance} --json")).ok().json();
+        work.wavesplat(&format!("convert a.npy -o a.wspl --force --tolerance {tolerance}")).ok();
+        let ratio = told["estimate"]["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
+        assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");
+    }
+    work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);
+    work.piped("info - --estimate", &work.read("a.npy")).fails(2, &["standard input"]);
+}
+
+#[test]
+fn coefficients_go_through_a_pipe_as_they_are() {
+    let work = Work::with_file("");
+    work.shell("cat a.npy | $WAVESPLAT convert - -o - | cat > b.wspl").ok();
+    assert!(work.read("a.wspl") == work.read("b.wspl"));
+    let mean = "import io, sys, array; d = sys.stdin.buffer.read(); a = array.array('f', d[128:]); print(len(a))";
+    let counted = work.shell(&format!("$WAVESPLAT extract a.wspl -o - --frames 10:20 | python3 -c \"{mean}\"")).ok();
+    assert_eq!(counted.text().trim(), "28000");
+    let early = work.shell("$WAVESPLAT extract a.wspl -o - --format nc | head -c 100 | wc -c").ok();
+    assert_eq!((early.text().trim(), early.err.as_str()), ("100", ""));
+}
+
+#[cfg(not(feature = "zarr"))]
+#[test]
+fn a_zarr_store_that_is_not_built_in_says_how_to_get_it() {
+    let source = input("zarr/v3_zstd.zarr");
+    Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["cargo build --release --features zarr"]);
+}
