@@ -1,7 +1,7 @@
 //! Frame files in: one source per format behind one trait.
 //!
-//! Whatever the format ([`formats`]), a file comes down to frames at known places or to frames that are decoded, in any
-//! order of axes ([`layout`]). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
+//! Whatever the format (`formats`), a file comes down to frames at known places or to frames that are decoded, in any
+//! order of axes (`layout`). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
 mod coloured;
