@@ -1,5 +1,7 @@
 //! Archives as the field's own software writes them: `tests/golden/inputs`, whose README says what is in there.
 
+use crate::common::random::Random;
+use crate::common::times;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use wavesplat::error::Result;
@@ -146,6 +148,73 @@ impl Case {
             window.check_unchanged().map_err(|e| e.to_string())?;
         }
         Ok(())
+    }
+}
+
+/// The files that a case's path stands for.
+fn files(path: &Path) -> Vec<PathBuf> {
+    match std::fs::read_dir(path) {
+        Ok(entries) => entries.flat_map(|entry| files(&entry.unwrap().path())).collect(),
+        Err(_) => vec![path.into()],
+    }
+}
+
+/// Copies a folder.
+fn copy(from: &Path, to: &Path) {
+    for file in files(from) {
+        let name = to.join(file.strip_prefix(from).unwrap());
+        std::fs::create_dir_all(name.parent().unwrap()).unwrap();
+        std::fs::copy(&file, name).unwrap();
+    }
+}
+
+/// Every file of a format with some bytes changed, cut or repeated: read, or refused, but nothing else.
+fn check_damaged(format: &str) {
+    let work = tempfile::tempdir().unwrap();
+    copy(&folder().join(format), work.path());
+    let mut random = Random(format.len() as u64);
+    for file in files(work.path()) {
+        let good = std::fs::read(&file).unwrap();
+        for _ in 0..4 * times() {
+            std::fs::write(&file, damaged(&good, &mut random)).unwrap();
+            let near = file.ancestors().take_while(|path| *path != work.path());
+            for path in near {
+                let options = OpenOptions { memory: 1 << 20, ..OpenOptions::default() };
+                let Ok(mut source) = open(&[path.into()], &options) else { continue };
+                let whole = source.archive().grid.whole();
+                let frames = source.archive().frames.unwrap_or(0).min(4);
+                if whole.voxels() < 1 << 16
+                    && let Ok(window) = source.window(0, frames)
+                {
+                    let mut out = vec![0; whole.voxels() * source.archive().sample.size()];
+                    (0..frames).for_each(|frame| drop(window.read_box(frame, &whole, &mut out)));
+                }
+            }
+        }
+        std::fs::write(&file, good).unwrap();
+    }
+}
+
+fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bad = good.to_vec();
+    for _ in 0..1 + random.below(4) {
+        let at = random.below(bad.len().max(1));
+        match random.below(8) {
+            0 => bad.truncate(at),
+            1 if at + 8 <= bad.len() => bad[at..at + 8].copy_from_slice(&[0xff; 8]),
+            2 if at + 4 <= bad.len() => bad[at..at + 4].copy_from_slice(&[0; 4]),
+            3 => bad.extend_from_within(at..),
+            _ if at < bad.len() => bad[at] ^= 1 << random.below(8),
+            _ => {}
+        }
+    }
+    bad
+}
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    for format in ["metaimage", "vtk", "vti", "vtkhdf", "nifti", "nrrd", "hdf5", "netcdf"] {
+        check_damaged(format);
     }
 }
 

@@ -59,8 +59,9 @@ impl Chunks {
             Counts::Voxels(_) => variable.lengths[axis],
             Counts::Only(_) => 1,
         };
-        let plane: usize = (0..counts.len()).filter(|i| *i != axis).map(of_axis).product::<usize>() * sample.size();
-        let whole: usize = (0..counts.len()).map(chunk).product::<usize>() * sample.size();
+        let bytes = |lengths: &mut dyn Iterator<Item = usize>| lengths.fold(sample.size(), usize::saturating_mul);
+        let plane = bytes(&mut (0..counts.len()).filter(|i| *i != axis).map(of_axis));
+        let whole = bytes(&mut (0..counts.len()).map(chunk));
         let memory = opener.how.memory;
         if whole > memory {
             return Err(too_large(&opener.path, whole));
@@ -159,5 +160,76 @@ impl Decode for Chunks {
 impl fmt::Debug for Chunks {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Chunks").field("path", &self.path).field("counts", &self.counts).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Attributes, How};
+    use super::*;
+    use crate::mapped::Access;
+    use std::sync::Mutex;
+
+    const LENGTHS: [usize; 5] = [7, 2, 5, 4, 6]; // t, one of two, z, y, x
+    const CHUNK: [usize; 5] = [3, 1, 2, 4, 5];
+
+    /// How often each sample was read.
+    static READS: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+
+    /// An array whose samples are their own numbers.
+    struct Counted;
+
+    impl ArrayFile for Counted {
+        fn variables(&self) -> Parsed<Vec<Variable>> {
+            Ok(Vec::new())
+        }
+
+        fn read(&self, _: &str, _: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+            let mut reads = READS.lock().expect("no panic");
+            reads.resize(LENGTHS.iter().product(), 0);
+            let mut found = vec![0_usize];
+            for (range, len) in ranges.iter().zip(LENGTHS) {
+                found = found.iter().flat_map(|at| range.clone().map(move |i| at * len + i)).collect();
+            }
+            found.iter().for_each(|at| reads[*at] += 1);
+            Ok(found.iter().flat_map(|at| (*at as u16).to_le_bytes()).collect())
+        }
+
+        fn numbers(&self, _: &str) -> Parsed<Vec<f64>> {
+            Ok(Vec::new())
+        }
+    }
+
+    #[test]
+    fn every_sample_is_read_once_and_put_in_its_place() {
+        let (dims, attributes) = (vec![String::new(); 5], Attributes::new());
+        let (lengths, chunk) = (LENGTHS.to_vec(), Some(CHUNK.to_vec()));
+        let variable = Variable { path: "a".into(), sample: Ok(SampleType::U16), lengths, dims, chunk, attributes };
+        let voxels = [2, 1, 0].map(Counts::Voxels);
+        let counts = [vec![Counts::Frames, Counts::Only(1)], voxels.to_vec()].concat();
+        for memory in [240, 500, 1 << 20] {
+            READS.lock().expect("no panic").clear();
+            let how = How { access: Access::Read, memory };
+            let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)) };
+            let mut chunks = Chunks::new(&variable, &counts, Vec::new(), &opener).expect("small chunks");
+            let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
+            assert_eq!((chunks.together(), stored.bytes), (3, 3 * 120 * 2));
+            for first in (0..7).step_by(3) {
+                let mut held = Held::new(stored.bytes, 1 << 20, Path::new("a")).expect("room");
+                chunks.decode(Path::new("a"), first..7.min(first + 3), &mut held).expect("reading");
+                let mut bytes = vec![0; 120 * 2 * 3.min(7 - first)];
+                held.read_at(0, &mut bytes).expect("what was put there");
+                let of_frame = |t: usize| (0..120).map(move |i| ((t * 2 + 1) * 120 + i) as u16);
+                let expected = (first..7.min(first + 3)).flat_map(of_frame).flat_map(u16::to_le_bytes);
+                assert!(expected.eq(bytes), "frames from {first}");
+            }
+            let reads = READS.lock().expect("no panic").clone();
+            let expected = (0..LENGTHS.iter().product()).map(|i: usize| u8::from(i / 120 % 2 == 1));
+            assert!(expected.eq(reads), "{memory} bytes");
+        }
+        let how = How { access: Access::Read, memory: 200 };
+        let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)) };
+        let refused = Chunks::new(&variable, &counts, Vec::new(), &opener).expect_err("chunks of 240 bytes");
+        assert!(refused.to_string().contains("--memory"), "{refused}");
     }
 }

@@ -248,6 +248,7 @@ impl Context<'_> {
             counts => Some(Axis { counts, len: variable.lengths[i], backwards: places.is_backwards(counts) }),
         };
         let layout = Layout(counts.iter().enumerate().filter_map(axis).collect());
+        layout.bytes(sample.size())?;
         if let Some(mesh) = mesh {
             (places.spacing, places.origin) = mesh.lattice();
             places.space_unit = Some("m".into());
