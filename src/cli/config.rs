@@ -15,6 +15,10 @@ use toml::de::{DeTable, DeValue};
 /// The id of the option that names a file.
 const CONFIG: &str = "config";
 
+/// What tables may be named for besides the commands of a program: the other program, or a command of it.
+const PROGRAMS: [&str; 2] = ["wavesplat", "wavesplat-render"];
+const COMMANDS: [&str; 7] = ["convert", "append", "info", "verify", "extract", "recover", "generate"];
+
 /// What a file gives.
 #[derive(Debug, Default)]
 pub(super) struct Config {
@@ -92,6 +96,9 @@ impl File<'_> {
         let table = table.map_err(|e| self.wrong(&e.span().unwrap_or(0..0), e.message().trim()))?.into_inner();
         let (mut options, mut own): (Vec<Taken>, Vec<&str>) = (Vec::new(), Vec::new());
         for (name, entries) in table.iter().filter_map(|(key, value)| Some((key, value.get_ref().as_table()?))) {
+            if self.is_of_another(name.get_ref()) {
+                continue;
+            }
             let Some(owner) = self.program.find_subcommand(name.get_ref().as_ref()) else {
                 let what = format!("[{}] is no command of {}", name.get_ref(), self.program.get_name());
                 return Err(self.wrong(&name.span(), &what));
@@ -111,6 +118,13 @@ impl File<'_> {
             }
         }
         Ok(options)
+    }
+
+    /// Whether a table is for the other program, which may read the same file.
+    fn is_of_another(&self, table: &str) -> bool {
+        let (own, commands) =
+            if self.program.has_subcommands() { ("wavesplat", &[][..]) } else { ("wavesplat-render", &COMMANDS[..]) };
+        commands.contains(&table) || PROGRAMS.contains(&table) && table != own
     }
 
     /// An error if no command has an option of this name.

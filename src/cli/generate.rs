@@ -7,6 +7,7 @@ use clap::{Command, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use std::fmt::Write as _;
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -86,6 +87,7 @@ fn completions(mut program: Command, shell: Shell) -> Result<()> {
 fn man_pages(program: Command, folder: &Path, force: bool) -> Result<()> {
     let mut program = program.disable_help_subcommand(true);
     program.build();
+    fs::create_dir_all(folder).map_err(|e| Error::io(folder, "making a folder", e))?;
     for command in std::iter::once(&program).chain(program.get_subcommands()) {
         let path = folder.join(Man::new(command.clone()).get_filename());
         let mut out = Output::create(&path, force)?;

@@ -28,6 +28,8 @@ pub struct Contents {
     pub units: Option<String>,
     /// Units of times.
     pub time_units: Option<String>,
+    /// The calendar of times, where it is said.
+    pub calendar: Option<String>,
     /// Units of positions.
     pub space_units: Option<String>,
     /// What marks a missing sample, if some may be missing: a number of the samples' type, or NaN.
@@ -52,6 +54,7 @@ impl Contents {
             name: name.unwrap_or_else(|| "values".into()),
             units: text("units").filter(|_| channel.is_none()),
             time_units: text("time-units").filter(|_| !numbered),
+            calendar: text("calendar").filter(|_| !numbered),
             space_units: text("space-units"),
             missing: missing(file, config),
         }
@@ -101,6 +104,7 @@ pub(super) mod testing {
             name: "a & \"b\"".into(),
             units: Some("<K>".into()),
             time_units: Some("s".into()),
+            calendar: None,
             space_units: Some("mm".into()),
             missing: None,
         }

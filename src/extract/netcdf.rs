@@ -92,6 +92,7 @@ fn coordinate_texts(contents: &Contents, name: &str) -> Vec<(&'static str, Strin
     let mut texts = vec![("long_name", long.to_string())];
     texts.extend(axis.map(|axis| ("axis", axis.into())));
     texts.extend(units.map(|units| ("units", units.clone())));
+    texts.extend(contents.calendar.clone().filter(|_| name == "time").map(|calendar| ("calendar", calendar)));
     texts
 }
 

@@ -136,15 +136,17 @@ pub struct Units {
     pub times: Option<String>,
     /// Unit of spacing and origin.
     pub space: Option<String>,
+    /// The calendar of times, if it is not the usual one.
+    pub calendar: Option<String>,
 }
 
 impl Units {
     /// Names of settings that units are kept under.
-    pub const SETTINGS: [&'static str; 3] = ["units", "time-units", "space-units"];
+    pub const SETTINGS: [&'static str; 4] = ["units", "time-units", "space-units", "calendar"];
 
     /// The units that are known, as settings.
     pub fn settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        let units = [&self.samples, &self.times, &self.space];
+        let units = [&self.samples, &self.times, &self.space, &self.calendar];
         Self::SETTINGS.into_iter().zip(units).filter_map(|(name, unit)| Some((name, unit.as_deref()?)))
     }
 }

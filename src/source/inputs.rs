@@ -164,7 +164,9 @@ fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let extension = formats::extension(first);
     if let Some(other) = files.iter().find(|p| formats::extension(p) != extension) {
         let what = format!("mixes formats, for example {} and {}", name(first), name(other));
-        return Err(Error::usage(format!("{}: {what}; a pattern such as '*.npy' chooses", folder.display())));
+        let pattern = folder.join(format!("*.{extension}"));
+        let hint = format!("a pattern in quotes such as '{}' chooses", pattern.display());
+        return Err(Error::usage(format!("{}: {what}; {hint}", folder.display())));
     }
     Ok(files)
 }

@@ -13,9 +13,23 @@ pub(super) fn check(paths: &[PathBuf]) -> Result<()> {
     let steps: Vec<i64> = numbers.windows(2).map(|n| n[1] - n[0]).collect();
     let usual = usual_step(&steps);
     match steps.iter().position(|s| *s != usual) {
+        Some(_) if is_a_shells_order(&numbers) => Err(out_of_order(&paths[0])),
         Some(at) => Err(irregular(&paths[at], &paths[at + 1], steps[at], usual)),
         None => Ok(()),
     }
+}
+
+/// Whether numbers are regular, but in the order of their digits: as a shell puts the names that match a pattern.
+fn is_a_shells_order(numbers: &[i64]) -> bool {
+    let (mut sorted, mut by_digits) = (numbers.to_vec(), numbers.to_vec());
+    sorted.sort_unstable();
+    by_digits.sort_by_key(i64::to_string);
+    by_digits == numbers && sorted != numbers && sorted.windows(3).all(|n| n[1] - n[0] == n[2] - n[1])
+}
+
+fn out_of_order(first: &Path) -> Error {
+    let what = "and the files after it are in the order that a shell gives, 10 before 2";
+    Error::input(first, format!("{what}; quote the pattern, or name the folder, to have them in that of their numbers"))
 }
 
 /// An error if numbered names differ in more than their numbers: a folder with frames of two variables, say.
@@ -103,6 +117,13 @@ mod tests {
         let message = message(checked(&["d/f_08.npy", "d/f_09.npy", "d/f_10.npy", "d/f_12.npy", "d/f_13.npy"]));
         assert!(message.contains("f_10.npy is followed by f_12.npy: a frame seems to be missing"), "{message}");
         assert!(message.contains("--allow-gaps"), "{message}");
+    }
+
+    #[test]
+    fn the_order_of_a_shell_is_named() {
+        let names: Vec<String> = [0, 1, 10, 11, 2, 3, 4, 5, 6, 7, 8, 9].map(|n| format!("f_{n}.vti")).to_vec();
+        let message = message(checked(&names.iter().map(String::as_str).collect::<Vec<_>>()));
+        assert!(message.contains("quote the pattern"), "{message}");
     }
 
     #[test]

@@ -23,10 +23,12 @@ impl Packing {
         Self { scale, offset, ..Self::NONE }
     }
 
-    /// The type of the samples: f32 holds what integers of up to 16 bits become as finely as they were.
-    pub(super) fn sample(stored: SampleType) -> SampleType {
+    /// The type of the samples: f32 where it holds what numbers become as finely as they were.
+    pub(super) fn sample(&self, stored: SampleType) -> SampleType {
+        let fine = self.scale.abs() / 4.0;
         match stored {
             SampleType::U32 | SampleType::I32 | SampleType::F64 => SampleType::F64,
+            _ if !stored.is_float() && sample::rounding(SampleType::F32, self.offset.abs()) > fine => SampleType::F64,
             _ => SampleType::F32,
         }
     }
@@ -38,7 +40,7 @@ impl Packing {
 
     /// Fills `out` with samples (little-endian, of the type that [`Packing::sample`] says) of stored numbers (little-endian).
     pub(super) fn unpack(&self, stored: SampleType, bytes: &[u8], out: &mut [u8]) {
-        let ty = Self::sample(stored);
+        let ty = self.sample(stored);
         let mut values = Vec::new();
         sample::for_each_run(stored, bytes, |first, numbers| {
             values.clear();
@@ -60,6 +62,7 @@ mod tests {
         packing.unpack(SampleType::I16, &stored, &mut out);
         let mut values = [0.0; 5];
         sample::load(SampleType::F32, &out, &mut values);
+        assert_eq!(Packing::scaled(1e-5, 300.0).sample(SampleType::I16), SampleType::F64);
         assert_eq!(values.map(|v| if v.is_nan() { 99.0 } else { v }), [3.0, 99.0, 5.0, 99.0, -22.0]);
     }
 }

@@ -85,7 +85,7 @@ fn info_tells_of_frames_and_how_large_they_would_become() {
         assert!(told.text().contains(words), "{words}: {}", told.text());
     }
     for tolerance in ["0.01", "0.0001"] {
-        let told = work.wavesplat(&format!("info a.npy --estimate --tolerance {tolerance} --json")).ok().json();
+        let told = work.wavesplat(&format!("info a.npy --estimate={tolerance} --json")).ok().json();
         work.wavesplat(&format!("convert a.npy -o a.wspl --force --tolerance {tolerance}")).ok();
         let ratio = told["estimate"]["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
         assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");

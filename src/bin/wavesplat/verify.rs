@@ -2,7 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, print, remembered};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print, remembered};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::report::PromiseReport;
@@ -83,8 +83,11 @@ impl VerifyArgs {
         if self.against.is_empty() {
             return Ok(None);
         }
-        let frames = self.frames.or(remembered(file, "frames")?);
-        self.input.open_again(file, &self.against, frames, &self.common).map(Some)
+        let source = self.input.open_again(file, &self.against, self.frames, &self.common)?;
+        // What was appended may be of the same archive: all of it is meant then, and not what was first taken.
+        let is_all = self.frames.is_some() || source.archive().frames == Some(file.frames());
+        let first = if is_all { None } else { remembered(file, "frames")? };
+        narrow(source, first, None).map(Some)
     }
 }
 

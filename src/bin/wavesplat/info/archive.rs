@@ -11,8 +11,7 @@ use wavesplat::error::{Error, Result};
 use wavesplat::output::STANDARD;
 use wavesplat::source::Archive;
 
-/// Tolerance and window of a conversion that says nothing of them.
-const TOLERANCE: f64 = 0.01;
+/// The window of a conversion that says nothing of it.
 const WINDOW: usize = 32;
 
 /// The keys of `--json`.
@@ -39,16 +38,17 @@ struct Info<'a> {
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
-    if args.estimate && args.inputs == [Path::new(STANDARD)] {
+    if args.estimate.is_some() && args.inputs == [Path::new(STANDARD)] {
         return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
     }
     let source = args.input.open_quietly(&args.inputs, &args.common)?;
     let mut source = narrow(source, args.frames, args.region)?;
     let archive = source.archive().clone();
-    let estimated = match args.estimate {
-        true => Some(estimate(source.as_mut(), &config(args, &archive), &args.common.progress("estimate", "blocks"))?),
-        false => None,
-    };
+    let progress = args.common.progress("estimate", "windows");
+    let estimated = args
+        .estimate
+        .map(|tolerance| estimate(source.as_mut(), &config(tolerance, args.common.memory.0, &archive), &progress));
+    let estimated = estimated.transpose()?;
     let info = Info::of(&archive, estimated);
     if args.common.json {
         return args.common.report(&info, false);
@@ -57,8 +57,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
 }
 
 /// How `convert` goes about it by default.
-fn config(args: &InfoArgs, archive: &Archive) -> ConvertConfig {
-    let plain = ConvertConfig::new(Coding::AUTO, WINDOW, args.tolerance.unwrap_or(TOLERANCE), args.common.memory.0);
+fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
+    let plain = ConvertConfig::new(Coding::AUTO, WINDOW, tolerance, memory);
     ConvertConfig { missing: MissingPolicy::Mask, missing_value: archive.missing_value(None), ..plain }
 }
 

@@ -118,6 +118,17 @@ impl Info {
             self.id,
             self.program
         );
+        let unit = |name: &str| self.settings.iter().find(|(n, _)| n == name).map(|(_, unit)| unit.as_str());
+        if let [first, .., last] | [first @ last] = self.times.as_slice() {
+            let _ = writeln!(text, "times      {first} to {last} {}", unit("time-units").unwrap_or_default());
+        }
+        let units: Vec<String> = [("samples in ", "units"), ("places in ", "space-units")]
+            .into_iter()
+            .filter_map(|(what, name)| Some(format!("{what}{}", unit(name)?)))
+            .collect();
+        if !units.is_empty() {
+            let _ = writeln!(text, "units      {}", units.join(", "));
+        }
         if let Some(colours) = &self.colours {
             let _ = writeln!(text, "colours    {} channels: {} by {colours}", self.channels, CHANNELS.join(", "));
         }

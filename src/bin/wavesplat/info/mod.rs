@@ -16,17 +16,15 @@ Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
-  wavesplat info frames/ --estimate --tolerance 0.001")]
+  wavesplat info frames/ --estimate=0.001")]
 pub(crate) struct InfoArgs {
     /// A coefficient file; or frames, as convert takes them
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// Of frames: convert a few blocks, and say about how large the coefficient file would be
-    #[arg(long)]
-    estimate: bool,
-    /// With --estimate: the tolerance of that file [default: 0.01]
-    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, requires = "estimate")]
-    tolerance: Option<f64>,
+    /// Of frames: convert a few blocks, and say about how large a coefficient file of this tolerance would be [0.01 if none is
+    /// given]
+    #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
+    estimate: Option<f64>,
     /// Of frames: only these, a:b or a:b:step, the end left out
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
     frames: Option<FrameRange>,
@@ -68,8 +66,11 @@ impl InfoArgs {
     }
 
     fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
-        let given =
-            [(self.estimate, "--estimate"), (self.frames.is_some(), "--frames"), (self.region.is_some(), "--region")];
+        let given = [
+            (self.estimate.is_some(), "--estimate"),
+            (self.frames.is_some(), "--frames"),
+            (self.region.is_some(), "--region"),
+        ];
         match given.into_iter().find(|(given, _)| *given) {
             Some((_, name)) => {
                 Err(Error::usage(format!("{}: is a coefficient file; {name} is for frames", path.display())))

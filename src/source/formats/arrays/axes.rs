@@ -7,6 +7,16 @@ use crate::source::layout::Counts;
 const ORDER: [Counts; 4] = [Counts::Frames, Counts::Voxels(2), Counts::Voxels(1), Counts::Voxels(0)];
 const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];
 
+/// A note on axes that were taken by their order alone; nothing if they say what they count.
+pub(super) fn note(variable: &Variable, all: &[Variable], counts: &[Counts], letters: Option<&str>) -> Option<String> {
+    let known = known(variable, all);
+    let guessed = |axis: &usize| known[*axis].is_none() && !matches!(counts[*axis], Counts::Only(_));
+    (0..counts.len()).find(guessed).filter(|_| letters.is_none())?;
+    let letter = |c: &Counts| ORDER.iter().position(|role| role == c).map_or('c', |at| LETTERS[at]);
+    let letters: String = counts.iter().map(letter).collect();
+    Some(format!("the axes {:?} are taken as {letters}, slowest first; --axes says otherwise", variable.lengths))
+}
+
 /// What each axis counts, the slowest first; `index` is that of an axis beside space and time, `letters` what the user says.
 pub(super) fn counts(
     variable: &Variable,
@@ -64,6 +74,9 @@ fn too_many(variable: &Variable, axis: usize, len: usize) -> String {
 fn by_letters(variable: &Variable, letters: &str) -> Parsed<Vec<Option<Counts>>> {
     let of = |c: char| LETTERS.iter().position(|letter| *letter == c).map(|at| ORDER[at]);
     let counts: Vec<_> = letters.chars().map(of).collect();
+    if let Some(twice) = ORDER.into_iter().position(|role| counts.iter().filter(|c| **c == Some(role)).count() > 1) {
+        return Err(format!("--axes {letters} has {} twice", LETTERS[twice]));
+    }
     if counts.len() != variable.lengths.len() {
         return Err(format!("{}: --axes {letters} names {}", shown(variable), counts.len()));
     }

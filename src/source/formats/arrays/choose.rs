@@ -2,7 +2,7 @@
 
 use super::{Variable, component};
 use crate::source::Parsed;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 
 const MOST_LISTED: usize = 20;
@@ -40,13 +40,21 @@ pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>,
         by_path.or(of_name.next().filter(|_| of_name.next().is_none())).cloned()
     };
     let (name, index) = component::named(given);
-    let found = find(given).map(|choice| (choice, None)).or_else(|| Some((find(name)?, index)));
+    let stepped = self::choices(all.iter());
+    let of_steps = |name: &str| {
+        let mut of_name = stepped.iter().filter(|c| c.name() == name && !c.steps.is_empty());
+        of_name.next().filter(|_| of_name.next().is_none()).cloned()
+    };
+    let found = find(given).or_else(|| of_steps(given)).map(|choice| (choice, None));
+    let found = found.or_else(|| Some((find(name).or_else(|| of_steps(name))?, index)));
     found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(&self::choices(all.iter()))))
 }
 
 /// The one variable that can be an archive, or of several the one that is `active`.
 pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Parsed<Choice<'a>> {
-    let mut volumes = choices(all.iter().filter(|v| is_volume(v, all)));
+    let bounds = bounds(all);
+    let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
+    let mut volumes = choices(all.iter().filter(|v| is_volume(v, least) && !bounds.contains(v.name())));
     if volumes.len() > 1
         && let Some(at) = volumes.iter().position(|c| active == Some(c.name()))
     {
@@ -97,12 +105,16 @@ fn templated(path: &str) -> Option<(String, u64)> {
     Some((named.collect::<Vec<_>>().join("/"), step))
 }
 
-/// Whether frames can be in it: numbers that have a place, and are not places themselves.
-fn is_volume(variable: &Variable, all: &[Variable]) -> bool {
-    let says = |v: &Variable, what| v.text(what) == Some(variable.name());
-    let is_bounds = all.iter().any(|v| says(v, "bounds") || says(v, "climatology") || says(v, "coordinates"));
-    let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
-    variable.sample.is_ok() && variable.lengths.len() >= least && !variable.lengths.contains(&0) && !is_bounds
+/// Names of variables that others name as their places.
+fn bounds(all: &[Variable]) -> HashSet<&str> {
+    let says = ["bounds", "climatology", "coordinates"];
+    let texts = all.iter().flat_map(|v| says.into_iter().filter_map(|what| v.text(what)));
+    texts.flat_map(str::split_whitespace).collect()
+}
+
+/// Whether frames can be in it: numbers that have a place.
+fn is_volume(variable: &Variable, least: usize) -> bool {
+    variable.sample.is_ok() && variable.lengths.len() >= least && !variable.lengths.contains(&0)
 }
 
 /// Variables by name and size, for messages.
@@ -113,6 +125,9 @@ fn listed(all: &[Choice<'_>]) -> String {
         let axes: Vec<_> = arrays[0].lengths.iter().zip(&arrays[0].dims).map(of).collect();
         let what = arrays[0].sample.as_ref().map_or_else(Clone::clone, ToString::to_string);
         let _ = write!(text, "\n  {path}: {what} ({})", axes.join(", "));
+        if arrays.len() > 1 {
+            let _ = write!(text, ", {} steps", arrays.len());
+        }
         if let Some(unit) = arrays[0].text("units") {
             let _ = write!(text, " in {unit}");
         }

@@ -24,15 +24,16 @@ pub(super) struct Chunks {
     order: Vec<usize>,
     /// Frames that are in the same chunks.
     together: usize,
-    /// The axis that is cut, and into pieces of what length, so that one of them is no more than may be held.
-    cut: (usize, usize),
+    /// What is read at once along each axis: whole chunks, and no more than may be held.
+    piece: Vec<usize>,
     opener: Opener,
-    /// The file, while frames are taken.
-    file: Option<Box<dyn ArrayFile>>,
 }
 
 /// Of what a program may take, chunks as they are decoded have about this part.
 const SHARE: usize = 16;
+
+/// How often what is read is in memory at once: as the library's numbers, and as bytes.
+const COPIES: usize = 2;
 
 /// The error of a chunk that is too large.
 fn too_large(path: &Path, bytes: usize) -> Error {
@@ -52,33 +53,25 @@ impl Chunks {
             (Some(at), None) if !is_slowest => MANY.min(variable.lengths[at]),
             _ => 1,
         };
-        let is_long = |axis: &usize| matches!(counts[*axis], Counts::Voxels(_)) && variable.lengths[*axis] > 1;
-        let axis = (0..counts.len()).find(is_long).unwrap_or(0);
-        let of_axis = |axis: usize| match counts[axis] {
-            Counts::Frames => together,
-            Counts::Voxels(_) => variable.lengths[axis],
-            Counts::Only(_) => 1,
-        };
         let bytes = |lengths: &mut dyn Iterator<Item = usize>| lengths.fold(sample.size(), usize::saturating_mul);
-        let plane = bytes(&mut (0..counts.len()).filter(|i| *i != axis).map(of_axis));
-        let whole = bytes(&mut (0..counts.len()).map(chunk));
-        let memory = opener.how.memory;
+        let (whole, memory) = (bytes(&mut (0..counts.len()).map(chunk)), opener.how.memory);
         if whole > memory {
             return Err(too_large(&opener.path, whole));
         }
-        let piece = (memory / plane.max(1)).next_multiple_of(chunk(axis)).max(chunk(axis));
+        let mut piece: Vec<usize> = (0..counts.len())
+            .map(|axis| match counts[axis] {
+                Counts::Frames => together,
+                Counts::Voxels(_) => chunk(axis),
+                Counts::Only(_) => 1,
+            })
+            .collect();
+        for axis in (0..counts.len()).rev().filter(|axis| matches!(counts[*axis], Counts::Voxels(_))) {
+            let others = bytes(&mut piece.iter().copied()) / piece[axis];
+            let fits = (memory / COPIES / others).max(piece[axis]);
+            piece[axis] = (fits / piece[axis] * piece[axis]).min(variable.lengths[axis]);
+        }
         let (path, lengths, counts) = (variable.path.clone(), variable.lengths.clone(), counts.to_vec());
-        Ok(Self {
-            path,
-            sample,
-            lengths,
-            counts,
-            order,
-            together,
-            cut: (axis, piece),
-            opener: opener.clone(),
-            file: None,
-        })
+        Ok(Self { path, sample, lengths, counts, order, together, piece, opener: opener.clone() })
     }
 
     /// How the frames that are read together are held.
@@ -86,15 +79,34 @@ impl Chunks {
         Stored::new(&layout.clone().with_frames(self.together), self.sample, false)
     }
 
-    /// The box of a variable with some frames, and with a range of the axis that is cut.
-    fn ranges(&self, frames: &Range<usize>, piece: &Range<usize>) -> Vec<Range<usize>> {
-        let range = |(axis, counts): (usize, &Counts)| match counts {
-            Counts::Only(index) => *index..index + 1,
-            Counts::Frames => frames.clone(),
-            Counts::Voxels(_) if axis == self.cut.0 => piece.clone(),
-            Counts::Voxels(_) => 0..self.lengths[axis],
-        };
-        self.counts.iter().enumerate().map(range).collect()
+    /// The boxes of some frames, one after another.
+    fn boxes(&self, frames: &Range<usize>) -> Vec<Vec<Range<usize>>> {
+        let mut boxes = vec![Vec::new()];
+        for (axis, counts) in self.counts.iter().enumerate() {
+            let (piece, len) = (self.piece[axis], self.lengths[axis]);
+            let ranges: Vec<Range<usize>> = match counts {
+                Counts::Only(index) => std::iter::once(*index..index + 1).collect(),
+                Counts::Frames => std::iter::once(frames.clone()).collect(),
+                Counts::Voxels(_) => (0..len).step_by(piece).map(|at| at..(at + piece).min(len)).collect(),
+            };
+            let longer = |found: Vec<Range<usize>>| {
+                ranges.iter().map(move |range| [found.clone(), vec![range.clone()]].concat()).collect::<Vec<_>>()
+            };
+            boxes = boxes.into_iter().flat_map(longer).collect();
+        }
+        boxes
+    }
+
+    /// Reads one box.
+    fn read(&self, file: &dyn ArrayFile, path: &Path, ranges: &[Range<usize>]) -> Result<Vec<u8>> {
+        let what = || format!("{} at {ranges:?}", self.path.trim_start_matches('/'));
+        let bytes = file.read(&self.path, self.sample, ranges);
+        let bytes = bytes.map_err(|e| Error::input(path, format!("{}: {e}", what())))?;
+        let expected = ranges.iter().map(Range::len).product::<usize>() * self.sample.size();
+        if bytes.len() != expected {
+            return Err(Error::input(path, format!("{}: has {} bytes, not {expected}", what(), bytes.len())));
+        }
+        Ok(bytes)
     }
 
     /// Puts a box among the frames that are read together.
@@ -131,29 +143,18 @@ impl Decode for Chunks {
     }
 
     fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
-        let file = match self.file.take() {
-            Some(file) => file,
-            None => self.opener.open()?,
-        };
-        let (axis, piece) = self.cut;
         let stored = self.order.get(frames.start).map_or(frames.clone(), |at| *at..*at + 1);
-        for first in (0..self.lengths[axis]).step_by(piece) {
-            let ranges = self.ranges(&stored, &(first..(first + piece).min(self.lengths[axis])));
-            let bytes = file.read(&self.path, self.sample, &ranges);
-            let bytes = bytes.map_err(|e| Error::input(path, format!("frames {frames:?} of {}: {e}", self.path)))?;
-            let expected = ranges.iter().map(Range::len).product::<usize>() * self.sample.size();
-            if bytes.len() != expected {
-                let what = format!("frames {frames:?} of {} have {} bytes, not {expected}", self.path, bytes.len());
-                return Err(Error::input(path, what));
+        self.opener.with_file(|file| {
+            for ranges in self.boxes(&stored) {
+                let bytes = self.read(file, path, &ranges)?;
+                self.put(&ranges, &bytes, out).map_err(|e| Error::io(path, format!("holding frames {frames:?}"), e))?;
             }
-            self.put(&ranges, &bytes, out).map_err(|e| Error::io(path, format!("holding frames {frames:?}"), e))?;
-        }
-        self.file = Some(file);
-        Ok(())
+            Ok(())
+        })
     }
 
     fn rest(&mut self) {
-        self.file = None;
+        self.opener.close();
     }
 }
 
@@ -168,7 +169,7 @@ mod tests {
     use super::super::{Attributes, How};
     use super::*;
     use crate::mapped::Access;
-    use std::sync::Mutex;
+    use std::sync::{Arc, Mutex};
 
     const LENGTHS: [usize; 5] = [7, 2, 5, 4, 6]; // t, one of two, z, y, x
     const CHUNK: [usize; 5] = [3, 1, 2, 4, 5];
@@ -210,7 +211,7 @@ mod tests {
         for memory in [240, 500, 1 << 20] {
             READS.lock().expect("no panic").clear();
             let how = How { access: Access::Read, memory };
-            let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)) };
+            let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
             let mut chunks = Chunks::new(&variable, &counts, Vec::new(), &opener).expect("small chunks");
             let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
             assert_eq!((chunks.together(), stored.bytes), (3, 3 * 120 * 2));
@@ -228,7 +229,7 @@ mod tests {
             assert!(expected.eq(reads), "{memory} bytes");
         }
         let how = How { access: Access::Read, memory: 200 };
-        let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)) };
+        let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
         let refused = Chunks::new(&variable, &counts, Vec::new(), &opener).expect_err("chunks of 240 bytes");
         assert!(refused.to_string().contains("--memory"), "{refused}");
     }

@@ -29,6 +29,7 @@ use places::Places;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use values::Values;
 
 /// An array, and what is said of it.
@@ -118,27 +119,50 @@ struct How {
 }
 
 /// What opens a file of arrays, as often as it is asked.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 struct Opener {
     path: PathBuf,
     how: How,
     open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>,
+    /// The file, while frames are taken of any of its arrays.
+    opened: Arc<Mutex<Option<Box<dyn ArrayFile>>>>,
 }
 
 impl Opener {
     fn new(path: &Path, open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>, options: &OpenOptions) -> Self {
         let how = How { access: options.access, memory: options.memory / SHARE };
-        Self { path: path.into(), how, open }
+        Self { path: path.into(), how, open, opened: Arc::default() }
     }
 
     fn open(&self) -> Result<Box<dyn ArrayFile>> {
         (self.open)(&self.path, self.how)
     }
+
+    /// Hands out the open file, which is open until the next [`Opener::close`].
+    fn with_file<T>(&self, use_it: impl FnOnce(&dyn ArrayFile) -> Result<T>) -> Result<T> {
+        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if opened.is_none() {
+            *opened = Some(self.open()?);
+        }
+        opened.as_deref().map(use_it).expect("it was opened")
+    }
+
+    /// Closes the file, unless arrays besides the one that asks are read from it.
+    fn close(&self) {
+        if Arc::strong_count(&self.opened) == 1 {
+            self.opened.lock().unwrap_or_else(PoisonError::into_inner).take();
+        }
+    }
 }
 
 /// Reads what an HDF5 file holds.
 pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<Described> {
-    describe(&Opener::new(path, hdf5::open, options), path, options)
+    let opener = Opener::new(path, hdf5::open, options);
+    // What the NetCDF library wrote says so, whatever its name is.
+    match opener.open()?.group("/").contains_key("_NCProperties") {
+        true => describe_netcdf(path, options),
+        false => describe(&opener, path, options),
+    }
 }
 
 /// Reads what a NetCDF file holds.
@@ -169,7 +193,8 @@ fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<De
     }
     .map_err(refused)?;
     check_steps(path, &choice, options)?;
-    let context = Context { file: file.as_ref(), all: &all, image, index, axes: options.axes.as_deref() };
+    let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
+    let context = Context { file: file.as_ref(), all: &all, image, index, axes, spaced };
     let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
     let mut parts = Vec::new();
     for found in &found {
@@ -177,9 +202,11 @@ fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<De
         parts.push(found.part((watched, state), chunks).map_err(refused)?);
     }
     let mut described = joined(found, parts).map_err(refused)?;
-    let times = openpmd::times(file.as_ref(), &choice);
-    if !times.is_empty() {
-        (described.times, described.units.times) = (times, Some("s".into()));
+    if let Some((times, are_seconds)) = openpmd::times(file.as_ref(), &choice) {
+        (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+    }
+    if choice.arrays.len() > 1 {
+        described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path));
     }
     Ok(described)
 }
@@ -218,6 +245,8 @@ struct Context<'a> {
     index: Option<usize>,
     /// What axes count, by the user's word.
     axes: Option<&'a str>,
+    /// Whether the user says how far voxels are apart.
+    spaced: bool,
 }
 
 /// What an array is.
@@ -241,8 +270,13 @@ impl Context<'_> {
             let path = variable.path.trim_start_matches('/');
             format!("{path} is of type {ty}, which is not supported; integers up to 32 bits and floats are")
         })?;
+        if variable.lengths.contains(&0) {
+            let path = variable.path.trim_start_matches('/');
+            return Err(format!("{path} has no samples: its axes are {:?}", variable.lengths));
+        }
         let counts = axes::counts(&variable, self.all, self.index, self.axes)?;
-        let mut places = Places::of(self.file, self.all, &variable, &counts)?;
+        let mut places = Places::of((self.file, self.all), &variable, &counts, self.spaced);
+        places.notes.extend(axes::note(&variable, self.all, &counts, self.axes));
         let axis = |(i, counts): (usize, &Counts)| match *counts {
             Counts::Only(_) => None,
             counts => Some(Axis { counts, len: variable.lengths[i], backwards: places.is_backwards(counts) }),
@@ -252,13 +286,14 @@ impl Context<'_> {
         if let Some(mesh) = mesh {
             (places.spacing, places.origin) = mesh.lattice();
             places.space_unit = Some("m".into());
+            places.notes.clear();
         }
         let order = self.of_image(&variable, &layout, &mut places)?;
         let name = match self.index {
             Some(index) => format!("{}[{index}]", variable.name()),
             None => variable.name().to_string(),
         };
-        let values = Values::of(&variable, sample);
+        let values = Values::of(&variable, sample)?;
         Ok(Found { name, counts, layout, order, places, values, variable })
     }
 
@@ -285,8 +320,8 @@ impl Found {
 
     fn described(self, parts: Vec<Part>) -> Parsed<Described> {
         let shape = Shape::new(self.layout.dims(), self.values.sample)?;
-        let Places { spacing, origin, times, space_unit, time_unit, notes, .. } = self.places;
-        let units = Units { samples: self.values.unit, times: time_unit, space: space_unit };
+        let Places { spacing, origin, times, space_unit, time_unit, calendar, notes, .. } = self.places;
+        let units = Units { samples: self.values.unit, times: time_unit, space: space_unit, calendar };
         let (variable, missing) = (Some(self.name), self.values.missing);
         Ok(Described { spacing, origin, times, variable, units, missing, notes, ..Described::plain(shape, parts) })
     }

@@ -83,6 +83,14 @@ impl Opened {
         let mut attributes = attributes(found);
         let unsigned = attributes.get("_Unsigned") == Some(&Attribute::Text("true".into()));
         let sample = sample_type(found.dtype(), unsigned);
+        if let (true, Ok(sample)) = (unsigned, &sample) {
+            let turn = 2_f64.powi(8 * sample.size() as i32);
+            for name in ["_FillValue", "missing_value", "valid_range", "valid_min", "valid_max"] {
+                if let Some(Attribute::Numbers(numbers)) = attributes.get_mut(name) {
+                    numbers.iter_mut().filter(|n| **n < 0.0).for_each(|n| *n += turn);
+                }
+            }
+        }
         if matches!(sample, Ok(SampleType::F32 | SampleType::F64)) && !attributes.contains_key("_FillValue") {
             attributes.insert("_FillValue".into(), Attribute::Numbers(vec![UNWRITTEN]));
         }

@@ -57,9 +57,9 @@ impl Mesh {
     }
 }
 
-/// The time of each step in seconds, where the groups of all say it.
-pub(super) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Vec<f64> {
-    let Some((before, _)) = choice.path.split_once(STEP) else { return Vec::new() };
+/// The time of each step and whether these are seconds, where the groups of all say it.
+pub(super) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Option<(Vec<f64>, bool)> {
+    let (before, _) = choice.path.split_once(STEP)?;
     let group = |variable: &&Variable| {
         let rest = variable.path.trim_start_matches('/')[before.len()..].find('/').unwrap_or_default();
         file.group(&variable.path.trim_start_matches('/')[..before.len() + rest])
@@ -69,7 +69,10 @@ pub(super) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Vec<f64> {
             Some(Attribute::Numbers(numbers)) => numbers.first().copied(),
             _ => None,
         };
-        Some(number("time")? * number("timeUnitSI").unwrap_or(1.0))
+        let second = number("timeUnitSI");
+        Some((number("time")? * second.unwrap_or(1.0), second.is_some()))
     };
-    choice.arrays.iter().map(group).map(time).collect::<Option<_>>().unwrap_or_default()
+    let times: Vec<(f64, bool)> = choice.arrays.iter().map(group).map(time).collect::<Option<_>>()?;
+    let are_seconds = times.iter().all(|(_, second)| *second);
+    Some((times.into_iter().map(|(time, _)| time).collect(), are_seconds))
 }

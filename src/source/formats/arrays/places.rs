@@ -7,6 +7,23 @@ use crate::source::layout::Counts;
 /// Steps along an axis may differ by so much of one: coordinates are often rounded to single precision.
 const REGULAR: f64 = 1e-2;
 
+/// Coordinates of an axis that are read.
+const MOST: usize = 1 << 24;
+
+/// Units of length, in metres.
+const LENGTHS: [(&str, f64); 10] = [
+    ("m", 1.0),
+    ("metre", 1.0),
+    ("metres", 1.0),
+    ("meter", 1.0),
+    ("meters", 1.0),
+    ("km", 1e3),
+    ("kilometers", 1e3),
+    ("cm", 1e-2),
+    ("mm", 1e-3),
+    ("um", 1e-6),
+];
+
 /// The lattice and the times of a variable.
 #[derive(Debug, Default)]
 pub(super) struct Places {
@@ -16,6 +33,7 @@ pub(super) struct Places {
     pub(super) times: Vec<f64>,
     pub(super) space_unit: Option<String>,
     pub(super) time_unit: Option<String>,
+    pub(super) calendar: Option<String>,
     pub(super) notes: Vec<String>,
 }
 
@@ -24,7 +42,7 @@ pub(super) struct Places {
 struct Line {
     /// Name of the axis.
     name: String,
-    /// Of the coordinate that is least.
+    /// The coordinate that is least.
     first: f64,
     /// To the next one.
     step: Option<f64>,
@@ -34,24 +52,30 @@ struct Line {
 }
 
 impl Places {
-    pub(super) fn of(file: &dyn ArrayFile, all: &[Variable], variable: &Variable, counts: &[Counts]) -> Parsed<Self> {
+    /// `spaced`: whether the user says how far voxels are apart.
+    pub(super) fn of(
+        (file, all): (&dyn ArrayFile, &[Variable]),
+        variable: &Variable,
+        counts: &[Counts],
+        spaced: bool,
+    ) -> Self {
         let mut places = Self { spacing: [1.0; 3], ..Self::default() };
         let mut lines = [const { None }; 3];
         for (axis, counts) in counts.iter().enumerate() {
             let coordinate = variable.coordinate(axis, all);
             match (counts, coordinate) {
-                (Counts::Frames, Some(times)) => places.take_times(file, times)?,
-                (Counts::Voxels(along), Some(coordinate)) => lines[*along] = Line::of(file, coordinate)?,
+                (Counts::Frames, Some(times)) => places.take_times(file, times),
+                (Counts::Voxels(along), Some(coordinate)) => lines[*along] = places.line(file, coordinate),
                 _ => {}
             }
         }
         if !counts.contains(&Counts::Frames)
-            && let Some(time) = all.iter().find(|v| v.lengths.iter().all(|n| *n == 1) && is_time(v))
+            && let Some(time) = scalar_time(all, variable)
         {
-            places.take_times(file, time)?;
+            places.take_times(file, time);
         }
-        places.take_lines(&lines);
-        Ok(places)
+        places.take_lines(&lines, spaced);
+        places
     }
 
     /// Whether voxels are stored from the last to the first.
@@ -59,58 +83,91 @@ impl Places {
         matches!(counts, Counts::Voxels(along) if self.backwards[along])
     }
 
-    fn take_times(&mut self, file: &dyn ArrayFile, times: &Variable) -> Parsed<()> {
-        self.times = file.numbers(&times.path)?;
-        if self.times.iter().any(|t| !t.is_finite()) {
-            self.times.clear();
-            self.notes.push(format!("{} is not a number for every frame: frames are numbered", times.name()));
+    /// The coordinates of an axis; none, with a note, where they lead nowhere.
+    fn line(&mut self, file: &dyn ArrayFile, coordinate: &Variable) -> Option<Line> {
+        let line = numbers(file, coordinate).ok().and_then(|at| Line::of(at, coordinate));
+        if line.is_none() {
+            let name = coordinate.name();
+            self.notes.push(format!("{name} does not lead from one end to the other: its voxels are numbered"));
         }
-        self.time_unit = times.text("units").map(String::from);
-        Ok(())
+        line
     }
 
-    fn take_lines(&mut self, lines: &[Option<Line>; 3]) {
+    fn take_times(&mut self, file: &dyn ArrayFile, times: &Variable) {
+        match numbers(file, times) {
+            Ok(numbers) => self.times = numbers,
+            Err(_) => self.notes.push(format!("{} cannot be read: frames are numbered", times.name())),
+        }
+        self.time_unit = times.text("units").map(String::from);
+        self.calendar = times.text("calendar").map(String::from);
+    }
+
+    fn take_lines(&mut self, lines: &[Option<Line>; 3], spaced: bool) {
         for (along, line) in lines.iter().enumerate() {
             self.backwards[along] = line.as_ref().is_some_and(|line| line.backwards);
         }
         // Lengths compare along axes of one unit alone: x leads, then y, then z.
         let Some(leading) = lines.iter().flatten().find(|line| line.step.is_some()) else { return };
         let step = leading.step.unwrap_or(1.0);
-        self.space_unit = Some(leading.unit.clone()).filter(|unit| !unit.is_empty());
+        let mut is_one_unit = true;
         for (along, line) in lines.iter().enumerate() {
-            match line {
-                Some(line) if line.unit == leading.unit => {
-                    (self.origin[along], self.spacing[along]) = (line.first, line.step.unwrap_or(step));
+            match line.as_ref().map(|line| (line, factor(&line.unit, &leading.unit))) {
+                Some((line, Some(factor))) => {
+                    (self.origin[along], self.spacing[along]) =
+                        (line.first * factor, line.step.map_or(step, |s| s * factor));
                     if !line.is_regular {
                         self.notes.push(format!("{} is not regular: its mean step is taken", line.name));
                     }
                 }
-                Some(line) => {
+                Some((line, None)) => {
                     self.spacing[along] = step;
-                    if line.step.is_some() {
-                        self.notes.push(format!(
-                            "{} is in {:?} and {} in {:?}: its voxels are drawn as far apart as those of {}; --spacing sets \
-                             another distance",
-                            line.name, line.unit, leading.name, leading.unit, leading.name
-                        ));
+                    is_one_unit &= line.step.is_none();
+                    if line.step.is_some() && !spaced {
+                        self.notes.push(line.other_unit(leading));
                     }
                 }
                 None => self.spacing[along] = step,
             }
         }
+        self.space_unit = Some(leading.unit.clone()).filter(|unit| is_one_unit && !unit.is_empty());
     }
 }
 
-fn is_time(variable: &Variable) -> bool {
-    axes::of_coordinate(variable) == Some(Counts::Frames) || variable.name().eq_ignore_ascii_case("time")
+/// The numbers of a coordinate, which are no more than an axis can have.
+fn numbers(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
+    match coordinate.lengths.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)) {
+        Some(count) if count <= MOST => file.numbers(&coordinate.path),
+        _ => Err(format!("{} is too long", coordinate.path)),
+    }
+}
+
+/// What turns numbers of one unit into those of another; none if they do not compare.
+fn factor(unit: &str, other: &str) -> Option<f64> {
+    let metres = |unit: &str| LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres);
+    if unit == other { Some(1.0) } else { Some(metres(unit)? / metres(other)?) }
+}
+
+/// The time of a file of one frame: CF's scalar coordinate.
+fn scalar_time<'a>(all: &'a [Variable], variable: &Variable) -> Option<&'a Variable> {
+    let times = || {
+        let is_time =
+            |v: &&Variable| axes::of_coordinate(v) == Some(Counts::Frames) || v.name().eq_ignore_ascii_case("time");
+        all.iter().filter(|v| v.lengths.iter().all(|n| *n == 1) && v.path != variable.path).filter(is_time)
+    };
+    let named = variable.text("coordinates").unwrap_or_default();
+    let is_valid = |v: &&Variable| v.text("standard_name") == Some("time") || v.name().eq_ignore_ascii_case("time");
+    let is_named = |v: &&Variable| named.split_whitespace().any(|name| name == v.name());
+    times().find(is_valid).or_else(|| times().find(is_named)).or_else(|| times().next())
 }
 
 impl Line {
     /// None for coordinates that do not lead from one end to the other.
-    fn of(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Option<Self>> {
-        let mut at = file.numbers(&coordinate.path)?;
-        let down = coordinate.text("positive").is_some_and(|positive| positive.eq_ignore_ascii_case("down"));
-        if down {
+    fn of(mut at: Vec<f64>, coordinate: &Variable) -> Option<Self> {
+        let unit = unit(coordinate.text("units").unwrap_or_default());
+        if unit == "degrees" {
+            unwrap_degrees(&mut at);
+        }
+        if coordinate.text("positive").is_some_and(|positive| positive.eq_ignore_ascii_case("down")) {
             at.iter_mut().for_each(|v| *v = -*v);
         }
         let backwards = at.len() > 1 && at[at.len() - 1] < at[0];
@@ -118,18 +175,66 @@ impl Line {
             at.reverse();
         }
         if at.is_empty() || at.iter().any(|v| !v.is_finite()) || at.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Ok(None);
+            return None;
         }
         let step = (at.len() > 1).then(|| (at[at.len() - 1] - at[0]) / (at.len() - 1) as f64);
         let off = |(i, v): (usize, &f64)| (v - at[0] - step.unwrap_or_default() * i as f64).abs();
         let is_regular = at.iter().enumerate().map(off).all(|off| off <= REGULAR * step.unwrap_or(1.0));
-        let unit = unit(coordinate.text("units").unwrap_or_default());
         let name = coordinate.name().to_string();
-        Ok(Some(Self { name, first: at[0], step, backwards, is_regular, unit }))
+        Some(Self { name, first: at[0], step, backwards, is_regular, unit })
+    }
+
+    /// A note on an axis whose lengths do not compare with those of the leading one.
+    fn other_unit(&self, leading: &Self) -> String {
+        let uneven = if self.is_regular { "" } else { " and not regular" };
+        format!(
+            "{} is in {:?}{uneven}, {} in {:?}: its voxels are numbered, and drawn as far apart as those of {}; --spacing sets \
+             another distance",
+            self.name, self.unit, leading.name, leading.unit, leading.name
+        )
+    }
+}
+
+/// Adds whole turns where longitudes jump back by most of one.
+fn unwrap_degrees(at: &mut [f64]) {
+    for i in 1..at.len() {
+        if at[i] < at[i - 1] - 180.0 {
+            at[i..].iter_mut().for_each(|v| *v += 360.0);
+        }
     }
 }
 
 /// Degrees are degrees, wherever they lead.
 fn unit(text: &str) -> String {
     if text.to_lowercase().starts_with("degree") { "degrees".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Attribute, Attributes};
+    use super::*;
+
+    fn line(at: &[f64], attributes: &[(&str, &str)]) -> Option<Line> {
+        let text = |(name, text): &(&str, &str)| ((*name).to_string(), Attribute::Text((*text).into()));
+        let attributes: Attributes = attributes.iter().map(text).collect();
+        let (lengths, dims) = (vec![at.len()], vec!["a".into()]);
+        Line::of(
+            at.to_vec(),
+            &Variable { path: "a".into(), sample: Err("f64".into()), lengths, dims, chunk: None, attributes },
+        )
+    }
+
+    #[test]
+    fn coordinates_lead_from_one_end_to_the_other() {
+        let found = |at: &[f64], attributes: &[(&str, &str)]| {
+            line(at, attributes).map(|l| (l.first, l.step, l.backwards, l.is_regular))
+        };
+        let east = [("units", "degrees_east")];
+        assert_eq!(found(&[350.0, 355.0, 0.0, 5.0], &east), Some((350.0, Some(5.0), false, true)));
+        assert_eq!(found(&[90.0, 0.0, -90.0], &[("units", "degrees_north")]), Some((-90.0, Some(90.0), true, true)));
+        assert_eq!(found(&[1.0, 2.0, 9.0], &[("positive", "down")]), Some((-9.0, Some(4.0), true, false)));
+        assert_eq!(found(&[350.0, 0.0], &[]), Some((0.0, Some(350.0), true, true)));
+        assert!(found(&[1.0, 3.0, 2.0, 5.0], &[]).is_none() && found(&[1.0, f64::NAN], &[]).is_none());
+        assert_eq!((factor("km", "m"), factor("hPa", "m"), factor("", "")), (Some(1000.0), None, Some(1.0)));
+    }
 }

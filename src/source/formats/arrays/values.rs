@@ -2,6 +2,7 @@
 
 use super::Variable;
 use crate::sample::SampleType;
+use crate::source::Parsed;
 use crate::source::packing::Packing;
 
 /// The samples that numbers stand for.
@@ -15,7 +16,7 @@ pub(super) struct Values {
 }
 
 impl Values {
-    pub(super) fn of(variable: &Variable, stored: SampleType) -> Self {
+    pub(super) fn of(variable: &Variable, stored: SampleType) -> Parsed<Self> {
         let unit = variable.text("units").filter(|unit| !unit.is_empty()).map(String::from);
         let declared = [variable.numbers("_FillValue"), variable.numbers("missing_value")].concat();
         let mut missing: Vec<f64> = Vec::new();
@@ -27,18 +28,22 @@ impl Values {
         let packing = Packing {
             scale: variable.number("scale_factor").unwrap_or(1.0),
             offset: variable.number("add_offset").unwrap_or(0.0),
-            valid: valid(variable),
+            valid: valid(variable, stored),
             missing,
         };
         let is_plain =
             packing.missing.len() < 2 && packing == Packing { missing: packing.missing.clone(), ..Packing::NONE };
         if is_plain {
             let missing = packing.missing.first().copied().or((!declared.is_empty()).then_some(f64::NAN));
-            return Self { sample: stored, packing: None, missing, unit };
+            return Ok(Self { sample: stored, packing: None, missing, unit });
         }
         let some_may_be = !declared.is_empty() || packing.valid != Packing::NONE.valid;
         let missing = some_may_be.then_some(f64::NAN);
-        Self { sample: Packing::sample(stored), packing: Some(packing), missing, unit }
+        if !(packing.scale.is_finite() && packing.offset.is_finite() && packing.scale != 0.0) {
+            let what = format!("scale_factor {} and add_offset {} make no numbers", packing.scale, packing.offset);
+            return Err(format!("{}: {what}", variable.path.trim_start_matches('/')));
+        }
+        Ok(Self { sample: packing.sample(stored), packing: Some(packing), missing, unit })
     }
 }
 
@@ -47,11 +52,13 @@ fn as_stored(stored: SampleType, value: f64) -> f64 {
     if stored.is_float() { crate::sample::round_to(stored, value) } else { value }
 }
 
-/// The least and the largest stored number that is valid.
-fn valid(variable: &Variable) -> (f64, f64) {
-    let (lo, hi) = Packing::NONE.valid;
-    match *variable.numbers("valid_range") {
-        [lo, hi] => (lo, hi),
-        _ => (variable.number("valid_min").unwrap_or(lo), variable.number("valid_max").unwrap_or(hi)),
-    }
+/// The least and the largest stored number that is valid; what is no number is no limit.
+fn valid(variable: &Variable, stored: SampleType) -> (f64, f64) {
+    let (lo, hi) = match *variable.numbers("valid_range") {
+        [lo, hi] => (Some(lo), Some(hi)),
+        _ => (variable.number("valid_min"), variable.number("valid_max")),
+    };
+    let limit = |of: Option<f64>| of.filter(|v| !v.is_nan()).map(|v| as_stored(stored, v));
+    let (least, most) = Packing::NONE.valid;
+    (limit(lo).unwrap_or(least), limit(hi).unwrap_or(most))
 }

@@ -2,6 +2,7 @@
 
 use super::{ArrayFile, Attribute, Variable};
 use crate::source::Parsed;
+use crate::source::formats::association::Association;
 
 /// What such a file says of its arrays.
 pub(super) struct Image {
@@ -52,20 +53,23 @@ impl Image {
 
     /// Spacing, and the place of the first sample.
     pub(super) fn lattice(&self, variable: &Variable) -> ([f64; 3], [f64; 3]) {
-        let shift = if data(variable) == Some("CellData") { 0.5 } else { 0.0 };
-        let first = |a: usize| self.origin[a] + (self.extent[2 * a] as f64 + shift) * self.spacing[a];
-        (self.spacing, std::array::from_fn(first))
+        let first = std::array::from_fn(|a| self.origin[a] + self.extent[2 * a] as f64 * self.spacing[a]);
+        (self.spacing, association(variable).origin(self.points(), first, self.spacing))
     }
 
     /// An error if an array is not of the image's size.
     pub(super) fn check(&self, dims: [usize; 3], variable: &Variable) -> Parsed<()> {
-        let cells = i64::from(data(variable) == Some("CellData"));
-        let of = |a: usize| self.extent[2 * a + 1].saturating_sub(self.extent[2 * a]).saturating_add(1 - cells);
-        let expected: [i64; 3] = std::array::from_fn(of);
-        match dims.map(|n| n as i64) == expected {
+        let expected = association(variable).dims(self.points());
+        match dims == expected {
             true => Ok(()),
             false => Err(format!("{} has {dims:?} samples, but the extent asks for {expected:?}", variable.path)),
         }
+    }
+
+    /// Points along x, y, z; 0 where the extent makes no sense.
+    fn points(&self) -> [usize; 3] {
+        let of = |a: usize| self.extent[2 * a + 1].saturating_sub(self.extent[2 * a]).saturating_add(1);
+        std::array::from_fn(|a| usize::try_from(of(a)).unwrap_or(0))
     }
 
     /// Which of an array's frames each step has.
@@ -76,9 +80,10 @@ impl Image {
         }
         let Ok(offsets) = file.numbers(&path) else { return Ok(Vec::new()) };
         // VTK itself writes one more than there are steps.
-        let offsets: Vec<usize> = offsets.into_iter().take(self.times.len()).map(|n| n as usize).collect();
-        match offsets.len() == self.times.len() && offsets.iter().all(|n| *n < frames) {
-            true => Ok(offsets),
+        let offsets: Vec<f64> = offsets.into_iter().take(self.times.len()).collect();
+        let is_there = |n: &f64| n.fract() == 0.0 && (0.0..frames as f64).contains(n);
+        match offsets.len() == self.times.len() && offsets.iter().all(is_there) {
+            true => Ok(offsets.into_iter().map(|n| n as usize).collect()),
             false => Err(format!("{path} leads to steps that {} does not have", variable.path)),
         }
     }
@@ -88,6 +93,10 @@ impl Image {
 fn data(variable: &Variable) -> Option<&str> {
     let (data, name) = variable.path.strip_prefix(ROOT)?.strip_prefix('/')?.split_once('/')?;
     Some(data).filter(|data| matches!(*data, "PointData" | "CellData") && name != "vtkGhostType")
+}
+
+fn association(variable: &Variable) -> Association {
+    if data(variable) == Some("CellData") { Association::Cells } else { Association::Points }
 }
 
 fn with_axes(variable: &Variable, steps: bool) -> Variable {

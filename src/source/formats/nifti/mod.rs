@@ -104,7 +104,7 @@ impl Array {
         let layout = Layout(slow.into_iter().chain(voxels).collect());
         let stored = sample_type(header.datatype)?;
         let packing = packing(header)?;
-        let sample = packing.as_ref().map_or(stored, |_| Packing::sample(stored));
+        let sample = packing.as_ref().map_or(stored, |packing| packing.sample(stored));
         let shape = Shape::new(layout.dims(), sample)?;
         let known = Known {
             spacing: placed.spacing,
@@ -140,7 +140,7 @@ impl Array {
         let units = Units {
             space: space_unit(header.units).map(String::from),
             times: time_unit(header.units).filter(|_| !times.is_empty()).map(String::from),
-            samples: None,
+            ..Units::default()
         };
         Described { spacing, origin, times, variable, units, notes, ..Described::plain(self.shape, vec![part]) }
     }

@@ -111,6 +111,7 @@ impl Axes {
             samples: known(list("sampleunits").first()),
             times: self.frames.and_then(|axis| known(all.get(axis)).or(known(space.get(3)))),
             space: first.clone().filter(|_| same(1) && same(2)),
+            calendar: None,
         }
     }
 }
