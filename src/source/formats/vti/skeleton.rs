@@ -6,6 +6,7 @@ use crate::mapped::FileBytes;
 const PIECE: usize = 64 << 10; // bytes read at a time
 const KEPT: usize = 64; // bytes of a text that stay
 const MOST: usize = 64 << 20; // bytes of what is left
+const MOST_CUTS: usize = MOST >> 4; // of 16 bytes each
 const TAG: &[u8] = b"<AppendedData";
 
 /// The XML up to the end of the `<AppendedData>` tag or of the file.
@@ -15,6 +16,8 @@ pub(super) struct Skeleton {
     /// Places in the text, and bytes that are left out before each.
     cuts: Vec<(u64, u64)>,
     left_out: u64,
+    /// Whether a `-` came, of which the next byte says whether it is a sign.
+    sign: bool,
     /// Bytes since the last `>`, if no `<` came.
     outside: Option<usize>,
     /// Where the tag of the appended data starts.
@@ -32,21 +35,43 @@ impl Skeleton {
             if piece[..len].iter().any(|byte| skeleton.ends_with(*byte)) {
                 break;
             }
-            if skeleton.text.len() > MOST {
+            if skeleton.text.len() > MOST || skeleton.cuts.len() > MOST_CUTS {
                 return Err(Error::input(file.path(), format!("its XML does not end within {MOST} bytes")));
             }
             at += len as u64;
+        }
+        if std::mem::take(&mut skeleton.sign) {
+            skeleton.keep(b'-');
         }
         Ok(skeleton)
     }
 
     /// Takes the next byte, and says whether it ends the XML.
     fn ends_with(&mut self, byte: u8) -> bool {
+        let inside_text = self.outside.is_some_and(|bytes| bytes >= KEPT);
+        if std::mem::take(&mut self.sign) {
+            match byte.is_ascii_alphanumeric() || byte == b'.' {
+                true => self.left_out += 1,
+                false => self.keep(b'-'), // of a comment, say
+            }
+        }
+        if inside_text && byte == b'-' {
+            self.sign = true;
+            return false;
+        }
         let samples = byte.is_ascii_alphanumeric() || byte.is_ascii_whitespace() || b"+/=.".contains(&byte);
-        if samples && self.outside.is_some_and(|bytes| bytes >= KEPT) {
+        if inside_text && samples {
             self.left_out += 1;
             return false;
         }
+        self.keep(byte);
+        if byte == b'a' && self.text.ends_with(TAG) {
+            self.appended = Some(self.text.len());
+        }
+        byte == b'>' && self.appended.is_some()
+    }
+
+    fn keep(&mut self, byte: u8) {
         if self.cuts.last().map_or(0, |(_, left_out)| *left_out) != self.left_out {
             self.cuts.push((self.text.len() as u64, self.left_out));
         }
@@ -56,10 +81,6 @@ impl Skeleton {
             (b'>', _) => Some(0),
             (_, bytes) => bytes.map(|bytes| bytes + 1),
         };
-        if byte == b'a' && self.text.ends_with(TAG) {
-            self.appended = Some(self.text.len());
-        }
-        byte == b'>' && self.appended.is_some()
     }
 
     /// What is left of the text.
@@ -103,5 +124,25 @@ mod tests {
         }
         let after = text.find("<c>").expect("a tag") as u64 + 3;
         assert_eq!(skeleton.place(after), bytes.find("<c>").expect("a tag") as u64 + 3);
+    }
+
+    #[test]
+    fn signs_of_numbers_are_left_out() {
+        let folder = Folder::new();
+        let read = |bytes: &str| {
+            let file = FileBytes::open(&folder.write("a.vti", bytes), Access::Read).expect("a file");
+            Skeleton::read(&file)
+        };
+        let bytes = format!("<a>{}</a><!-- > {} - --><b>-", "-1.5e-07 -.5 -nan\n".repeat(10_000), "-1 ".repeat(10_000));
+        let skeleton = read(&bytes).expect("reading");
+        let text = String::from_utf8(skeleton.text().to_vec()).expect("text");
+        assert!(text.len() < 300 && text.contains("</a><!-- >") && text.ends_with("---><b>-"), "{text}");
+        assert!(skeleton.cuts.len() < 10, "{:?}", skeleton.cuts);
+        for tag in ["</a>", "<!--", "-->", "<b>-"] {
+            assert_eq!(skeleton.place(text.find(tag).expect(tag) as u64), bytes.find(tag).expect(tag) as u64, "{tag}");
+        }
+        assert_eq!(skeleton.end(), bytes.len() as u64);
+        let cuts = format!("<a>{}", "-1 -".repeat(20) + &"- ".repeat(MOST_CUTS + PIECE));
+        assert!(crate::source::testing::message(read(&cuts)).contains("does not end"));
     }
 }
