@@ -52,9 +52,7 @@ impl Found {
         if image.header.parallel {
             return refused("is a list of pieces among the pieces of another".into());
         }
-        if image.header.pieces.len() > MOST {
-            return refused(format!("has {} pieces; up to {MOST} are supported", image.header.pieces.len()));
-        }
+        check_count(image, image.header.pieces.len())?;
         let pieces = image.header.pieces.iter().filter(|piece| !piece.extent.is_empty());
         let pieces = pieces.map(|piece| locate(image, piece, wanted)).collect::<Result<Vec<_>>>()?;
         let (big_endian, time) = (image.header.big_endian, image.time()?);
@@ -62,12 +60,21 @@ impl Found {
     }
 }
 
+/// Refuses more pieces than can be compared.
+fn check_count(image: &Image, pieces: usize) -> Result<()> {
+    if pieces <= MOST {
+        return Ok(());
+    }
+    Err(Error::input(image.file.path(), format!("has {pieces} pieces or more; up to {MOST} are supported")))
+}
+
 /// The pieces of the files that a file lists.
 fn listed(image: &Image, wanted: &Wanted<'_>) -> Result<Found> {
     let folder = image.file.path().parent().unwrap_or(Path::new(""));
+    check_count(image, image.header.pieces.len())?;
     let sources = image.header.pieces.iter().filter(|piece| !piece.extent.is_empty());
     let mut all: Option<Found> = None;
-    for source in sources.filter_map(|piece| piece.source.as_deref()).take(MOST) {
+    for source in sources.filter_map(|piece| piece.source.as_deref()) {
         let path = folder.join(source);
         let found = Found::of(&Image::open(&path)?, wanted)?;
         let Some(before) = &mut all else {
@@ -78,6 +85,7 @@ fn listed(image: &Image, wanted: &Wanted<'_>) -> Result<Found> {
             return Err(Error::input(&path, "has another byte_order than the piece before it"));
         }
         before.pieces.extend(found.pieces);
+        check_count(image, before.pieces.len())?;
     }
     all.ok_or_else(|| Error::input(image.file.path(), "lists no piece that holds anything"))
 }

@@ -431,6 +431,25 @@ fn pieces_make_up_a_frame() {
 }
 
 #[test]
+fn more_pieces_than_can_be_compared_are_refused() {
+    let folder = Folder::new();
+    let image = |ty: &str, inside: &str| {
+        let image = format!("<{ty} WholeExtent=\"0 1 0 1 0 1\">{inside}</{ty}>");
+        format!("<VTKFile type=\"{ty}\" {}>{image}</VTKFile>", TAGS[0].0)
+    };
+    let piece =
+        "<Piece Extent=\"0 1 0 1 0 1\">".to_string() + &points(&array("UInt8", "format=\"ascii\"", "1")) + "</Piece>";
+    folder.write("many.vti", image("ImageData", &piece.repeat(9_000)));
+    let source = "<Piece Extent=\"0 1 0 1 0 1\" Source=\"many.vti\"/>";
+    let declared = "<PPointData><PDataArray type=\"UInt8\" Name=\"J\"/></PPointData>";
+    for (files, pieces) in [(2, 18_000), (20_000, 20_000)] {
+        let list = image("PImageData", &(declared.to_string() + &source.repeat(files)));
+        let words = format!("has {pieces} pieces or more; up to 16384");
+        refused(&[folder.write("a.pvti", list)], &OpenOptions::default(), &words);
+    }
+}
+
+#[test]
 fn the_time_of_a_file_is_that_of_its_frame() {
     let folder = Folder::new();
     let time = |t: f64, format: &str| match format {
