@@ -1,5 +1,8 @@
 //! How the axes of an array go in the world: along the world's in any order and direction, or aslant.
 
+use crate::source::Parsed;
+use crate::source::layout::{Axis, Counts};
+
 /// What is taken as straight: a part of a step so small does not show.
 const SLANT: f64 = 1e-3;
 
@@ -26,6 +29,22 @@ pub(in crate::source) struct Placed {
 }
 
 impl Directions {
+    /// Steps of these lengths along axes that go in these directions. Lengths below 0 are refused: they would turn an axis
+    /// once more, or would be meant to.
+    pub(in crate::source) fn of(directions: [[f64; 3]; 3], spacing: [f64; 3], first: [f64; 3]) -> Parsed<Self> {
+        if spacing.iter().any(|step| *step < 0.0) {
+            return Err(format!("has the spacing {spacing:?}, which is not positive"));
+        }
+        let steps = std::array::from_fn(|axis| directions[axis].map(|c: f64| c * spacing[axis]));
+        Ok(Self { steps, first })
+    }
+
+    /// World position of a place that is given in steps from the first voxel.
+    pub(in crate::source) fn place(&self, steps: [f64; 3]) -> [f64; 3] {
+        let along = |axis: usize| (0..3).map(|a| self.steps[a][axis] * steps[a]).sum::<f64>();
+        std::array::from_fn(|axis| self.first[axis] + along(axis))
+    }
+
     /// Turns an array of these lengths so that its axes ascend along x, y, z. One that is aslant stays as it is stored.
     pub(in crate::source) fn placed(&self, lengths: [usize; 3], what: &str) -> Placed {
         let norms = self.steps.map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
@@ -57,6 +76,16 @@ impl Directions {
     }
 }
 
+impl Placed {
+    /// The axes of an array of these lengths, its slowest first.
+    pub(in crate::source) fn voxels(&self, lengths: [usize; 3]) -> [Axis; 3] {
+        [2, 1, 0].map(|a| {
+            let (of, backwards) = self.axes[a];
+            Axis { backwards, ..Axis::new(Counts::Voxels(of), lengths[a]) }
+        })
+    }
+}
+
 /// Says what is turned, if anything.
 fn turned(axes: &[(usize, bool); 3]) -> Option<String> {
     let stored =
@@ -83,6 +112,13 @@ mod tests {
         assert_eq!((turned.spacing, turned.origin), ([4.0, 2.0, 0.5], [1.0, 2.0, 0.0]));
         assert_eq!(turned.axes, [(2, true), (0, false), (1, false)]);
         assert!(turned.note.expect("a note").contains("along -z +x +y of the world"));
+    }
+
+    #[test]
+    fn places_are_counted_in_steps() {
+        let turned = Directions::of([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [2.0, 3.0, 4.0], [1.0; 3]);
+        assert_eq!(turned.expect("steps").place([1.0, 0.5, 2.0]), [2.5, 9.0, -1.0]);
+        assert!(Directions::of([[1.0, 0.0, 0.0]; 3], [1.0, -1.0, 1.0], [0.0; 3]).is_err());
     }
 
     #[test]

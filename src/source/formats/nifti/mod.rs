@@ -96,12 +96,8 @@ impl Array {
         let own = Some(header.intent_name.as_str()).filter(|name| !name.is_empty());
         let (index, variable) = component::of_only(own, components, variable)?;
         let placed = header.directions().placed([x, y, z], "directions of the NIfTI");
-        let voxels = [(2, z), (1, y), (0, x)].map(|(axis, len)| {
-            let (of, backwards) = placed.axes[axis];
-            Axis { backwards, ..Axis::new(Counts::Voxels(of), len) }
-        });
         let slow = [Axis::new(Counts::Only(index), components), Axis::new(Counts::Frames, frames)];
-        let layout = Layout(slow.into_iter().chain(voxels).collect());
+        let layout = Layout(slow.into_iter().chain(placed.voxels([x, y, z])).collect());
         let stored = sample_type(header.datatype)?;
         let packing = packing(header)?;
         let sample = packing.as_ref().map_or(stored, |packing| packing.sample(stored));

@@ -9,6 +9,7 @@ mod pieced;
 mod skeleton;
 
 use super::component::{self, Chosen};
+use super::directions::{Directions, Placed};
 use crate::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::described::{Described, Stored};
@@ -19,24 +20,17 @@ use header::{Array, Header};
 use image::{Image, sample_type};
 use std::path::Path;
 
-const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-
 /// Reads the XML of one file, and of those that it lists, and checks that the array is all there.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
     let image = Image::open(path)?;
     let header = &image.header;
     let wanted = Wanted::of(header, variable).map_err(|e| Error::input(path, e))?;
     let (part, time) = pieced::part(&image, &wanted)?;
-    let mut described = Described::plain(wanted.shape, vec![part]);
-    described.spacing = header.spacing;
-    let first = std::array::from_fn(|a| header.origin[a] + header.whole.ends(a).0 as f64 * header.spacing[a]);
-    described.origin = wanted.array.of.origin(wanted.points, first, header.spacing);
-    described.times = time.into_iter().collect();
-    described.variable = Some(component::label(&wanted.array.name, wanted.array.components, wanted.chosen.component));
-    if header.direction != IDENTITY {
-        described.notes.push("the Direction of the .vti is not kept: axes are taken as those of the world".into());
-    }
-    Ok(described)
+    let array = wanted.array;
+    let variable = Some(component::label(&array.name, array.components, wanted.chosen.component));
+    let Placed { spacing, origin, note, .. } = wanted.placed;
+    let (times, notes) = (time.into_iter().collect(), note.into_iter().collect());
+    Ok(Described { spacing, origin, times, variable, notes, ..Described::plain(wanted.shape, vec![part]) })
 }
 
 /// The array that is meant.
@@ -44,8 +38,10 @@ struct Wanted<'a> {
     array: &'a Array,
     chosen: Chosen,
     whole: Extent,
-    /// Points of it along x, y, z.
-    points: [usize; 3],
+    /// Voxels along its axes, the fastest first, as they are stored.
+    lengths: [usize; 3],
+    placed: Placed,
+    /// As they are when turned.
     shape: Shape,
     /// Bytes of all components of a sample.
     voxel: usize,
@@ -64,16 +60,27 @@ impl<'a> Wanted<'a> {
             let types = "UInt8 to Int32, Float32 and Float64 are";
             return Err(format!("array {}: type {} is not supported; {types}", array.name, array.ty));
         };
-        let shape = Shape::new(array.of.dims(points), sample)?;
+        let lengths = array.of.dims(points);
+        let placed = directions(header, array, points)?.placed(lengths, "directions of the .vti");
+        let shape = Shape::new(Layout(placed.voxels(lengths).to_vec()).dims(), sample)?;
         let voxel = array.components.checked_mul(sample.size()).ok_or("its samples have too many components")?;
-        Ok(Self { array, chosen, whole: header.whole, points, shape, voxel })
+        Ok(Self { array, chosen, whole: header.whole, lengths, placed, shape, voxel })
     }
 
     fn stored(&self, big_endian: bool) -> Parsed<Stored> {
-        let mut layout = Layout::plain(self.shape.dims(), 1);
-        layout.0.push(Axis::new(Counts::Only(self.chosen.component), self.array.components));
+        let components = Axis::new(Counts::Only(self.chosen.component), self.array.components);
+        let layout = Layout(self.placed.voxels(self.lengths).into_iter().chain([components]).collect());
         Stored::new(&layout, self.shape.sample(), big_endian)
     }
+}
+
+/// Where the samples of an array are in the world: those of cells between points.
+fn directions(header: &Header, array: &Array, points: [usize; 3]) -> Parsed<Directions> {
+    let matrix = &header.direction;
+    let columns = std::array::from_fn(|axis| [0, 1, 2].map(|row| matrix[3 * row + axis]));
+    let lattice = Directions::of(columns, header.spacing, header.origin)?;
+    let start = [0, 1, 2].map(|axis| header.whole.ends(axis).0 as f64);
+    Ok(Directions { first: lattice.place(array.of.origin(points, start, [1.0; 3])), ..lattice })
 }
 
 #[cfg(test)]

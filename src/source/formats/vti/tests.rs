@@ -225,19 +225,56 @@ fn no_damage_panics() {
     survives_damage("a.vti", &Vti { tag: TAGS[3].0.into(), arrays, appended: Vec::new() }.bytes());
 }
 
+/// As [`Vti::bytes`], with a `Direction`.
+fn directed(vti: &Vti, direction: &str) -> Vec<u8> {
+    let (bytes, mark) = (vti.bytes(), b" Spacing=");
+    let at = bytes.windows(mark.len()).position(|w| w == mark).expect("a spacing");
+    [&bytes[..at], format!(" Direction=\"{direction}\"").as_bytes(), &bytes[at..]].concat()
+}
+
 #[test]
-fn a_direction_is_noted_and_frames_must_agree() {
+fn straight_directions_are_turned() {
+    let folder = Folder::new();
+    let ty = SampleType::U16;
+    let all: Vec<u8> = payload(ty, 0..1, false);
+    let flipped = |[x, y, z]: [usize; 3]| all[2 * (((2 - z) * 5 + y) * 7 + (6 - x))..][..2].to_vec();
+    let voxels = crate::volume::Region { start: [0; 3], end: [7, 5, 3] };
+    let samples: Vec<u8> = voxels.iter().flat_map(flipped).collect();
+    let [before, blocks] = zlib(&samples, TAGS[0].1, 64);
+    let packed = appended(&compressed(TAGS[0].0), "UInt16", "raw", &[before, blocks].concat());
+    for vti in [raw(TAGS[0], "UInt16", &samples), packed] {
+        let file = [folder.write("a.vti", directed(&vti, "-1 0 0 0 1 0 0 0 -1"))];
+        check_inputs(&file, &OpenOptions::default(), ty, 1);
+        let source = open(&file, &OpenOptions::default()).expect("opening");
+        let grid = source.archive().grid;
+        assert_eq!((grid.spacing, grid.origin), ([0.5, 1.0, 2.0], [-3.0, 2.0, -1.0]));
+        assert!(source.archive().notes[0].contains("along -x +y -z of the world"));
+    }
+    // Axes of 5, 3, 7 voxels that go along y, z, x.
+    let order = |[y, z, x]: [usize; 3]| all[2 * ((z * 5 + y) * 7 + x)..][..2].to_vec();
+    let voxels = crate::volume::Region { start: [0; 3], end: [5, 3, 7] };
+    let samples: Vec<u8> = voxels.iter().flat_map(order).collect();
+    let bytes = directed(&raw(TAGS[0], "UInt16", &samples), "0 0 1 1 0 0 0 1 0");
+    let at = bytes.windows(4).position(|w| w == b"\n  _").expect("appended");
+    let text = String::from_utf8(bytes[..at].to_vec()).expect("text").replace("2 8 0 4 0 2", "0 4 0 2 2 8");
+    let file = [folder.write("a.vti", [text.as_bytes(), &bytes[at..]].concat())];
+    check_inputs(&file, &OpenOptions::default(), ty, 1);
+    let grid = open(&file, &OpenOptions::default()).expect("opening").archive().grid;
+    assert_eq!((grid.spacing, grid.origin), ([2.0, 0.5, 1.0], [5.0, 2.0, 3.0]));
+}
+
+#[test]
+fn an_oblique_direction_is_noted_and_frames_must_agree() {
     let folder = Folder::new();
     let vti = raw(TAGS[0], "UInt8", &payload(SampleType::U8, 0..1, false));
     let a = folder.write("a1.vti", vti.bytes());
-    let tilted =
-        String::from_utf8_lossy(&vti.bytes()[..200]).replace("Spacing", "Direction=\"0 1 0 1 0 0 0 0 1\" Spacing");
-    let b = folder.write("b.vti", [tilted.as_bytes(), &vti.bytes()[200..]].concat());
-    let source = open(std::slice::from_ref(&b), &OpenOptions::default()).expect("opening");
-    assert!(source.archive().notes[0].contains("Direction"));
+    let b = folder.write("b.vti", directed(&vti, "0.6 -0.8 0 0.8 0.6 0 0 0 1"));
+    let source = open(&[b], &OpenOptions::default()).expect("opening");
+    assert!(source.archive().notes[0].contains("directions of the .vti are not kept"));
+    assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 2.0]);
     let renamed = Vti { arrays: vti.arrays.replace("\"J\"", "\"K\""), ..vti };
     let c = folder.write("c.vti", renamed.bytes());
-    refused(&[a, b, c], &OpenOptions::default(), "c.vti: has the array K, but the first frame");
+    refused(&[a, c], &OpenOptions::default(), "c.vti: has the array K, but the first frame");
 }
 
 /// An array as VTK compresses it, in blocks of so many bytes: what stands before them, and all of them.
