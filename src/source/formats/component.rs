@@ -45,7 +45,7 @@ pub(in crate::source) fn of_only(
         return Err(format!("has no array {asked}; its only one is called {name}"));
     }
     let index = chosen(name, components, index)?;
-    let called = if components > 1 { Some(format!("{name}[{index}]")) } else { own.map(String::from) };
+    let called = if components > 1 { Some(label(name, components, index)) } else { own.map(String::from) };
     Ok((index, called))
 }
 

@@ -51,7 +51,7 @@ impl Data<'_> {
     /// Frames that are all in one file.
     fn part(&self, file: &FileBytes, header: u64, frames: usize) -> Result<Part> {
         let refused = |e| Error::input(file.path(), e);
-        let start = self.start(file, header, self.samples.shape.dims()[2], frames)?;
+        let start = self.start(file, header, self.samples.lengths[2], frames)?;
         let one = self.samples.stored(1).map_err(refused)?;
         let (stored, at) = if self.samples.compressed {
             let place = Place {
@@ -93,7 +93,7 @@ impl Data<'_> {
 
     /// Frames of which each slice along z is a file.
     fn slices(&self, paths: &mut dyn Iterator<Item = PathBuf>) -> Result<Part> {
-        let [x, y, z] = self.samples.shape.dims();
+        let [x, y, z] = self.samples.lengths;
         let stored = self.samples.stored(1).map_err(|e| Error::input(self.file.path(), e))?;
         let mut frames: Vec<Vec<Piece>> = Vec::new();
         for (i, path) in paths.enumerate() {
@@ -140,7 +140,7 @@ impl<'a> Names<'a> {
         let mut numbers: Vec<i64> = words[1..].iter().rev().take(3).map_while(|word| word.parse().ok()).collect();
         numbers.reverse();
         let name = words[..words.len() - numbers.len()].join(" ");
-        let along = if samples.axes == 4 { samples.frames } else { samples.shape.dims()[2] } as i64;
+        let along = if samples.axes == 4 { samples.frames } else { samples.lengths[2] } as i64;
         let (first, last, step) = match numbers[..] {
             [] => (1, along, 1),
             [first] => (first, first.saturating_add(along - 1), 1),
@@ -155,7 +155,7 @@ impl<'a> Names<'a> {
 
     /// Axes of each file, where there are as many files as it takes.
     fn checked_axes(&self, samples: &Samples) -> Parsed<usize> {
-        let (axes, frames, planes) = (self.axes, samples.frames, samples.shape.dims()[2]);
+        let (axes, frames, planes) = (self.axes, samples.frames, samples.lengths[2]);
         let expected = match axes {
             _ if axes == samples.axes => Some(1),
             3 => Some(frames),

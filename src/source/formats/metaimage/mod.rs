@@ -4,6 +4,7 @@ mod data;
 mod header;
 
 use super::component;
+use super::directions::{Directions, Placed};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
@@ -25,21 +26,26 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let header = growing_head(&file, Header::parse)?;
     let samples = samples(&header, variable).map_err(refused)?;
     let parts = data::parts(&file, &header, &samples)?;
-    let mut described = Described::plain(samples.shape, parts);
-    (described.spacing, described.origin, described.times) = grid(&header, &samples).map_err(refused)?;
-    let (components, component) = samples.components;
-    described.variable = (components > 1).then(|| component::label("", components, component));
-    described.notes = notes(&header, samples.axes).map_err(refused)?;
-    Ok(described)
+    let times = times(&header, &samples).map_err(refused)?;
+    let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
+    let Samples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
+    let notes = note.into_iter().chain(unheeded).collect();
+    Ok(Described { spacing, origin, times, variable, notes, ..Described::plain(shape, parts) })
 }
 
 /// What the samples are, wherever they are.
 struct Samples {
     axes: usize,
+    /// Voxels along its axes of space, the fastest first, as they are stored.
+    lengths: [usize; 3],
+    placed: Placed,
+    /// As they are when turned.
     shape: Shape,
     frames: usize,
-    /// Components of a voxel, and which of them is meant.
-    components: (usize, usize),
+    components: usize,
+    /// Which of them is meant.
+    component: usize,
+    variable: Option<String>,
     big_endian: bool,
     compressed: bool,
 }
@@ -47,18 +53,17 @@ struct Samples {
 impl Samples {
     /// How some frames are stored.
     fn stored(&self, frames: usize) -> Parsed<Stored> {
-        let mut layout = Layout::plain(self.shape.dims(), frames);
-        layout.0.push(Axis::new(Counts::Only(self.components.1), self.components.0));
-        Stored::new(&layout, self.shape.sample(), self.big_endian)
+        let components = Axis::new(Counts::Only(self.component), self.components);
+        let voxels = self.placed.voxels(self.lengths);
+        let axes = [Axis::new(Counts::Frames, frames)].into_iter().chain(voxels).chain([components]);
+        Stored::new(&Layout(axes.collect()), self.shape.sample(), self.big_endian)
     }
 
     /// Some planes as if components were voxels beside one another.
     fn flat(&self, planes: usize) -> Parsed<Shape> {
-        let [x, y, _] = self.shape.dims();
-        Shape::new(
-            [x.checked_mul(self.components.0).ok_or("a row of its size is too large")?, y, planes],
-            self.shape.sample(),
-        )
+        let [x, y, _] = self.lengths;
+        let row = x.checked_mul(self.components).ok_or("a row of its size is too large")?;
+        Shape::new([row, y, planes], self.shape.sample())
     }
 }
 
@@ -71,35 +76,22 @@ fn samples(header: &Header, variable: Option<&str>) -> Parsed<Samples> {
         return Err(format!("has {axes} dimension(s); supported are 3 (x y z) and 4 (x y z t)"));
     }
     let sizes: Vec<usize> = numbers(header.required("DimSize")?, "DimSize", axes)?;
-    let frames = sizes.get(3).copied().unwrap_or(1);
+    let (lengths, frames) = ([sizes[0], sizes[1], sizes[2]], sizes.get(3).copied().unwrap_or(1));
     if frames == 0 {
         return Err("has 0 frames".into());
     }
-    let shape = Shape::new([sizes[0], sizes[1], sizes[2]], sample_type(header.required("ElementType")?)?)?;
+    let placed = directions(header, axes)?.placed(lengths, "directions of the MetaImage");
+    let dims = Layout(placed.voxels(lengths).to_vec()).dims();
+    let shape = Shape::new(dims, sample_type(header.required("ElementType")?)?)?;
+    let components = header.get("elementnumberofchannels").unwrap_or("1");
+    let components = components.parse().map_err(|_| format!("ElementNumberOfChannels {components:?} is no number"))?;
+    let (component, variable) = component::of_only(None, components, variable)?;
     let big_endian = header.flag(&["binarydatabyteordermsb", "elementbyteordermsb"])?.unwrap_or(false);
     let compressed = header.flag(&["compresseddata"])?.unwrap_or(false);
-    let samples = Samples { axes, shape, frames, components: components(header, variable)?, big_endian, compressed };
+    let samples =
+        Samples { axes, lengths, placed, shape, frames, components, component, variable, big_endian, compressed };
     samples.stored(frames)?; // so that all sizes that follow are small enough
     Ok(samples)
-}
-
-/// Components of a voxel, and which of them is meant.
-fn components(header: &Header, variable: Option<&str>) -> Parsed<(usize, usize)> {
-    let count = header.get("elementnumberofchannels").unwrap_or("1");
-    let count: usize = count.parse().map_err(|_| format!("ElementNumberOfChannels {count:?} is no number"))?;
-    if count == 0 {
-        return Err("has 0 channels".into());
-    }
-    let index = match variable.map(component::named) {
-        Some((name, _)) if !name.is_empty() => {
-            return Err(format!(
-                "has no array {name}: its samples have no name; --variable '[0]' is their first component"
-            ));
-        }
-        Some((_, index)) => index,
-        None => None,
-    };
-    Ok((count, component::chosen("", count, index).map_err(|e| e.trim_start().to_string())?))
 }
 
 fn sample_type(name: &str) -> Parsed<SampleType> {
@@ -119,29 +111,44 @@ fn sample_type(name: &str) -> Parsed<SampleType> {
     })
 }
 
-/// Spacing and origin of x, y, z, and times where a fourth axis has a spacing.
-fn grid(header: &Header, &Samples { axes, frames, .. }: &Samples) -> Parsed<([f64; 3], [f64; 3], Vec<f64>)> {
-    let field = |names: &[&str], default: f64| match header.any(names) {
-        Some(text) => numbers(text, names[0], axes),
-        None => Ok(vec![default; axes]),
-    };
-    let (spacing, origin) = (field(&SPACING, 1.0)?, field(&ORIGIN, 0.0)?);
-    let times = match (spacing.get(3), header.any(&SPACING)) {
-        (Some(step), Some(_)) if step.is_finite() => (0..frames).map(|t| origin[3] + step * t as f64).collect(),
-        _ => Vec::new(),
-    };
-    let of_space = |all: &[f64]| std::array::from_fn(|axis| all[axis]);
-    Ok((of_space(&spacing), of_space(&origin), times))
+/// Where voxels are in the world.
+fn directions(header: &Header, axes: usize) -> Parsed<Directions> {
+    let matrix = matrix(header, axes)?;
+    let rows = std::array::from_fn(|row| std::array::from_fn(|axis| matrix[row][axis]));
+    let of_space = |all: Vec<f64>| std::array::from_fn(|axis| all[axis]);
+    let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
+    Directions::of(rows, of_space(spacing), of_space(origin))
 }
 
-fn notes(header: &Header, axes: usize) -> Parsed<Vec<String>> {
+/// The direction of each axis.
+fn matrix(header: &Header, axes: usize) -> Parsed<Vec<Vec<f64>>> {
+    let unit = |axis| (0..axes).map(|a| if a == axis { 1.0 } else { 0.0 }).collect();
+    let Some(text) = header.any(&TRANSFORM) else { return Ok((0..axes).map(unit).collect()) };
+    Ok(numbers(text, "TransformMatrix", axes * axes)?.chunks(axes).map(<[f64]>::to_vec).collect())
+}
+
+/// Times where a fourth axis has a spacing.
+fn times(header: &Header, &Samples { axes, frames, .. }: &Samples) -> Parsed<Vec<f64>> {
+    let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
+    Ok(match (spacing.get(3), header.any(&SPACING)) {
+        (Some(step), Some(_)) if step.is_finite() => (0..frames).map(|t| origin[3] + step * t as f64).collect(),
+        _ => Vec::new(),
+    })
+}
+
+/// A number for each axis, by the first of some fields that is there.
+fn per_axis(header: &Header, names: &[&str], default: f64, axes: usize) -> Parsed<Vec<f64>> {
+    header.any(names).map_or_else(|| Ok(vec![default; axes]), |text| numbers(text, names[0], axes))
+}
+
+/// What the header says and nothing is done about.
+fn unheeded(header: &Header, axes: usize) -> Parsed<Vec<String>> {
     let mut notes = Vec::new();
-    if let Some(text) = header.any(&TRANSFORM) {
-        let matrix: Vec<f64> = numbers(text, "TransformMatrix", axes * axes)?;
-        let identity = |(i, value): (usize, &f64)| *value == if i % (axes + 1) == 0 { 1.0 } else { 0.0 };
-        if !matrix.iter().enumerate().all(identity) {
-            notes.push("the TransformMatrix of the MetaImage is not kept: axes are taken as those of the world".into());
-        }
+    let matrix = matrix(header, axes)?;
+    let of_time = |a: usize| [matrix[3][a], matrix[a][3]];
+    if axes == 4 && (0..4).any(|a| of_time(a) != [if a == 3 { 1.0 } else { 0.0 }; 2]) {
+        notes
+            .push("the TransformMatrix of the MetaImage mixes time with space: its part of space is kept alone".into());
     }
     let scaled = |(name, value): (&str, f64)| header.get(name).is_some_and(|text| text.parse() != Ok(value));
     if [("elementtointensityfunctionslope", 1.0), ("elementtointensityfunctionoffset", 0.0)].into_iter().any(scaled) {

@@ -109,9 +109,10 @@ fn one_component_of_several_is_read() {
         let file = [folder.write("a.mha", local(&fields, &bytes))];
         check_inputs(&file, &named("[0]"), ty, 4);
         let mut source = open(&file, &named("[y]")).expect("opening");
-        assert_eq!(source.archive().variable.as_deref(), Some("[1]"));
+        assert_eq!(source.archive().variable.as_deref(), Some("samples[1]"));
+        check_inputs(&file, &named("samples[x]"), ty, 4);
         crate::source::testing::check_window(&*source.window(0, 4).expect("window"), ty, 1);
-        refused(&file, &options(), "a.mha: has 2 components: --variable '[0]' takes the first, up to [1]");
+        refused(&file, &options(), "samples has 2 components: --variable 'samples[0]' takes the first, up to [1]");
         refused(&file, &named("[2]"), "none with number 2");
         refused(&file, &named("b"), "has no array b");
     }
@@ -131,8 +132,53 @@ fn the_grid_and_times_are_read() {
     let a = archive("ElementSize = 3 3 3 1\nPosition = 1 1 1 0\nTransformMatrix = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
     assert_eq!((a.grid.spacing, a.grid.origin), ([3.0; 3], [1.0; 3]));
     assert!(a.notes.is_empty());
-    let a = archive("Orientation = 0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1\nElementToIntensityFunctionSlope = 2\n");
+    let a = archive("Orientation = 0.6 0.8 0 0 -0.8 0.6 0 0 0 0 1 0 0 0 0 1\nElementToIntensityFunctionSlope = 2\n");
     assert!(a.times.is_empty() && a.notes[0].contains("not kept") && a.notes[1].contains("not applied"));
+}
+
+#[test]
+fn straight_directions_are_turned() {
+    let folder = Folder::new();
+    let ty = SampleType::I16;
+    let all = payload(ty, 0..4, false);
+    let frames = all.chunks(2 * 7 * 5 * 3);
+    let turned = |frame: &[u8]| -> Vec<u8> {
+        let stored = (0..3).flat_map(|z| (0..5).flat_map(move |y| (0..7).map(move |x| (6 - x, 4 - y, z))));
+        stored.flat_map(|(x, y, z)| frame[2 * ((z * 5 + y) * 7 + x)..][..2].to_vec()).collect()
+    };
+    let turned: Vec<u8> = frames.flat_map(turned).collect();
+    let matrix = "TransformMatrix = -1 0 0 0 0 -1 0 0 0 0 1 0 0 0 0 1\n";
+    let fields = format!("ElementType = MET_SHORT\nElementSpacing = 0.5 2 1 1\nOffset = 1 2 3 0\n{matrix}");
+    for (i, slice) in turned.chunks(2 * 7 * 5).enumerate() {
+        folder.write(&format!("s{i:03}.raw"), slice);
+    }
+    let packed = local(&format!("CompressedData = True\n{fields}"), &zlib(&turned));
+    let slices = header(4, &fields, "LIST 2D") + &(0..12).map(|i| format!("s{i:03}.raw\n")).collect::<String>();
+    for bytes in [local(&fields, &turned), packed, slices.into_bytes()] {
+        let file = [folder.write("a.mhd", bytes)];
+        check_inputs(&file, &options(), ty, 4);
+        let source = open(&file, &options()).expect("opening");
+        let grid = source.archive().grid;
+        assert_eq!((grid.spacing, grid.origin), ([0.5, 2.0, 1.0], [-2.0, -6.0, 3.0]));
+        assert!(source.archive().notes[0].contains("along -x -y +z of the world"));
+    }
+    let mixed = fields.replace("-1 0 0 0 0 -1", "-1 0 0 1 0 -1");
+    let source = open(&[folder.write("a.mha", local(&mixed, &turned))], &options()).expect("opening");
+    assert!(source.archive().notes[1].contains("mixes time with space"));
+}
+
+#[test]
+fn an_axis_of_the_array_is_a_row_of_the_matrix() {
+    let folder = Folder::new();
+    let all = payload(SampleType::U8, 0..1, false);
+    // Axes of 5, 3, 7 voxels that go along y, z, x.
+    let stored = (0..7).flat_map(|x| (0..3).flat_map(move |z| (0..5).map(move |y| (z * 5 + y) * 7 + x)));
+    let samples: Vec<u8> = stored.map(|at| all[at]).collect();
+    let fields = "ElementType = MET_UCHAR\nElementSpacing = 1 2 3\nTransformMatrix = 0 1 0 0 0 1 1 0 0\n";
+    let text = header(3, fields, "LOCAL").replace("7 5 3", "5 3 7");
+    let file = [folder.write("a.mha", [text.as_bytes(), &samples].concat())];
+    check_inputs(&file, &options(), SampleType::U8, 1);
+    assert_eq!(open(&file, &options()).expect("opening").archive().grid.spacing, [3.0, 1.0, 2.0]);
 }
 
 #[test]
@@ -157,7 +203,7 @@ fn what_is_not_supported_is_named() {
     with("NDims", "CompressedData = True\nHeaderSize = -1\nNDims", "HeaderSize -1 says nothing");
     with("NDims", "HeaderSize = 9\nNDims", "ends inside its header");
     with("NDims", "HeaderSize = -2\nNDims", "HeaderSize -2");
-    with("NDims", "ElementNumberOfChannels = 0\nNDims", "0 channels");
+    with("NDims", "ElementNumberOfChannels = 0\nNDims", "samples has no component");
     with("NDims", "nonsense\nNDims", "without a =");
     with("NDims", "ElementSpacing = 1 1 -1 1\nNDims", "not positive");
     with("LOCAL", "gone.raw", "gone.raw: opening");
