@@ -138,7 +138,7 @@ impl Decode for Deflated {
         let Place { frame_bytes, frames: all, .. } = self.place;
         let bytes = frames.len() * frame_bytes;
         let at = |got: usize| frames.start + got / frame_bytes;
-        let got = hold(&mut reader, path, (0, bytes), out, |got, e| damaged(path, at(got), e))?;
+        let got = hold(&mut reader, path, (0, bytes), out, |got, e| damaged(path, at(got), &e))?;
         if got < bytes {
             return Err(Error::input(path, format!("what it holds ends inside frame {} of {all}", at(got))));
         }
@@ -173,12 +173,12 @@ pub(super) fn hold(
     path: &Path,
     (at, bytes): (u64, usize),
     out: &mut Held,
-    failed: impl Fn(usize, &io::Error) -> Error,
+    failed: impl Fn(usize, io::Error) -> Error,
 ) -> Result<usize> {
     let (mut got, mut chunk) = (0, vec![0; CHUNK.min(bytes)]);
     while got < bytes {
         let wanted = chunk.len().min(bytes - got);
-        let n = read_some(reader, &mut chunk[..wanted]).map_err(|e| failed(got, &e))?;
+        let n = read_some(reader, &mut chunk[..wanted]).map_err(|e| failed(got, e))?;
         if n == 0 {
             break;
         }

@@ -10,8 +10,14 @@ pub(in crate::source) fn count(first: i64, last: i64, step: i64) -> Parsed<usize
     usize::try_from(steps).ok().and_then(|n| n.checked_add(1)).ok_or_else(wrong)
 }
 
-/// A name from a pattern with one `%d`, perhaps with a width such as `%03d`.
-pub(in crate::source) fn numbered(pattern: &str, number: i64) -> Parsed<String> {
+/// Names from a pattern with one `%d`, perhaps with a width such as `%03d`: of `count` numbers from the first on. There are as
+/// many as [`count`] says.
+pub(in crate::source) fn names(
+    pattern: &str,
+    first: i64,
+    count: usize,
+    step: i64,
+) -> Parsed<impl Iterator<Item = String> + use<>> {
     let wrong = || format!("data file pattern {pattern:?} needs one number such as %d or %03d");
     let (before, rest) = pattern.split_once('%').ok_or_else(wrong)?;
     let end = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
@@ -21,6 +27,10 @@ pub(in crate::source) fn numbered(pattern: &str, number: i64) -> Parsed<String> 
     if width > 64 {
         return Err(wrong());
     }
-    let number = if digits.starts_with('0') { format!("{number:0width$}") } else { format!("{number:width$}") };
-    Ok(format!("{before}{number}{after}"))
+    let (before, after, zeros) = (before.to_string(), after.to_string(), digits.starts_with('0'));
+    let name = move |number: i64| match zeros {
+        true => format!("{before}{number:0width$}{after}"),
+        false => format!("{before}{number:width$}{after}"),
+    };
+    Ok((0..count as i64).map(move |i| name(first + i * step)))
 }

@@ -1,16 +1,14 @@
 //! Frames that are put together from pieces: boxes of voxels, each of which is decoded from its first byte to its last.
 
-use super::deflated::{Compression, FileReader, expect_end};
+use super::deflated::{Compression, FileReader, expect_end, hold};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes, State};
 use crate::source::described::Decode;
-use crate::source::held::{Held, read_some};
+use crate::source::held::Held;
 use std::fmt::Debug;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-const CHUNK: usize = 1 << 20; // bytes taken at a time
 
 /// The samples of a piece in their file.
 pub(in crate::source) trait Packed: Debug + Send {
@@ -18,10 +16,13 @@ pub(in crate::source) trait Packed: Debug + Send {
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>>;
 }
 
-/// Samples from a byte of a file, as they are or compressed.
+/// Samples in a file, as they are or compressed.
 #[derive(Debug)]
 pub(in crate::source) struct Stream {
+    /// Where they start in the file, or the stream does that they are in.
     pub(in crate::source) start: u64,
+    /// Bytes of what a compressed stream holds that come before them.
+    pub(in crate::source) skip: u64,
     pub(in crate::source) bytes: usize,
     pub(in crate::source) compression: Option<Compression>,
 }
@@ -29,10 +30,10 @@ pub(in crate::source) struct Stream {
 impl Packed for Stream {
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>> {
         let reader = FileReader::new(file, self.start);
-        Ok(match self.compression {
-            Some(compression) => compression.reader(reader),
-            None => Box::new(reader.take(self.bytes as u64)),
-        })
+        let Some(compression) = self.compression else { return Ok(Box::new(reader.take(self.bytes as u64))) };
+        let mut reader = compression.reader(reader);
+        io::copy(&mut reader.by_ref().take(self.skip), &mut io::sink())?; // where it ends before, no samples come
+        Ok(reader)
     }
 }
 
@@ -58,13 +59,19 @@ pub(in crate::source) struct Pieces {
     pub(in crate::source) dims: [usize; 3],
     /// Bytes of a voxel, all components together.
     pub(in crate::source) voxel: usize,
+    /// Frames that lie together, and are one here.
+    pub(in crate::source) together: usize,
     /// The pieces of each frame, all within its dimensions.
     pub(in crate::source) frames: Vec<Vec<Piece>>,
 }
 
 impl Decode for Pieces {
+    fn together(&self) -> usize {
+        self.together
+    }
+
     fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
-        self.frames[frames.start].iter().try_for_each(|piece| self.copy(piece, out))
+        self.frames[frames.start / self.together].iter().try_for_each(|piece| self.copy(piece, out))
     }
 }
 
@@ -75,9 +82,10 @@ impl Pieces {
         piece.state.check(path, &file.state())?;
         let mut reader = piece.samples.open(file).map_err(|e| damaged(path, e))?;
         let (run, starts) = self.runs(piece);
-        let mut chunk = vec![0; CHUNK.min(run)];
         for start in starts {
-            copy_run(&mut *reader, path, &mut chunk, start..start + run, out)?;
+            if hold(&mut *reader, path, (start as u64, run), out, |_, e| damaged(path, e))? < run {
+                return Err(Error::input(path, "its samples end early"));
+            }
         }
         expect_end(&mut *reader, path, 0)
     }
@@ -94,21 +102,6 @@ impl Pieces {
         let start = move |(k, j): (usize, usize)| (((plane + k) * y + row + j) * x + first) * voxel;
         (run * voxel, (0..planes).flat_map(move |k| (0..rows).map(move |j| (k, j))).map(start))
     }
-}
-
-fn copy_run(reader: &mut dyn Read, path: &Path, chunk: &mut [u8], run: Range<usize>, out: &mut Held) -> Result<()> {
-    let mut at = run.start;
-    while at < run.end {
-        let wanted = chunk.len().min(run.end - at);
-        match read_some(reader, &mut chunk[..wanted]).map_err(|e| damaged(path, e))? {
-            0 => return Err(Error::input(path, "its samples end early")),
-            n => {
-                out.write_at(at as u64, &chunk[..n]).map_err(|e| Error::io(path, "holding its samples", e))?;
-                at += n;
-            }
-        }
-    }
-    Ok(())
 }
 
 fn damaged(path: &Path, error: io::Error) -> Error {

@@ -100,7 +100,7 @@ impl Data<'_> {
             let slice = FileBytes::open(&path, Access::Read)?;
             let start = self.start(&slice, 0, 1, 1)?;
             let compression = if self.samples.compressed { Some(Compression::at(&slice, start)?) } else { None };
-            let samples = Box::new(Stream { start, bytes: stored.bytes / z, compression });
+            let samples = Box::new(Stream { start, skip: 0, bytes: stored.bytes / z, compression });
             if i % z == 0 {
                 frames.push(Vec::new());
             }
@@ -108,7 +108,7 @@ impl Data<'_> {
             frames[i / z].push(piece);
         }
         let (count, voxel) = (frames.len(), stored.bytes / (x * y * z));
-        let at = At::Decoded(Box::new(Pieces { dims: [x, y, z], voxel, frames }));
+        let at = At::Decoded(Box::new(Pieces { dims: [x, y, z], voxel, together: 1, frames }));
         Ok(Part { path: self.file.path().into(), state: self.file.state(), frames: count, stored, at })
     }
 }
@@ -148,8 +148,7 @@ impl<'a> Names<'a> {
             [first, last, step, ..] => (first, last, step),
         };
         let count = pattern::count(first, last, step)?;
-        pattern::numbered(&name, first)?; // so that a wrong pattern is an error
-        let names = (0..count as i64).filter_map(move |i| pattern::numbered(&name, first + i * step).ok());
+        let names = pattern::names(&name, first, count, step)?;
         Ok(Self { names: Box::new(names), count, axes: samples.axes - 1 })
     }
 

@@ -2,13 +2,13 @@
 
 use super::Array;
 use super::files::Files;
-use super::gathered::{Gathered, Piece};
 use super::header::Header;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::Parsed;
 use crate::source::described::{At, Part, Stored, check_size};
 use crate::source::formats::deflated::{Compression, Stream, check_room};
+use crate::source::formats::pieces::{self, Piece, Pieces};
 use crate::source::layout::{Counts, Layout};
 use std::path::Path;
 
@@ -45,7 +45,7 @@ pub(super) fn parts(file: &FileBytes, header: &Header, array: &Array) -> Result<
     }
     let bytes = array.layout.bytes(array.shape.sample().size()).map_err(refused)? / count;
     let pieces = names.map(|name| array.piece(&open(&name)?, &skip, bytes)).collect::<Result<_>>()?;
-    Ok(vec![array.gathered(file, pieces, bytes).map_err(refused)?])
+    Ok(vec![array.of_pieces(file, pieces, bytes).map_err(refused)?])
 }
 
 impl Array {
@@ -87,32 +87,37 @@ impl Array {
         Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: At::Byte(start) })
     }
 
-    /// A file of less than a frame, or of some samples of every frame.
+    /// A file of less than a frame, or of some samples of every frame; where its samples come, [`Self::of_pieces`] says.
     fn piece(&self, data: &FileBytes, skip: &Skip, bytes: usize) -> Result<Piece> {
-        let (path, state, gzip) = (data.path().into(), data.state(), self.gzip);
-        if gzip {
+        let refused = |what| Err(Error::input(data.path(), what));
+        let stream = if self.gzip {
             let (start, skip) = skip.compressed(data, 0)?;
-            let room = check_room(data.len(), skip.saturating_add(bytes as u64));
-            room.map_err(|e| Error::input(data.path(), e))?;
-            return Ok(Piece { path, state, start, skip, gzip });
-        }
-        let start = skip.start(data, 0, bytes)?;
-        if data.len().checked_sub(start) != Some(bytes as u64) {
-            let what =
-                format!("expected {bytes} bytes of samples after {start}, found {}", data.len().saturating_sub(start));
-            return Err(Error::input(path, what));
-        }
-        Ok(Piece { path, state, start, skip: 0, gzip })
+            check_room(data.len(), skip.saturating_add(bytes as u64)).or_else(refused)?;
+            pieces::Stream { start, skip, bytes, compression: Some(Compression::Gzip) }
+        } else {
+            let start = skip.start(data, 0, bytes)?;
+            let found = data.len().saturating_sub(start);
+            if found != bytes as u64 {
+                return refused(format!("expected {bytes} bytes of samples after {start}, found {found}"));
+            }
+            pieces::Stream { start, skip: 0, bytes, compression: None }
+        };
+        let (path, state, samples) = (data.path().into(), data.state(), Box::new(stream));
+        Ok(Piece { path, state, start: [0; 3], dims: [bytes, 1, 1], samples })
     }
 
-    /// Frames that are in several files: one after another, or all together.
-    fn gathered(&self, file: &FileBytes, pieces: Vec<Piece>, bytes: usize) -> Parsed<Part> {
+    /// Frames that are in several files: one after another, or all together. Bytes count as voxels, which lie in a row.
+    fn of_pieces(&self, file: &FileBytes, pieces: Vec<Piece>, bytes: usize) -> Parsed<Part> {
         let frames = self.axes.len(self.axes.frames);
         let in_turn = frames == 1 || self.axes.frames == Some(self.axes.sizes.len() - 1);
         let together = if in_turn { 1 } else { frames };
         let layout = self.layout.clone().with_frames(together);
         let stored = Stored::new(&layout, self.shape.sample(), self.big_endian)?;
-        let at = At::Decoded(Box::new(Gathered { pieces, bytes, together, frames }));
+        let (each, mut pieces) = (pieces.len() / (frames / together), pieces.into_iter());
+        let placed = |(i, piece)| Piece { start: [i * bytes, 0, 0], ..piece };
+        let groups = (0..frames / together).map(|_| pieces.by_ref().take(each).enumerate().map(placed).collect());
+        let at =
+            At::Decoded(Box::new(Pieces { dims: [each * bytes, 1, 1], voxel: 1, together, frames: groups.collect() }));
         Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
     }
 }

@@ -52,10 +52,7 @@ impl Files {
         Ok(match self {
             Self::List { names, .. } => Box::new(names.into_iter()),
             Self::One(name) => Box::new(std::iter::once(name)),
-            Self::Pattern { pattern, first, step, .. } => {
-                pattern::numbered(&pattern, first)?; // so that a wrong pattern is an error
-                Box::new((0..count as i64).filter_map(move |i| pattern::numbered(&pattern, first + i * step).ok()))
-            }
+            Self::Pattern { pattern, first, step, .. } => Box::new(pattern::names(&pattern, first, count, step)?),
         })
     }
 }

@@ -4,7 +4,6 @@
 mod axes;
 mod data;
 mod files;
-mod gathered;
 mod header;
 
 pub(in crate::source) use header::MAGIC;

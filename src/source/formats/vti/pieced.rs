@@ -28,7 +28,7 @@ pub(super) fn part(image: &Image, wanted: &Wanted<'_>) -> Result<(Part, Option<f
         return Ok((Part { path: path.clone(), state: *state, frames: 1, stored, at: At::Byte(start) }, found.time));
     }
     let frames = vec![found.pieces.into_iter().map(|located| located.piece).collect()];
-    let at = At::Decoded(Box::new(Pieces { dims: wanted.lengths, voxel: wanted.voxel, frames }));
+    let at = At::Decoded(Box::new(Pieces { dims: wanted.lengths, voxel: wanted.voxel, together: 1, frames }));
     Ok((Part { path: path.into(), state: image.file.state(), frames: 1, stored, at }, found.time))
 }
 

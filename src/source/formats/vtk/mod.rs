@@ -42,7 +42,12 @@ fn text(file: &FileBytes, array: &Array, shape: Shape) -> At {
     let samples = Words { start: array.start, count: array.components * array.tuples, sample };
     let (path, state) = (file.path().into(), file.state());
     let piece = Piece { path, state, start: [0; 3], dims, samples: Box::new(samples) };
-    At::Decoded(Box::new(Pieces { dims, voxel: array.components * sample.size(), frames: vec![vec![piece]] }))
+    At::Decoded(Box::new(Pieces {
+        dims,
+        voxel: array.components * sample.size(),
+        together: 1,
+        frames: vec![vec![piece]],
+    }))
 }
 
 fn stored(header: &Header, array: &Array, chosen: Chosen) -> Parsed<(Shape, Stored)> {
