@@ -1,10 +1,11 @@
 //! VTK's base64: what some texts one after another encode, perhaps broken by white space.
 
 use super::text::Characters;
+use super::words::wrong;
 use crate::mapped::FileBytes;
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, Read};
 
 const GROUP: usize = 4; // characters that are decoded together
 
@@ -32,7 +33,7 @@ impl Text {
             while !rest.is_empty() {
                 let padding = rest.iter().position(|c| *c == b'=');
                 let (text, after) = rest.split_at(padding.map_or(rest.len(), |at| (at / GROUP + 1) * GROUP));
-                let damaged = |e| io::Error::new(ErrorKind::InvalidData, format!("its base64 array is damaged: {e}"));
+                let damaged = |e| wrong(format!("its base64 array is damaged: {e}"));
                 STANDARD.decode_vec(text, &mut self.decoded).map_err(damaged)?;
                 rest = after;
             }

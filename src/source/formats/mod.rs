@@ -18,6 +18,7 @@ pub(in crate::source) mod raw;
 mod text;
 mod vti;
 mod vtk;
+mod words;
 mod xml;
 
 pub use npy::{ArrayHeader, array_header};

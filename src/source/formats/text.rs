@@ -1,9 +1,10 @@
 //! Samples as text: numbers with white space between them.
 
 use super::pieces::Packed;
+use super::words::wrong;
 use crate::mapped::FileBytes;
 use crate::sample::{self, SampleType, swap_endian};
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, Read};
 
 const PIECE: usize = 64 << 10; // bytes read at a time
 
@@ -111,7 +112,7 @@ impl Numbers {
 
 fn no_number(word: &[u8]) -> io::Error {
     let word = String::from_utf8_lossy(&word[..word.len().min(40)]).into_owned();
-    io::Error::new(ErrorKind::InvalidData, format!("{word:?} is no number that its type can hold"))
+    wrong(format!("{word:?} is no number that its type can hold"))
 }
 
 impl Read for Numbers {

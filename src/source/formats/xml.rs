@@ -3,7 +3,6 @@
 use crate::source::Parsed;
 use quick_xml::XmlVersion;
 use quick_xml::events::BytesStart;
-use std::str::FromStr;
 
 /// An attribute's text, if the element has it.
 pub(in crate::source) fn attribute(element: &BytesStart<'_>, name: &str) -> Parsed<Option<String>> {
@@ -17,11 +16,4 @@ pub(in crate::source) fn attribute(element: &BytesStart<'_>, name: &str) -> Pars
 /// An attribute that must be there.
 pub(in crate::source) fn required(element: &BytesStart<'_>, name: &str) -> Parsed<String> {
     attribute(element, name)?.ok_or_else(|| format!("<{}> has no {name}", element.name().as_ref()))
-}
-
-/// `N` numbers separated by spaces.
-pub(in crate::source) fn numbers<T: FromStr + Copy, const N: usize>(text: &str, what: &str) -> Parsed<[T; N]> {
-    let found: Option<Vec<T>> = text.split_whitespace().map(|n| n.parse().ok()).collect();
-    let wrong = || format!("{what} must be {N} numbers, not {text:?}");
-    found.and_then(|v| v.try_into().ok()).ok_or_else(wrong)
 }

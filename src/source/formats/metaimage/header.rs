@@ -1,8 +1,8 @@
 //! The text of a MetaImage header: fields, and the list of data files that may end it.
 
 use crate::source::Parsed;
+use crate::source::formats::words::shortened;
 use std::collections::HashMap;
-use std::str::FromStr;
 
 /// The fields of a header, and where it ends.
 #[derive(Debug, Default)]
@@ -91,15 +91,3 @@ impl Header {
 }
 
 const DATA: &str = "elementdatafile";
-
-/// The start of a line that may be anything.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
-}
-
-/// `count` numbers separated by spaces.
-pub(super) fn numbers<T: FromStr>(text: &str, what: &str, count: usize) -> Parsed<Vec<T>> {
-    let found: Option<Vec<T>> = text.split_whitespace().map(|n| n.parse().ok()).collect();
-    let wrong = || format!("{what} must be {count} numbers, not {text:?}");
-    found.filter(|v| v.len() == count).ok_or_else(wrong)
-}

@@ -5,6 +5,7 @@ mod header;
 
 use super::component;
 use super::directions::{Directions, Placed};
+use super::words::numbers;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
@@ -12,7 +13,7 @@ use crate::source::Parsed;
 use crate::source::described::{Described, Stored, growing_head};
 use crate::source::frames::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
-use header::{Header, numbers};
+use header::Header;
 use std::path::Path;
 
 const SPACING: [&str; 2] = ["elementspacing", "elementsize"];

@@ -1,9 +1,10 @@
 //! What the axes of a NRRD count, and where they lie in the world.
 
-use super::header::{Header, numbers, vectors};
+use super::header::{Header, vectors};
 use crate::source::Parsed;
 use crate::source::described::Units;
 use crate::source::formats::directions::Directions;
+use crate::source::formats::words::{list, numbers};
 
 /// The axes of an array, numbered from the fastest as in the file.
 #[derive(Debug)]
@@ -102,13 +103,13 @@ impl Axes {
 
     /// Units of what lies along the axes, and of samples.
     pub(super) fn units(&self, header: &Header) -> Units {
-        let list = |field| quoted(header.get(field).unwrap_or_default());
-        let (all, space) = (list("units"), list("spaceunits"));
+        let words = |field| quoted(header.get(field).unwrap_or_default());
+        let (all, space) = (words("units"), words("spaceunits"));
         let known = |unit: Option<&String>| unit.filter(|u| !matches!(u.as_str(), "" | "???" | "none")).cloned();
         let first = known(space.first()).or(known(all.get(self.voxels[0])));
         let same = |a: usize| known(space.get(a)).or(known(all.get(self.voxels[a]))) == first;
         Units {
-            samples: known(list("sampleunits").first()),
+            samples: known(words("sampleunits").first()),
             times: self.frames.and_then(|axis| known(all.get(axis)).or(known(space.get(3)))),
             space: first.clone().filter(|_| same(1) && same(2)),
             calendar: None,
@@ -148,7 +149,7 @@ fn is_component(kind: &str) -> bool {
 /// A number for each axis, or none at all.
 fn per_axis(header: &Header, field: &str) -> Parsed<Vec<f64>> {
     let name = if field == "axismins" { "axis mins" } else { field };
-    numbers(header.get(field).unwrap_or_default(), name, 0)
+    list(header.get(field).unwrap_or_default(), name)
 }
 
 /// Words that may be in quotes.

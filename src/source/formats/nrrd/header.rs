@@ -2,7 +2,6 @@
 
 use crate::source::Parsed;
 use std::collections::HashMap;
-use std::str::FromStr;
 
 /// How every NRRD starts.
 pub(in crate::source) const MAGIC: &[u8] = b"NRRD000";
@@ -77,15 +76,6 @@ impl Header {
     pub(super) fn required(&self, name: &str) -> Parsed<&str> {
         self.get(name).ok_or_else(|| format!("its header does not say {name}"))
     }
-}
-
-/// Numbers separated by spaces: exactly `count`, or any number of them if that is 0.
-pub(super) fn numbers<T: FromStr>(text: &str, what: &str, count: usize) -> Parsed<Vec<T>> {
-    let found: Option<Vec<T>> = text.split_whitespace().map(|n| n.parse().ok()).collect();
-    let wrong = || {
-        format!("{what} must be {} numbers, not {text:?}", if count == 0 { "all".into() } else { count.to_string() })
-    };
-    found.filter(|v| count == 0 || v.len() == count).ok_or_else(wrong)
 }
 
 /// Vectors such as `(1,0,0)`, of three numbers or with time of four, and `none` between them.

@@ -1,8 +1,9 @@
 //! Arrays in blocks, each of which is compressed by zlib.
 
 use super::encoded::Count;
+use crate::source::formats::words::wrong;
 use flate2::bufread::ZlibDecoder;
-use std::io::{self, BufReader, ErrorKind, Read, Take};
+use std::io::{self, BufReader, Read, Take};
 
 /// What stands before the blocks of an array.
 #[derive(Debug)]
@@ -96,8 +97,4 @@ impl<R: Read> Read for Inflated<R> {
             }
         }
     }
-}
-
-fn wrong(what: String) -> io::Error {
-    io::Error::new(ErrorKind::InvalidData, what)
 }

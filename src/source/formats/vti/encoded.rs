@@ -8,6 +8,7 @@ use crate::source::formats::base64::Text;
 use crate::source::formats::deflated::FileReader;
 use crate::source::formats::pieces::Packed;
 use crate::source::formats::text::{Characters, Numbers};
+use crate::source::formats::words::wrong;
 use std::io::{self, ErrorKind, Read};
 
 /// A count that VTK puts before the samples of an array.
@@ -160,8 +161,4 @@ impl Packed for Encoded {
 /// Characters that encode so many bytes, if not more.
 fn characters(bytes: u64) -> u64 {
     bytes.div_ceil(3).saturating_mul(4)
-}
-
-fn wrong(what: String) -> io::Error {
-    io::Error::new(ErrorKind::InvalidData, what)
 }

@@ -3,7 +3,8 @@
 use super::extent::Extent;
 use crate::source::Parsed;
 use crate::source::formats::association::Association;
-use crate::source::formats::xml::{attribute, numbers, required};
+use crate::source::formats::words::array;
+use crate::source::formats::xml::{attribute, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
@@ -142,21 +143,21 @@ impl Header {
     }
 
     fn image(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        self.whole = Extent(numbers(&required(e, "WholeExtent")?, "WholeExtent")?);
+        self.whole = Extent(array(&required(e, "WholeExtent")?, "WholeExtent")?);
         if let Some(text) = attribute(e, "Spacing")? {
-            self.spacing = numbers(&text, "Spacing")?;
+            self.spacing = array(&text, "Spacing")?;
         }
         if let Some(text) = attribute(e, "Origin")? {
-            self.origin = numbers(&text, "Origin")?;
+            self.origin = array(&text, "Origin")?;
         }
         if let Some(text) = attribute(e, "Direction")? {
-            self.direction = numbers(&text, "Direction")?;
+            self.direction = array(&text, "Direction")?;
         }
         Ok(())
     }
 
     fn piece(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        let extent = Extent(numbers(&required(e, "Extent")?, "Extent")?);
+        let extent = Extent(array(&required(e, "Extent")?, "Extent")?);
         let source = attribute(e, "Source")?;
         if self.parallel && source.is_none() {
             return Err("has a <Piece> without a Source".into());

@@ -8,8 +8,8 @@ use crate::source::Parsed;
 use crate::source::formats::association::Association;
 use crate::source::formats::pieces::Packed;
 use crate::source::formats::text::Words;
+use crate::source::formats::words::{array, number, shortened};
 use std::io::Read;
-use std::str::FromStr;
 
 /// How every such file starts.
 pub(in crate::source) const MAGIC: &[u8] = b"# vtk DataFile";
@@ -73,13 +73,15 @@ impl Header {
             ("DATASET", kind) => {
                 return Err(format!("is a {}: only STRUCTURED_POINTS are supported", kind.join(" ").to_uppercase()));
             }
-            ("DIMENSIONS", sizes) => self.points = numbers(sizes, "DIMENSIONS")?,
-            ("SPACING" | "ASPECT_RATIO", sizes) => self.spacing = numbers(sizes, "SPACING")?,
-            ("ORIGIN", place) => self.origin = numbers(place, "ORIGIN")?,
+            ("DIMENSIONS", sizes) => self.points = array(&sizes.join(" "), "DIMENSIONS")?,
+            ("SPACING" | "ASPECT_RATIO", sizes) => self.spacing = array(&sizes.join(" "), "SPACING")?,
+            ("ORIGIN", place) => self.origin = array(&place.join(" "), "ORIGIN")?,
             ("POINT_DATA", count) => {
-                self.inside = Some((Association::Points, numbers::<_, 1>(count, "POINT_DATA")?[0]));
+                self.inside = Some((Association::Points, number(&count.join(" "), "size of POINT_DATA")?))
             }
-            ("CELL_DATA", count) => self.inside = Some((Association::Cells, numbers::<_, 1>(count, "CELL_DATA")?[0])),
+            ("CELL_DATA", count) => {
+                self.inside = Some((Association::Cells, number(&count.join(" "), "size of CELL_DATA")?))
+            }
             _ => return Ok(false),
         }
         Ok(true)
@@ -275,19 +277,4 @@ fn decoded(name: &str) -> String {
         rest = if byte.is_some() { &after[2..] } else { after };
     }
     String::from_utf8_lossy(&bytes).into_owned()
-}
-
-fn number<T: FromStr>(text: &str, what: &str) -> Parsed<T> {
-    text.parse().map_err(|_| format!("the {what} {:?} is no number", shortened(text)))
-}
-
-fn numbers<T: FromStr + Copy, const N: usize>(words: &[&str], what: &str) -> Parsed<[T; N]> {
-    let found: Option<Vec<T>> = words.iter().map(|n| n.parse().ok()).collect();
-    let wrong = || format!("{what} must be {N} number(s), not {:?}", shortened(&words.join(" ")));
-    found.and_then(|v| v.try_into().ok()).ok_or_else(wrong)
-}
-
-/// The start of what may be anything.
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
 }

@@ -147,7 +147,7 @@ fn what_is_not_supported_is_named() {
     with("POINT_DATA 105", "CELL_DATA 105", "has 105 samples, but DIMENSIONS need 48");
     with("7 5 3", "7 5 4", "DIMENSIONS need 140");
     with("7 5 3", "7 0 3", "is empty");
-    with("7 5 3", "7 5", "DIMENSIONS must be 3 number(s)");
+    with("7 5 3", "7 5", "DIMENSIONS must be 3 numbers");
     with("DIMENSIONS 7 5 3\n", "", "does not say its DIMENSIONS");
     with("7 5 3", "7000000000 5000000000 3000000000", "too large");
     with("POINT_DATA 105", "POINT_DATA 18446744073709551615", "too large for any file");
