@@ -55,6 +55,7 @@
 //!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
 //!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/canvas.rs`,
 //!    `render/weights.rs`, `extract/mod.rs`, `verify.rs` and, to find damage, `file.rs`; `render/plan.rs` asks how many there are.
+//!    In `mapped.rs` one waits for signals, and `source/formats/arrays` may decode chunks on the workers that read.
 //! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
 //! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
 //! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
