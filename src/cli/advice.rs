@@ -1,6 +1,7 @@
 //! What to do next, where arguments are not understood.
 
 use super::config::Config;
+use crate::source;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;
@@ -48,7 +49,7 @@ fn for_a_word(word: &str) -> Option<String> {
         (_, Some("wspl")) => Some(format!(
             "'wavesplat info {word}' says what it holds, 'wavesplat-render {word} -o frame_%04d.png' makes pictures"
         )),
-        _ if Path::new(word).exists() || ending.is_some_and(|ending| FRAMES.contains(&ending)) => {
+        _ if Path::new(word).exists() || is_frames(word) => {
             Some(format!("'wavesplat convert {word} -o run.wspl' converts frames"))
         }
         ("render" | "view" | "show" | "plot", _) => Some("wavesplat-render makes pictures".into()),
@@ -56,11 +57,15 @@ fn for_a_word(word: &str) -> Option<String> {
     }
 }
 
-/// Endings of frames.
-const FRAMES: [&str; 19] = [
-    "npy", "nrrd", "nhdr", "nii", "gz", "mha", "mhd", "vti", "pvti", "vtk", "pvd", "series", "h5", "hdf5", "vtkhdf",
-    "nc", "zarr", "raw", "bin",
-];
+/// Endings of frames that do not say what they are.
+const HEADERLESS: [&str; 3] = ["raw", "bin", "img"];
+
+/// Whether a word is the name of a file of frames, by how it ends.
+fn is_frames(word: &str) -> bool {
+    let word = word.to_lowercase();
+    let ends = |ending| word.strip_suffix(ending).is_some_and(|name: &str| name.ends_with('.'));
+    source::endings().chain(HEADERLESS).any(ends)
+}
 
 /// Who takes an option that a command does not know.
 fn owner(command: &Command, option: &str) -> Option<String> {

@@ -22,7 +22,7 @@ mod testing;
 pub(crate) use coloured::Coloured;
 pub use coloured::{CHANNELS, Painter};
 pub use described::Units;
-pub use formats::{ArrayHeader, array_header};
+pub use formats::{ArrayHeader, array_header, endings};
 pub use inputs::files;
 pub use select::{Selection, select};
 

@@ -12,7 +12,7 @@ use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPol
 use wavesplat::error::{Error, Result};
 use wavesplat::output::{Output, STANDARD};
 use wavesplat::resume::{self, Earlier};
-use wavesplat::source::{Archive, FrameSource};
+use wavesplat::source::{Archive, FrameSource, endings};
 use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
@@ -26,18 +26,7 @@ Examples:
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
   wavesplat convert frames/ -o coloured.wspl --transfer-function viridis",
-    after_help = "\
-Inputs: .npy, .nrrd/.nhdr, .vti, .pvd, headerless data with --dims and --dtype.
-
-A run that is stopped or killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. \
-With --resume the same command goes on there (frames that were converted are read again and compared); a producer behind a \
-pipe must begin at its first frame again.
-
-The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass; \
---range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
-every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range: \
-wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker \
-than the mean, and single frames, may be off by many times the tolerance."
+    after_help = after_help()
 )]
 pub(crate) struct ConvertArgs {
     /// Frame files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
@@ -113,6 +102,23 @@ pub(crate) struct ConvertArgs {
 /// Headings of the help.
 const PROMISE: &str = "What is promised";
 const CODING: &str = "How it is coded (the defaults are good)";
+
+/// The end of the help: what inputs may be, and what else should be known.
+fn after_help() -> String {
+    let endings: Vec<String> = endings().map(|ending| format!(".{ending}")).collect();
+    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{TO_KNOW}", endings.join(" "))
+}
+
+const TO_KNOW: &str = "\
+A run that is stopped or killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. \
+With --resume the same command goes on there (frames that were converted are read again and compared); a producer behind a \
+pipe must begin at its first frame again.
+
+The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass; \
+--range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
+every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range: \
+wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker \
+than the mean, and single frames, may be off by many times the tolerance.";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum BasisName {

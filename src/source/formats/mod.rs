@@ -27,11 +27,56 @@ use super::OpenOptions;
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::described::{Described, head};
+use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
-/// The formats that describe themselves, for messages.
-pub(in crate::source) const SUPPORTED: &str = ".npy, .nrrd, .nhdr, .nii, .nii.gz, .hdr with .img, .mha, .mhd, .vti, .pvti, .vtk, .pvd, .series, .nc, .h5, .vtkhdf, .zarr, \
-     and headerless data of any name";
+/// The extensions by which formats are known.
+const ENDINGS: [(&str, Format); 26] = [
+    ("npy", Format::Npy),
+    ("nrrd", Format::Nrrd),
+    ("nhdr", Format::Nrrd),
+    ("nii", Format::Nifti),
+    ("nii.gz", Format::Nifti),
+    ("hdr", Format::Nifti),
+    ("hdr.gz", Format::Nifti),
+    ("mha", Format::MetaImage),
+    ("mhd", Format::MetaImage),
+    ("vti", Format::Vti),
+    ("pvti", Format::Vti),
+    ("vtk", Format::Vtk),
+    ("pvd", Format::Pvd),
+    ("series", Format::FileSeries),
+    ("nc", Format::NetCdf),
+    ("nc3", Format::NetCdf),
+    ("nc4", Format::NetCdf),
+    ("cdf", Format::NetCdf),
+    ("netcdf", Format::NetCdf),
+    ("h5", Format::Hdf5),
+    ("hdf5", Format::Hdf5),
+    ("hdf", Format::Hdf5),
+    ("he5", Format::Hdf5),
+    ("vtkhdf", Format::Hdf5),
+    ("zarr", Format::Zarr),
+    ("wspl", Format::Coefficients),
+];
+
+/// Extensions of inputs that say themselves what they are.
+pub fn endings() -> impl Iterator<Item = &'static str> {
+    ENDINGS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
+}
+
+/// What is supported, for messages.
+pub(in crate::source) const SUPPORTED: Supported = Supported;
+
+/// As [`SUPPORTED`].
+pub(in crate::source) struct Supported;
+
+impl Display for Supported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        endings().try_for_each(|ending| write!(f, ".{ending}, "))?;
+        write!(f, "and headerless data of any name")
+    }
+}
 
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
 
@@ -62,21 +107,8 @@ pub(in crate::source) enum Format {
 impl Format {
     /// By extension; none for headerless data and for what is not supported.
     pub(in crate::source) fn by_name(path: &Path) -> Option<Self> {
-        match extension(path).as_str() {
-            "npy" => Some(Self::Npy),
-            "nrrd" | "nhdr" => Some(Self::Nrrd),
-            "nii" | "nii.gz" | "hdr" | "hdr.gz" => Some(Self::Nifti),
-            "mha" | "mhd" => Some(Self::MetaImage),
-            "vti" | "pvti" => Some(Self::Vti),
-            "vtk" => Some(Self::Vtk),
-            "h5" | "hdf5" | "hdf" | "he5" | "vtkhdf" => Some(Self::Hdf5),
-            "nc" | "nc4" | "nc3" | "cdf" | "netcdf" => Some(Self::NetCdf),
-            "zarr" => Some(Self::Zarr),
-            "pvd" => Some(Self::Pvd),
-            "series" => Some(Self::FileSeries),
-            "wspl" => Some(Self::Coefficients),
-            _ => None,
-        }
+        let found = extension(path);
+        ENDINGS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
     }
 
     /// Whether a file of it holds frames, and says itself what they are.
@@ -200,5 +232,20 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
             Err(Error::usage(format!("{}: {what}", path.display())))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_ending_is_known_once() {
+        for (ending, format) in ENDINGS {
+            assert_eq!(Format::by_name(Path::new(&format!("a.b.{}", ending.to_uppercase()))), Some(format));
+        }
+        let supported = SUPPORTED.to_string();
+        assert!(supported.starts_with(".npy, .nrrd, ") && supported.contains(".hdf5, "), "{supported}");
+        assert!(!supported.contains("wspl") && endings().all(|ending| supported.contains(ending)));
     }
 }
