@@ -89,16 +89,16 @@ impl Array {
 
     /// A file of less than a frame, or of some samples of every frame; where its samples come, [`Self::of_pieces`] says.
     fn piece(&self, data: &FileBytes, skip: &Skip, bytes: usize) -> Result<Piece> {
-        let refused = |what| Err(Error::input(data.path(), what));
+        let refused = |what| Error::input(data.path(), what);
         let stream = if self.gzip {
             let (start, skip) = skip.compressed(data, 0)?;
-            check_room(data.len(), skip.saturating_add(bytes as u64)).or_else(refused)?;
+            check_room(data.len(), skip.saturating_add(bytes as u64)).map_err(refused)?;
             pieces::Stream { start, skip, bytes, compression: Some(Compression::Gzip) }
         } else {
             let start = skip.start(data, 0, bytes)?;
             let found = data.len().saturating_sub(start);
             if found != bytes as u64 {
-                return refused(format!("expected {bytes} bytes of samples after {start}, found {found}"));
+                return Err(refused(format!("expected {bytes} bytes of samples after {start}, found {found}")));
             }
             pieces::Stream { start, skip: 0, bytes, compression: None }
         };

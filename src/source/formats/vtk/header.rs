@@ -77,10 +77,10 @@ impl Header {
             ("SPACING" | "ASPECT_RATIO", sizes) => self.spacing = array(&sizes.join(" "), "SPACING")?,
             ("ORIGIN", place) => self.origin = array(&place.join(" "), "ORIGIN")?,
             ("POINT_DATA", count) => {
-                self.inside = Some((Association::Points, number(&count.join(" "), "size of POINT_DATA")?))
+                self.inside = Some((Association::Points, number(&count.join(" "), "size of POINT_DATA")?));
             }
             ("CELL_DATA", count) => {
-                self.inside = Some((Association::Cells, number(&count.join(" "), "size of CELL_DATA")?))
+                self.inside = Some((Association::Cells, number(&count.join(" "), "size of CELL_DATA")?));
             }
             _ => return Ok(false),
         }
