@@ -82,9 +82,12 @@ impl Pieces {
         piece.state.check(path, &file.state())?;
         let mut reader = piece.samples.open(file).map_err(|e| damaged(path, e))?;
         let (run, starts) = self.runs(piece);
+        let mut seen = 0;
         for start in starts {
-            if hold(&mut *reader, path, (start as u64, run), out, |_, e| damaged(path, e))? < run {
-                return Err(Error::input(path, "its samples end early"));
+            let got = hold(&mut *reader, path, (start as u64, run), out, |_, e| damaged(path, e))?;
+            seen += got;
+            if got < run {
+                return Err(Error::input(path, format!("its samples end early, after {seen} bytes")));
             }
         }
         expect_end(&mut *reader, path, 0)
