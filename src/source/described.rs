@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 const FIRST_READ: usize = 4 << 10; // bytes of a header
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 
+/// Spacings and origins that differ by less than this part of the spacing are the same, written differently.
+const SAME_PLACE: f64 = 1e-6;
+
 /// The files of an archive, in order.
 #[derive(Debug, Default)]
 pub(super) struct Files {
@@ -188,6 +191,45 @@ impl Described {
     pub(super) fn grid(&self) -> Grid {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }
+
+    /// Whether its frames can follow those of the first file, or of the first array of a file, which messages call `name`.
+    ///
+    /// # Errors
+    /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
+    pub(super) fn follows(&self, first: &Self, name: &str) -> Parsed<Unlike> {
+        let said = |text: &Option<String>| text.clone().unwrap_or_else(|| "none".into());
+        let value = |missing: Option<f64>| missing.map_or_else(|| "none".into(), |value| value.to_string());
+        let same = |what: &str, own: String, theirs: String| {
+            if own == theirs { Ok(()) } else { Err(format!("has {what}{own}, but {name} has {theirs}")) }
+        };
+        same("", self.shape.to_string(), first.shape.to_string())?;
+        same("the array ", said(&self.variable), said(&first.variable))
+            .map_err(|e| format!("{e}; --variable chooses one"))?;
+        same("samples in the unit ", said(&self.units.samples), said(&first.units.samples))?;
+        same("places in the unit ", said(&self.units.space), said(&first.units.space))?;
+        same("the missing value ", value(self.missing), value(first.missing))?;
+        let is_timed = !self.times.is_empty() && !first.times.is_empty();
+        Ok(Unlike { grid: !self.is_placed_as(first), times: is_timed && self.units.times != first.units.times })
+    }
+
+    /// Whether voxels are where those of another file are, but for a small part of their distance.
+    fn is_placed_as(&self, other: &Self) -> bool {
+        let is_near = |a: f64, b: f64, axis: usize| (a - b).abs() <= SAME_PLACE * other.spacing[axis].abs();
+        let is_same = |axis: usize| {
+            is_near(self.spacing[axis], other.spacing[axis], axis)
+                && is_near(self.origin[axis], other.origin[axis], axis)
+        };
+        (0..3).all(is_same)
+    }
+}
+
+/// In what a file differs from the first one, though its frames can follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Unlike {
+    /// Its spacing or origin.
+    pub(super) grid: bool,
+    /// What its times are measured in, or since when.
+    pub(super) times: bool,
 }
 
 /// Checks that a file of `len` bytes holds `frames` frames from byte `start` and nothing after them.

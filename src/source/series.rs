@@ -7,8 +7,9 @@ use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::volume::Grid;
+use std::mem;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Files whose frames follow one another.
@@ -35,25 +36,35 @@ struct Decoded {
 impl Series {
     /// Reads the header of every file.
     pub(super) fn open(files: &Files, options: &OpenOptions) -> Result<Self> {
-        let Some((first, rest)) = files.paths.split_first() else {
+        let Some((first_path, rest)) = files.paths.split_first() else {
             return Err(Error::usage("no input was given"));
         };
-        let mut series = Self::of(formats::describe(first, options)?, options);
+        let mut first = describe(first_path, options)?;
+        let mut series = Self::of(&mut first, options);
+        let name = format!("the first frame ({})", first_path.display());
+        let (mut placed_otherwise, mut timed_otherwise) = (None, None);
         for path in rest {
-            series.append(formats::describe(path, options)?, path, first)?;
+            let mut file = describe(path, options)?;
+            let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
+            placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
+            timed_otherwise = timed_otherwise.or(unlike.times.then_some(path));
+            series.take(&mut file);
         }
-        series.finish(files, options)
+        if let Some(path) = placed_otherwise {
+            let what = "the spacing and origin are those of the first file";
+            note_once(&mut series.archive.notes, format!("{what}; {} has others", path.display()));
+        }
+        series.finish(files, timed_otherwise, options)
     }
 
-    fn of(first: Described, options: &OpenOptions) -> Self {
-        let mut archive = Archive {
+    fn of(first: &mut Described, options: &OpenOptions) -> Self {
+        let archive = Archive {
             variable: first.variable.clone(),
             units: first.units.clone(),
             missing: first.missing,
             format: first.format,
             ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
-        override_grid(&mut archive.grid, options);
         let (shape, parts, starts) = (first.shape, Vec::new(), Vec::new());
         let (access, memory) = (options.access, options.memory);
         let mut series = Self { archive, shape, access, memory, parts, starts, last: None };
@@ -61,12 +72,13 @@ impl Series {
         series
     }
 
-    fn take(&mut self, file: Described) {
-        self.archive.times.extend(file.times);
-        for note in file.notes {
+    /// Takes the frames of a file, with their times and the notes on them.
+    fn take(&mut self, file: &mut Described) {
+        self.archive.times.extend(&file.times);
+        for note in mem::take(&mut file.notes) {
             note_once(&mut self.archive.notes, note);
         }
-        for part in file.parts {
+        for part in mem::take(&mut file.parts) {
             let frames = self.archive.frames.unwrap_or(0);
             self.starts.push(frames);
             self.archive.frames = self.archive.frames.and_then(|_| frames.checked_add(part.frames));
@@ -77,30 +89,7 @@ impl Series {
         }
     }
 
-    fn append(&mut self, file: Described, path: &Path, first: &Path) -> Result<()> {
-        let first = first.display();
-        if file.shape != self.shape {
-            let what = format!("has {}, but the first frame ({first}) has {}", file.shape, self.shape);
-            return Err(Error::input(path, what));
-        }
-        if file.variable != self.archive.variable {
-            let name = |v: &Option<String>| v.clone().unwrap_or_else(|| "without a name".into());
-            let (its, theirs) = (name(&file.variable), name(&self.archive.variable));
-            let what =
-                format!("has the array {its}, but the first frame ({first}) has {theirs}; --variable chooses one");
-            return Err(Error::input(path, what));
-        }
-        if file.units != self.archive.units {
-            return Err(Error::input(path, format!("is in other units than the first frame ({first})")));
-        }
-        if file.missing.map(f64::to_bits) != self.archive.missing.map(f64::to_bits) {
-            return Err(Error::input(path, format!("marks missing samples otherwise than the first frame ({first})")));
-        }
-        self.take(file);
-        Ok(())
-    }
-
-    fn finish(mut self, files: &Files, options: &OpenOptions) -> Result<Self> {
+    fn finish(mut self, files: &Files, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
         for note in &files.notes {
             note_once(&mut self.archive.notes, note.clone());
         }
@@ -109,12 +98,21 @@ impl Series {
         };
         if frames == files.times.len() {
             self.archive.times.clone_from(&files.times);
+        } else if let Some(path) = timed_otherwise {
+            self.drop_times(format!("{} has times of another unit or start than the first file", path.display()));
         }
         if self.archive.times.len() != frames {
             self.archive.times.clear();
         }
         check_grid(&self.archive.grid, options, &files.paths[0])?;
         Ok(self)
+    }
+
+    /// Leaves times out, and their unit, since numbers of frames are in none.
+    fn drop_times(&mut self, why: String) {
+        self.archive.times.clear();
+        self.archive.units.times = None;
+        note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));
     }
 
     /// Adds some frames of a part to a window.
@@ -207,6 +205,15 @@ impl FrameSource for Series {
         self.rest(parts.start..parts.end.saturating_sub(1).max(parts.start));
         Ok(Box::new(window))
     }
+}
+
+/// What a file says, with the user's spacing and origin in place of its own.
+fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+    let mut file = formats::describe(path, options)?;
+    let mut grid = file.grid();
+    override_grid(&mut grid, options);
+    (file.spacing, file.origin) = (grid.spacing, grid.origin);
+    Ok(file)
 }
 
 fn note_once(notes: &mut Vec<String>, note: String) {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::sample::SampleType;
+use crate::source::described::{Units, Unlike};
 use crate::source::open;
 use crate::source::testing::{DIMS, Folder, message, payload, refused};
 
@@ -39,6 +40,44 @@ fn a_frame_of_another_shape_is_named() {
     let a = folder.write("a.nrrd", nrrd("7 5 3 1", &[0; 105]));
     let b = folder.write("b.nrrd", nrrd("7 3 5 1", &[0; 105]));
     refused(&[a, b], &OpenOptions::default(), "b.nrrd: has 7x3x5 u8 samples, but the first frame");
+}
+
+#[test]
+fn what_a_file_says_otherwise_than_the_first_is_refused_or_noted() {
+    let folder = Folder::new();
+    let file = |name: &str, more: &str| {
+        let text = format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: 7 5 3\n{more}encoding: raw\n\n");
+        folder.write(name, [text.as_bytes(), &[0; 105]].concat())
+    };
+    let spaced = |by: &str| format!("spacings: {by} 1 1\n");
+    let files = [("f0", "0.5"), ("f1", "0.50000001"), ("f2", "0.75"), ("f3", "2")]
+        .map(|(name, by)| file(&format!("{name}.nrrd"), &spaced(by)));
+    let source = open(&files, &OpenOptions::default()).expect("opening");
+    assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 1.0]);
+    let [note] = &source.archive().notes[..] else { panic!("{:?}", source.archive().notes) };
+    assert!(note.contains("those of the first file") && note.ends_with("f2.nrrd has others"), "{note}");
+    assert!(open(&files[..2], &OpenOptions::default()).expect("opening").archive().notes.is_empty());
+    let given = OpenOptions { spacing: Some([1.0; 3]), ..OpenOptions::default() };
+    assert!(open(&files, &given).expect("opening").archive().notes.is_empty(), "the user's holds for all");
+}
+
+#[test]
+fn files_follow_one_another_in_the_same_units() {
+    let shape = Shape::new(DIMS, SampleType::U8).expect("small");
+    let plain = || Described { times: vec![1.0], ..Described::plain(shape, Vec::new()) };
+    let units =
+        |samples: &str, times: &str| Units { samples: Some(samples.into()), times: Some(times.into()), space: None };
+    let first = Described { units: units("K", "hours since 2020-01-01"), missing: Some(-1.0), ..plain() };
+    let later = |units| Described { units, missing: Some(-1.0), ..plain() };
+    let refusal = |file: &Described| file.follows(&first, "a").expect_err("another");
+    let same = later(units("K", "hours since 2020-01-01")).follows(&first, "a");
+    assert_eq!(same, Ok(Unlike { grid: false, times: false }));
+    let tomorrow = later(units("K", "hours since 2020-01-02"));
+    assert_eq!(tomorrow.follows(&first, "a"), Ok(Unlike { grid: false, times: true }));
+    let untimed = Described { times: Vec::new(), ..tomorrow };
+    assert_eq!(untimed.follows(&first, "a"), Ok(Unlike { grid: false, times: false }));
+    assert_eq!(refusal(&later(units("C", ""))), "has samples in the unit C, but a has K");
+    assert_eq!(refusal(&Described { missing: None, ..untimed }), "has the missing value none, but a has -1");
 }
 
 #[test]
