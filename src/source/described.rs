@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::mapped::{FileBytes, State};
 use crate::sample::SampleType;
 use crate::volume::Grid;
-use std::cmp::Ordering;
 use std::fmt::Debug;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -32,16 +31,13 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Checks what a list says of files and times. `kind` is what it is called.
-    pub(super) fn of_list(mut self, kind: &str) -> Parsed<Self> {
+    /// Checks what a list says of files and times.
+    pub(super) fn of_list(self) -> Parsed<Self> {
         if !self.times.is_empty() && self.times.len() != self.paths.len() {
             return Err("gives a time to some of its files only".into());
         }
         if let Some(at) = self.times.windows(2).position(|t| t[0] == t[1]) {
             return Err(format!("lists two files for the time {}; one is supported", self.times[at]));
-        }
-        if self.times.windows(2).any(|t| t[1].partial_cmp(&t[0]) != Some(Ordering::Greater)) {
-            self.notes.push(format!("the times in the {kind} do not ascend; its files are taken in the order listed"));
         }
         Ok(self)
     }

@@ -104,8 +104,20 @@ impl Series {
         if self.archive.times.len() != frames {
             self.archive.times.clear();
         }
+        self.check_times();
         check_grid(&self.archive.grid, options, &files.paths[0])?;
         Ok(self)
+    }
+
+    /// Leaves times out that are no numbers, and notes those that do not ascend, whatever says them.
+    fn check_times(&mut self) {
+        let times = &self.archive.times;
+        if !times.iter().all(|t| t.is_finite()) {
+            self.drop_times("times are not all finite".into());
+        } else if times.windows(2).any(|t| t[1] <= t[0]) {
+            let what = "the times do not ascend; frames are taken in the order of the files, or of the list of them";
+            note_once(&mut self.archive.notes, what.into());
+        }
     }
 
     /// Leaves times out, and their unit, since numbers of frames are in none.

@@ -31,7 +31,7 @@ fn parse(bytes: &[u8], folder: &Path) -> Parsed<Files> {
     }
     let times = list.files.iter().filter_map(|file| file.time).collect();
     let paths = list.files.iter().map(|file| folder.join(&file.name)).collect();
-    Files { paths, times, notes: Vec::new() }.of_list(".series")
+    Files { paths, times, notes: Vec::new() }.of_list()
 }
 
 #[cfg(test)]

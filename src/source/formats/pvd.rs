@@ -56,7 +56,7 @@ fn finish(files: Files, sets: usize) -> Parsed<Files> {
     if sets > 1 {
         return Err("lists several parts or groups; one file for each time is supported".into());
     }
-    files.of_list(".pvd")
+    files.of_list()
 }
 
 #[cfg(test)]

@@ -81,6 +81,29 @@ fn files_follow_one_another_in_the_same_units() {
 }
 
 #[test]
+fn times_that_are_no_numbers_are_left_out_and_those_that_go_back_are_noted() {
+    let folder = Folder::new();
+    for t in 0..3 {
+        folder.write(&format!("f{t}.nrrd"), nrrd("7 5 3 1", &[0; 105]));
+    }
+    let archive = |times: [&str; 3]| {
+        let set = |t: usize| format!("<DataSet timestep=\"{}\" file=\"f{t}.nrrd\"/>", times[t]);
+        let sets: String = (0..3).map(set).collect();
+        let list = folder.write("a.pvd", format!("<VTKFile type=\"Collection\">{sets}</VTKFile>"));
+        open(&[list], &OpenOptions::default()).expect("opening").archive().clone()
+    };
+    assert!(archive(["-1", "0", "2"]).notes.is_empty());
+    for bad in ["nan", "inf", "1e999"] {
+        let Archive { times, notes, .. } = archive(["0", bad, "2"]);
+        assert!(times.is_empty(), "{bad}");
+        assert_eq!(notes, ["times are not all finite: frames are numbered"]);
+    }
+    let Archive { times, notes, .. } = archive(["0", "2", "1"]);
+    assert_eq!(times, [0.0, 2.0, 1.0]);
+    assert!(notes.len() == 1 && notes[0].contains("do not ascend"), "{notes:?}");
+}
+
+#[test]
 fn a_file_that_changes_after_opening_is_noticed() {
     let folder = Folder::new();
     let file = folder.write("a.raw", payload(SampleType::U8, 0..1, false));
