@@ -19,6 +19,8 @@ const SMALL_GAP: usize = 4096;
 const WASTE: usize = 8;
 /// No joined read is longer than this.
 const MAX_JOINED: usize = 4 << 20;
+/// Nor one of samples that are apart where small reads are cheap: it stays in a processor's cache.
+const MAX_SPAN: usize = 64 << 10;
 
 /// The voxels and the sample type of every frame of an archive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,27 +194,63 @@ fn copy_strided(
     let dims = region.dims();
     let mut axes = [0, 1, 2];
     axes.sort_by_key(|axis| (dims[*axis] == 1, strides[*axis].unsigned_abs()));
-    let [line, rows, planes] = axes;
+    let [axis, rows, planes] = axes;
     let out_strides = [size, size * dims[0], size * dims[0] * dims[1]];
     let place = |axis: usize, index: usize| strides[axis] * (region.start[axis] + index) as i64;
-    let pitch = strides[line].unsigned_abs() as usize;
-    let backwards = strides[line] < 0;
-    let mut span = vec![0; (dims[line] - 1) * pitch + size];
+    let line = Line { samples: dims[axis], size, stride: strides[axis], out_stride: out_strides[axis] };
+    let mut span = line.span(bytes);
     for (k, j) in (0..dims[planes]).flat_map(|k| (0..dims[rows]).map(move |j| (k, j))) {
-        let nearest = if backwards { dims[line] - 1 } else { 0 };
-        let from = place(planes, k) + place(rows, j) + place(line, nearest);
-        bytes.read_at(frame.wrapping_add_signed(from), &mut span)?;
+        let from = frame.wrapping_add_signed(place(planes, k) + place(rows, j) + place(axis, 0));
         let to = k * out_strides[planes] + j * out_strides[rows];
-        if pitch == size && line == 0 && !backwards {
-            out[to..][..span.len()].copy_from_slice(&span);
-            continue;
-        }
-        for i in 0..dims[line] {
-            let stored = if backwards { dims[line] - 1 - i } else { i };
-            out[to + i * out_strides[line]..][..size].copy_from_slice(&span[stored * pitch..][..size]);
-        }
+        line.copy(bytes, from, &mut span, &mut out[to..])?;
     }
     Ok(())
+}
+
+/// Samples of a box along one axis.
+struct Line {
+    samples: usize,
+    size: usize, // of a sample, in bytes
+    stride: i64, // bytes from a sample to the next one
+    out_stride: usize,
+}
+
+impl Line {
+    fn pitch(&self) -> usize {
+        self.stride.unsigned_abs() as usize
+    }
+
+    /// Room for what is read at once: as many samples as are worth it with what lies between them, at least one.
+    fn span(&self, bytes: &Bytes) -> Vec<u8> {
+        let (pitch, most) = (self.pitch(), self.size * WASTE);
+        let (gap, longest) =
+            if bytes.small_reads_are_cheap() { (most, MAX_SPAN) } else { (most.max(SMALL_GAP), MAX_JOINED) };
+        let joined = if pitch > gap { 1 } else { (longest / pitch.max(1)).clamp(1, self.samples) };
+        vec![0; (joined - 1) * pitch + self.size]
+    }
+
+    /// Copies the line whose first sample is at `from`.
+    fn copy(&self, bytes: &Bytes, from: u64, span: &mut [u8], out: &mut [u8]) -> io::Result<()> {
+        let Self { samples, size, stride, out_stride } = *self;
+        let (pitch, backwards) = (self.pitch(), stride < 0);
+        let joined = (span.len() - size).checked_div(pitch).unwrap_or(0) + 1;
+        for first in (0..samples).step_by(joined) {
+            let count = joined.min(samples - first);
+            let nearest = if backwards { first + count - 1 } else { first };
+            let span = &mut span[..(count - 1) * pitch + size];
+            bytes.read_at(from.wrapping_add_signed(stride * nearest as i64), span)?;
+            let out = &mut out[first * out_stride..];
+            if pitch == size && out_stride == size && !backwards {
+                out[..span.len()].copy_from_slice(span);
+                continue;
+            }
+            for i in 0..count {
+                let stored = if backwards { count - 1 - i } else { i };
+                out[i * out_stride..][..size].copy_from_slice(&span[stored * pitch..][..size]);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The bytes of a box as equally long rows, in planes: rows as long as they lie together in the frame.
@@ -358,6 +396,40 @@ mod tests {
                 }
                 let first = stored.strides.first;
                 both(&bytes).into_iter().for_each(|b| check_window(&window(shape, [b], &stored, &[first]), ty, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn samples_far_apart_are_read_alone_and_near_ones_in_bounded_pieces() {
+        let line = |samples, stride| Line { samples, size: 2, stride, out_stride: 2 };
+        let [file, memory] = both(&[]);
+        for bytes in [&file, &memory] {
+            assert_eq!(line(1 << 30, 1 << 20).span(bytes).len(), 2, "one sample");
+            assert!(line(1 << 30, -8).span(bytes).len() <= MAX_JOINED, "a piece");
+            assert_eq!(line(5, 8).span(bytes).len(), 34, "the line");
+            assert_eq!(line(1, 0).span(bytes).len(), 2);
+        }
+        assert_eq!(line(1 << 30, 100).span(&memory).len(), 2, "small reads are cheap there");
+        assert!(line(1 << 30, 100).span(&file).len() > MAX_JOINED / 2);
+    }
+
+    #[test]
+    fn lines_are_the_same_read_in_pieces_or_sample_by_sample() {
+        const SAMPLES: usize = 50_000; // more than a piece where they are 8 bytes apart
+        for pitch in [2, 8, 20] {
+            let numbers = |i: usize| (i as u16).to_le_bytes().into_iter().chain([0; 18]).take(pitch);
+            let stored: Vec<u8> = (0..SAMPLES).flat_map(numbers).collect();
+            let forwards: Vec<u8> = (0..SAMPLES).flat_map(|i| (i as u16).to_le_bytes()).collect();
+            let backwards: Vec<u8> = (0..SAMPLES).rev().flat_map(|i| (i as u16).to_le_bytes()).collect();
+            let last = ((SAMPLES - 1) * pitch) as u64;
+            for bytes in both(&stored) {
+                for (from, stride, expected) in [(0, pitch as i64, &forwards), (last, -(pitch as i64), &backwards)] {
+                    let line = Line { samples: SAMPLES, size: 2, stride, out_stride: 2 };
+                    let mut found = vec![0; 2 * SAMPLES];
+                    line.copy(&bytes, from, &mut line.span(&bytes), &mut found).expect("reading");
+                    assert!(found == *expected, "{pitch} bytes apart, from {from}");
+                }
             }
         }
     }
