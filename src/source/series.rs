@@ -99,7 +99,7 @@ impl Series {
         if frames == files.times.len() {
             self.archive.times.clone_from(&files.times);
         } else if let Some(path) = timed_otherwise {
-            self.drop_times(format!("{} has times of another unit or start than the first file", path.display()));
+            self.drop_times(&format!("{} has times of another unit or start than the first file", path.display()));
         }
         if self.archive.times.len() != frames {
             self.archive.times.clear();
@@ -113,7 +113,7 @@ impl Series {
     fn check_times(&mut self) {
         let times = &self.archive.times;
         if !times.iter().all(|t| t.is_finite()) {
-            self.drop_times("times are not all finite".into());
+            self.drop_times("times are not all finite");
         } else if times.windows(2).any(|t| t[1] <= t[0]) {
             let what = "the times do not ascend; frames are taken in the order of the files, or of the list of them";
             note_once(&mut self.archive.notes, what.into());
@@ -121,7 +121,7 @@ impl Series {
     }
 
     /// Leaves times out, and their unit, since numbers of frames are in none.
-    fn drop_times(&mut self, why: String) {
+    fn drop_times(&mut self, why: &str) {
         self.archive.times.clear();
         self.archive.units.times = None;
         note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));

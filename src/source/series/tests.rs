@@ -65,8 +65,11 @@ fn what_a_file_says_otherwise_than_the_first_is_refused_or_noted() {
 fn files_follow_one_another_in_the_same_units() {
     let shape = Shape::new(DIMS, SampleType::U8).expect("small");
     let plain = || Described { times: vec![1.0], ..Described::plain(shape, Vec::new()) };
-    let units =
-        |samples: &str, times: &str| Units { samples: Some(samples.into()), times: Some(times.into()), space: None };
+    let units = |samples: &str, times: &str| Units {
+        samples: Some(samples.into()),
+        times: Some(times.into()),
+        ..Units::default()
+    };
     let first = Described { units: units("K", "hours since 2020-01-01"), missing: Some(-1.0), ..plain() };
     let later = |units| Described { units, missing: Some(-1.0), ..plain() };
     let refusal = |file: &Described| file.follows(&first, "a").expect_err("another");
