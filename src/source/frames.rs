@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn samples_far_apart_are_read_alone_and_near_ones_in_bounded_pieces() {
         let line = |samples, stride| Line { samples, size: 2, stride, out_stride: 2 };
-        let [file, memory] = both(&[]);
+        let [file, memory] = both(&[0]);
         for bytes in [&file, &memory] {
             assert_eq!(line(1 << 30, 1 << 20).span(bytes).len(), 2, "one sample");
             assert!(line(1 << 30, -8).span(bytes).len() <= MAX_JOINED, "a piece");
