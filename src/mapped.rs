@@ -60,6 +60,12 @@ impl State {
         };
         Err(Error::Changed { path: path.into(), what: format!("changed while it was being read: {what}") })
     }
+
+    /// An error if what has this name is no longer in this state.
+    pub fn check_path(&self, path: &Path) -> Result<()> {
+        let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
+        self.check(path, &Self::of(&now))
+    }
 }
 
 /// An open file, and its state as it was at open.
@@ -144,8 +150,7 @@ impl FileBytes {
 
     /// An error if what has the file's name is no longer in the state that the file had at open.
     pub fn check_unchanged(&self) -> Result<()> {
-        let now = self.path.metadata().map_err(|e| Error::io(&self.path, "checking", e))?;
-        self.state.check(&self.path, &State::of(&now))
+        self.state.check_path(&self.path)
     }
 }
 

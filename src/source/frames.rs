@@ -5,12 +5,12 @@ use super::Parsed;
 use super::described::Stored;
 use super::held::Held;
 use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
+use crate::mapped::{FileBytes, State};
 use crate::output::STANDARD;
 use crate::sample::{SampleType, swap_endian};
 use crate::volume::Region;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Reads that lie closer together than this are joined, since the system reads whole pages anyway.
@@ -71,8 +71,8 @@ impl std::fmt::Display for Shape {
 pub(super) enum Bytes {
     /// In a file as they are.
     File(FileBytes),
-    /// Taken from a file or a stream.
-    Held { data: Arc<Held>, file: Option<Arc<FileBytes>> },
+    /// Taken from a file, which was in a state, or from a stream. The file is not kept open: a window may be of many.
+    Held { data: Arc<Held>, file: Option<(PathBuf, State)> },
 }
 
 impl Bytes {
@@ -90,10 +90,17 @@ impl Bytes {
         }
     }
 
-    fn file(&self) -> Option<&FileBytes> {
+    fn path(&self) -> &Path {
         match self {
-            Self::File(file) => Some(file),
-            Self::Held { file, .. } => file.as_deref(),
+            Self::File(file) => file.path(),
+            Self::Held { file, .. } => file.as_ref().map_or(Path::new(STANDARD), |(path, _)| path),
+        }
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        match self {
+            Self::File(file) => file.check_unchanged(),
+            Self::Held { file, .. } => file.as_ref().map_or(Ok(()), |(path, state)| state.check_path(path)),
         }
     }
 }
@@ -144,7 +151,7 @@ impl FrameWindow for Frames {
     }
 
     fn check_unchanged(&self) -> Result<()> {
-        self.bytes.iter().filter_map(|(bytes, _)| bytes.file()).try_for_each(FileBytes::check_unchanged)
+        self.bytes.iter().try_for_each(|(bytes, _)| bytes.check_unchanged())
     }
 }
 
@@ -168,10 +175,7 @@ impl Frames {
         } else {
             copy_strided(bytes, frame.offset, &stored.strides.voxel, region, size, out)
         };
-        read.map_err(|e| {
-            let path = bytes.file().map_or(Path::new(STANDARD), FileBytes::path);
-            Error::io(path, format!("reading {}", frame.name), e)
-        })?;
+        read.map_err(|e| Error::io(bytes.path(), format!("reading {}", frame.name), e))?;
         if stored.big_endian {
             swap_endian(stored.sample, out);
         }

@@ -5,23 +5,52 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A fixed number of bytes, zero at first.
 #[derive(Debug)]
 pub(super) enum Held {
     Memory(Vec<u8>),
-    /// A temporary file without a name.
-    Spool(File),
+    /// In a temporary file, from a byte on.
+    Spool {
+        file: Arc<File>,
+        start: u64,
+        len: u64,
+    },
+}
+
+/// A temporary file without a name, made when it is needed first: a window has one for all that it has no memory for, since
+/// a process may not have one open for each frame.
+#[derive(Debug, Default)]
+pub(super) struct Spool {
+    file: Option<Arc<File>>,
+    len: u64,
+}
+
+impl Spool {
+    /// Room for `bytes` more.
+    fn room(&mut self, bytes: usize) -> io::Result<Held> {
+        let file = match &self.file {
+            Some(file) => file.clone(),
+            None => self.file.insert(Arc::new(tempfile::tempfile()?)).clone(),
+        };
+        let (start, len) = (self.len, bytes as u64);
+        self.len = start.checked_add(len).ok_or(ErrorKind::FileTooLarge)?;
+        file.set_len(self.len)?;
+        Ok(Held::Spool { file, start, len })
+    }
 }
 
 impl Held {
     /// Room for `bytes`, in memory if it may take so many. `name` stands for what they are of in messages.
     pub(super) fn new(bytes: usize, memory: usize, name: &Path) -> Result<Self> {
+        Self::within(bytes, memory, &mut Spool::default(), name)
+    }
+
+    /// As [`Self::new`], with a file that others share.
+    pub(super) fn within(bytes: usize, memory: usize, spool: &mut Spool, name: &Path) -> Result<Self> {
         if bytes > memory {
-            let failed = |e| Error::io(std::env::temp_dir(), "making a temporary file", e);
-            let file = tempfile::tempfile().map_err(failed)?;
-            file.set_len(bytes as u64).map_err(failed)?;
-            return Ok(Self::Spool(file));
+            return spool.room(bytes).map_err(|e| Error::io(std::env::temp_dir(), "making a temporary file", e));
         }
         let mut held = Vec::new();
         let full = |_| Error::io(name, format!("holding {bytes} bytes"), ErrorKind::OutOfMemory.into());
@@ -39,7 +68,7 @@ impl Held {
     pub(super) fn write_at(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Memory(held) => held[at as usize..][..bytes.len()].copy_from_slice(bytes),
-            Self::Spool(file) => file.write_all_at(bytes, at)?,
+            Self::Spool { file, start, len } => file.write_all_at(bytes, place(*start, *len, at, bytes.len())?)?,
         }
         Ok(())
     }
@@ -48,9 +77,15 @@ impl Held {
     pub(super) fn read_at(&self, at: u64, out: &mut [u8]) -> io::Result<()> {
         match self {
             Self::Memory(held) => wavesplat_format::Storage::read_at(held.as_slice(), at, out),
-            Self::Spool(file) => file.read_exact_at(out, at),
+            Self::Spool { file, start, len } => file.read_exact_at(out, place(*start, *len, at, out.len())?),
         }
     }
+}
+
+/// Where bytes of a part of a file are, which must be there: what comes after is of others.
+fn place(start: u64, len: u64, at: u64, bytes: usize) -> io::Result<u64> {
+    let is_there = at.checked_add(bytes as u64).is_some_and(|end| end <= len);
+    if is_there { Ok(start + at) } else { Err(ErrorKind::UnexpectedEof.into()) }
 }
 
 /// Some bytes, or none at the end.
@@ -60,5 +95,25 @@ pub(super) fn read_some(reader: &mut dyn Read, out: &mut [u8]) -> io::Result<usi
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
             result => return result,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shares_a_file_stays_apart() {
+        let (mut spool, name) = (Spool::default(), Path::new("a"));
+        let mut held = [3, 5].map(|bytes| Held::within(bytes, 0, &mut spool, name).expect("room"));
+        held[1].write_at(0, b"vwxyz").expect("writing");
+        held[0].write_at(1, b"bc").expect("writing");
+        let (mut first, mut second) = ([1; 3], [1; 2]);
+        held[0].read_at(0, &mut first).expect("reading");
+        held[1].read_at(3, &mut second).expect("reading");
+        assert_eq!((&first, &second), (b"\0bc", b"yz"));
+        assert!(held[0].read_at(1, &mut first).is_err() && held[0].write_at(2, b"de").is_err(), "of the other");
+        let files = held.map(|held| if let Held::Spool { file, .. } = held { file } else { panic!("in memory") });
+        assert!(Arc::ptr_eq(&files[0], &files[1]));
     }
 }

@@ -157,6 +157,13 @@ pub trait FrameSource: Send {
     ///
     /// Streams can only go forward: `first` must be where the last window ended, or later.
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>>;
+
+    /// As [`Self::window`], of every `step`-th frame from `first`, `count` of them. Sources that can do so leave those between
+    /// unread.
+    fn window_of(&mut self, first: usize, count: usize, step: usize) -> Result<Box<dyn FrameWindow>> {
+        let window = self.window(first, (count.max(1) - 1) * step + 1)?;
+        Ok(select::stepped(window, count, step))
+    }
 }
 
 /// The samples of a region of some frames of a window, frame after frame, each of `ty.size()` bytes.

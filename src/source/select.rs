@@ -45,26 +45,53 @@ impl FrameSource for Selected {
 
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         let Selection { first: start, step, region, .. } = self.selection;
-        let window = self.source.window(start + first * step, (count.max(1) - 1) * step + 1)?;
-        let frames = window.frames().div_ceil(step).min(count);
-        Ok(Box::new(SelectedWindow { window, frames, step, region }))
+        let window = self.source.window_of(start + first * step, count, step)?;
+        Ok(Box::new(SelectedWindow { window, region }))
     }
 }
 
 struct SelectedWindow {
     window: Box<dyn FrameWindow>,
-    frames: usize,
-    step: usize,
     region: Region,
 }
 
 impl FrameWindow for SelectedWindow {
     fn frames(&self) -> usize {
+        self.window.frames()
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        self.window.read_box(frame, &region.moved_by(self.region.start), out)
+    }
+
+    fn name(&self, frame: usize) -> String {
+        self.window.name(frame)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        self.window.check_unchanged()
+    }
+}
+
+/// Every `step`-th frame of a window from its first, at most `count` of them.
+pub(super) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
+    let frames = window.frames().div_ceil(step).min(count);
+    Box::new(SteppedWindow { window, frames, step })
+}
+
+struct SteppedWindow {
+    window: Box<dyn FrameWindow>,
+    frames: usize,
+    step: usize,
+}
+
+impl FrameWindow for SteppedWindow {
+    fn frames(&self) -> usize {
         self.frames
     }
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        self.window.read_box(frame * self.step, &region.moved_by(self.region.start), out)
+        self.window.read_box(frame * self.step, region, out)
     }
 
     fn name(&self, frame: usize) -> String {

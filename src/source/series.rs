@@ -2,7 +2,7 @@
 
 use super::described::{At, Described, Files, Part};
 use super::frames::{Bytes, Frame, Frames, Shape};
-use super::held::Held;
+use super::held::{Held, Spool};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
@@ -127,35 +127,34 @@ impl Series {
         note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));
     }
 
-    /// Adds some frames of a part to a window.
-    fn add(&mut self, part: usize, wanted: Range<usize>, window: &mut Frames) -> Result<()> {
+    /// Adds some frames of a part, ascending, to a window.
+    fn add(&mut self, part: usize, wanted: &[usize], (window, spool): (&mut Frames, &mut Spool)) -> Result<()> {
         let Part { path, state, at, .. } = &self.parts[part];
-        let access = if matches!(at, At::Byte(_)) { self.access } else { Access::Read };
-        let file = FileBytes::open(path, access)?;
-        state.check(path, &file.state())?;
+        let (path, state) = (path.clone(), *state);
         let together = match at {
             At::Byte(start) => {
+                let file = FileBytes::open(&path, self.access)?;
+                state.check(&path, &file.state())?;
                 self.push(part, (0, *start), wanted, Bytes::File(file), window);
                 return Ok(());
             }
             At::Decoded(decoder) => decoder.together(),
         };
-        let file = Some(Arc::new(file));
-        let mut next = wanted.start;
-        while next < wanted.end {
-            let first = next - next % together;
-            let end = (first + together).min(wanted.end);
-            let data = self.decoded(part, first, together, window)?;
-            self.push(part, (first, 0), next..end, Bytes::Held { data, file: file.clone() }, window);
-            next = end;
+        state.check_path(&path)?;
+        for wanted in wanted.chunk_by(|a, b| a / together == b / together) {
+            let first = wanted[0] - wanted[0] % together;
+            let room = self.memory.saturating_sub(window.memory());
+            let data = self.decoded(part, (first, together), room, spool)?;
+            let file = Some((path.clone(), state));
+            self.push(part, (first, 0), wanted, Bytes::Held { data, file }, window);
         }
         Ok(())
     }
 
     /// Adds frames that are in some bytes, where the part's frame `first` begins at `start`.
-    fn push(&self, part: usize, (first, start): (usize, u64), frames: Range<usize>, bytes: Bytes, window: &mut Frames) {
+    fn push(&self, part: usize, (first, start): (usize, u64), frames: &[usize], bytes: Bytes, window: &mut Frames) {
         let Part { path, stored, frames: all, .. } = &self.parts[part];
-        for index in frames {
+        for &index in frames {
             let path = path.display();
             let name = if *all == 1 { path.to_string() } else { format!("{path}, frame {index}") };
             let offset = start + stored.strides.first + (index - first) as u64 * stored.strides.frame;
@@ -164,15 +163,21 @@ impl Series {
         window.bytes.push((bytes, stored.clone()));
     }
 
-    /// The frames of a part from `first` on that are packed together.
-    fn decoded(&mut self, part: usize, first: usize, together: usize, window: &Frames) -> Result<Arc<Held>> {
+    /// The frames of a part from `first` on that are packed together, in memory if there is `room`.
+    fn decoded(
+        &mut self,
+        part: usize,
+        (first, together): (usize, usize),
+        room: usize,
+        spool: &mut Spool,
+    ) -> Result<Arc<Held>> {
         if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
             return Ok(last.data.clone());
         }
         self.last = None;
         let Part { path, frames, stored, at, .. } = &mut self.parts[part];
         let At::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
-        let mut data = Held::new(stored.bytes, self.memory.saturating_sub(window.memory()), path)?;
+        let mut data = Held::within(stored.bytes, room, spool, path)?;
         decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
         let data = Arc::new(data);
         if together > 1 {
@@ -190,6 +195,12 @@ impl Series {
         }
     }
 
+    /// Those of some frames that a part holds, counted from its first.
+    fn wanted(&self, part: usize, frames: impl Iterator<Item = usize>) -> Vec<usize> {
+        let (start, held) = (self.starts[part], self.parts[part].frames);
+        frames.filter_map(|frame| frame.checked_sub(start)).take_while(|index| *index < held).collect()
+    }
+
     /// The parts that hold frames of a range.
     fn parts_of(&self, frames: &Range<usize>) -> Range<usize> {
         let first = self.starts.partition_point(|s| *s <= frames.start).saturating_sub(1);
@@ -203,16 +214,23 @@ impl FrameSource for Series {
     }
 
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
+        self.window_of(first, count, 1)
+    }
+
+    fn window_of(&mut self, first: usize, count: usize, step: usize) -> Result<Box<dyn FrameWindow>> {
         let all = self.archive.frames.unwrap_or(0);
-        let Some(end) = first.checked_add(count).filter(|end| *end <= all) else {
+        let span = count.checked_sub(1).map_or(Some(0), |gaps| gaps.checked_mul(step)?.checked_add(1));
+        let Some(end) = span.and_then(|span| first.checked_add(span)).filter(|end| *end <= all) else {
             return Err(Error::usage(format!("{count} frame(s) from {first} were asked for, but there are {all}")));
         };
         let mut window = Frames { shape: self.shape, bytes: Vec::new(), frames: Vec::new() };
+        let mut spool = Spool::default();
         let parts = if count == 0 { 0..0 } else { self.parts_of(&(first..end)) };
         for part in parts.clone() {
-            let start = self.starts[part];
-            let wanted = first.saturating_sub(start)..(end - start).min(self.parts[part].frames);
-            self.add(part, wanted, &mut window)?;
+            let wanted = self.wanted(part, (first..end).step_by(step));
+            if !wanted.is_empty() {
+                self.add(part, &wanted, (&mut window, &mut spool))?;
+            }
         }
         self.rest(parts.start..parts.end.saturating_sub(1).max(parts.start));
         Ok(Box::new(window))

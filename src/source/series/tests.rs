@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::sample::SampleType;
-use crate::source::described::{Units, Unlike};
+use crate::source::described::{Decode, Stored, Units, Unlike};
 use crate::source::open;
 use crate::source::testing::{DIMS, Folder, message, payload, refused};
+use std::sync::Mutex;
 
 fn raw() -> OpenOptions {
     OpenOptions { dims: Some(DIMS.into()), sample: Some(SampleType::U8), ..OpenOptions::default() }
@@ -32,6 +33,62 @@ fn windows_cross_files_of_several_frames() {
     }
     assert!(source.window(4, 2).expect("window").name(0).ends_with("f2.nrrd, frame 2"));
     assert!(message(source.window(usize::MAX, 2)).contains("there are 6"));
+}
+
+/// Stands for frames that are decoded one at a time, and remembers which were.
+#[derive(Debug)]
+struct Counted(Arc<Mutex<Vec<usize>>>);
+
+impl Decode for Counted {
+    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+        self.0.lock().expect("no panic").push(frames.start);
+        out.write_at(0, &payload(SampleType::U8, frames, false)).expect("room");
+        Ok(())
+    }
+}
+
+#[test]
+fn frames_that_are_stepped_over_are_not_decoded_and_spooled_ones_share_a_file() {
+    let folder = Folder::new();
+    let file = folder.write("a.raw", payload(SampleType::U8, 0..40, false));
+    let options = OpenOptions { dims: Some([&DIMS[..], &[40]].concat()), memory: 210, ..raw() };
+    let mut series = Series::open(&Files { paths: vec![file], ..Files::default() }, &options).expect("opening");
+    let decoded = Arc::new(Mutex::new(Vec::new()));
+    let part = &mut series.parts[0];
+    part.at = At::Decoded(Box::new(Counted(decoded.clone())));
+    part.stored = Stored::plain(&series.shape, 1, false).expect("small");
+    let window = series.window_of(2, 5, 7).expect("window");
+    assert_eq!(*decoded.lock().expect("no panic"), [2, 9, 16, 23, 30]);
+    assert_eq!(window.frames(), 5);
+    for frame in 0..5 {
+        let mut found = vec![0; 105];
+        window.read_box(frame, &Grid::unit(DIMS).whole(), &mut found).expect("reading");
+        let index = 2 + 7 * frame;
+        assert_eq!(found, payload(SampleType::U8, index..index + 1, false));
+        assert!(window.name(frame).ends_with(&format!("frame {index}")));
+    }
+    assert!(series.window_of(2, 7, 7).is_err() && series.window_of(1, usize::MAX, 2).is_err(), "beyond the end");
+}
+
+#[test]
+fn steps_cross_files() {
+    let folder = Folder::new();
+    let files = [(0, 2), (2, 1), (3, 4)].map(|(first, count)| {
+        let bytes = payload(SampleType::U8, first..first + count, false);
+        folder.write(&format!("f{first}.nrrd"), nrrd(&format!("7 5 3 {count}"), &bytes))
+    });
+    let options = OpenOptions { allow_gaps: true, ..OpenOptions::default() };
+    let mut source = open(&files, &options).expect("opening");
+    for (first, count, step) in [(0, 3, 3), (1, 3, 2), (1, 2, 5), (6, 1, 9), (7, 0, 4)] {
+        let window = source.window_of(first, count, step).expect("window");
+        assert_eq!(window.frames(), count);
+        for frame in 0..count {
+            let mut found = vec![0; 105];
+            window.read_box(frame, &Grid::unit(DIMS).whole(), &mut found).expect("reading");
+            let index = first + step * frame;
+            assert_eq!(found, payload(SampleType::U8, index..index + 1, false), "{first}, {step}");
+        }
+    }
 }
 
 #[test]
