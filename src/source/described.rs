@@ -1,9 +1,8 @@
 //! What input files say of themselves, in the same words for every format.
 
 use super::Parsed;
-use super::frames::Shape;
 use super::held::Held;
-use super::layout::{Layout, Strides};
+use super::layout::{Layout, Shape, Strides};
 use super::packing::Packing;
 use crate::error::{Error, Result};
 use crate::mapped::{FileBytes, State};

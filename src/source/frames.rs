@@ -1,13 +1,13 @@
 //! A window of frames as bytes at known places: the one way in which every format copies boxes out.
 
 use super::FrameWindow;
-use super::Parsed;
 use super::described::Stored;
 use super::held::Held;
+use super::layout::Shape;
 use crate::error::{Error, Result};
 use crate::mapped::{FileBytes, State};
 use crate::output::STANDARD;
-use crate::sample::{SampleType, swap_endian};
+use crate::sample::swap_endian;
 use crate::volume::Region;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,50 +21,6 @@ const WASTE: usize = 8;
 const MAX_JOINED: usize = 4 << 20;
 /// Nor one of samples that are apart where small reads are cheap: it stays in a processor's cache.
 const MAX_SPAN: usize = 64 << 10;
-
-/// The voxels and the sample type of every frame of an archive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
-    dims: [usize; 3],
-    sample: SampleType,
-    frame_bytes: usize,
-}
-
-impl Shape {
-    /// Refuses empty frames and those whose bytes cannot be addressed, with the reason.
-    pub(super) fn new(dims: [usize; 3], sample: SampleType) -> Parsed<Self> {
-        let [x, y, z] = dims;
-        if dims.contains(&0) {
-            return Err(format!("a frame of {x}x{y}x{z} voxels is empty"));
-        }
-        let voxels = x.checked_mul(y).and_then(|n| n.checked_mul(z));
-        let bytes = voxels.and_then(|n| n.checked_mul(sample.size())).filter(|n| isize::try_from(*n).is_ok());
-        let frame_bytes = bytes.ok_or_else(|| format!("a frame of {x}x{y}x{z} voxels is too large"))?;
-        Ok(Self { dims, sample, frame_bytes })
-    }
-
-    /// Voxels along x, y, z.
-    pub(super) fn dims(&self) -> [usize; 3] {
-        self.dims
-    }
-
-    /// The type of the samples.
-    pub(super) fn sample(&self) -> SampleType {
-        self.sample
-    }
-
-    /// Bytes of one frame.
-    pub(super) fn frame_bytes(&self) -> usize {
-        self.frame_bytes
-    }
-}
-
-impl std::fmt::Display for Shape {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let [x, y, z] = self.dims;
-        write!(f, "{x}x{y}x{z} {} samples", self.sample)
-    }
-}
 
 /// Where the bytes of some frames are.
 #[derive(Debug)]
@@ -133,7 +89,7 @@ impl FrameWindow for Frames {
     }
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        let Shape { dims, sample, .. } = self.shape;
+        let (dims, sample) = (self.shape.dims(), self.shape.sample());
         assert!(Region { start: [0; 3], end: dims }.contains(region), "{region:?} is not inside {dims:?}");
         assert_eq!(out.len(), region.voxels() * sample.size(), "bytes of {region:?}");
         let Some(packing) = &self.bytes[self.frames[frame].bytes].1.packing else {
@@ -169,7 +125,7 @@ impl Frames {
     fn read_stored(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
         let frame = &self.frames[frame];
         let (bytes, stored) = &self.bytes[frame.bytes];
-        let (dims, size) = (self.shape.dims, stored.sample.size());
+        let (dims, size) = (self.shape.dims(), stored.sample.size());
         let read = if stored.strides.is_plain(dims, size) {
             Rows::new(dims, region, size).copy(bytes, frame.offset, out)
         } else {
@@ -328,6 +284,7 @@ fn flattened(dims: [usize; 3], region: &Region) -> ([usize; 3], Region) {
 mod tests {
     use super::super::testing::{DIMS, check_window, payload};
     use super::*;
+    use crate::sample::SampleType;
     use crate::source::layout::{Axis, Counts, Layout, Strides};
     use crate::source::packing::Packing;
 

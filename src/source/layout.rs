@@ -1,6 +1,51 @@
-//! How the samples of some frames lie in an array: axes in any order and direction.
+//! What a frame is made of, and how the samples of some frames lie in an array: axes in any order and direction.
 
 use super::Parsed;
+use crate::sample::SampleType;
+
+/// The voxels and the sample type of every frame of an archive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape {
+    dims: [usize; 3],
+    sample: SampleType,
+    frame_bytes: usize,
+}
+
+impl Shape {
+    /// Refuses empty frames and those whose bytes cannot be addressed, with the reason.
+    pub(super) fn new(dims: [usize; 3], sample: SampleType) -> Parsed<Self> {
+        let [x, y, z] = dims;
+        if dims.contains(&0) {
+            return Err(format!("a frame of {x}x{y}x{z} voxels is empty"));
+        }
+        let voxels = x.checked_mul(y).and_then(|n| n.checked_mul(z));
+        let bytes = voxels.and_then(|n| n.checked_mul(sample.size())).filter(|n| isize::try_from(*n).is_ok());
+        let frame_bytes = bytes.ok_or_else(|| format!("a frame of {x}x{y}x{z} voxels is too large"))?;
+        Ok(Self { dims, sample, frame_bytes })
+    }
+
+    /// Voxels along x, y, z.
+    pub(super) fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// The type of the samples.
+    pub(super) fn sample(&self) -> SampleType {
+        self.sample
+    }
+
+    /// Bytes of one frame.
+    pub(super) fn frame_bytes(&self) -> usize {
+        self.frame_bytes
+    }
+}
+
+impl std::fmt::Display for Shape {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.dims;
+        write!(f, "{x}x{y}x{z} {} samples", self.sample)
+    }
+}
 
 /// What an axis counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,9 @@
 //! Files as one archive: whatever the format, a file comes down to frames at known places, or to frames that are decoded.
 
 use super::described::{At, Described, Files, Part};
-use super::frames::{Bytes, Frame, Frames, Shape};
+use super::frames::{Bytes, Frame, Frames};
 use super::held::{Held, Spool};
+use super::layout::Shape;
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};

@@ -2,8 +2,9 @@
 
 use super::described::Stored;
 use super::formats::{self, Format, npy, raw};
-use super::frames::{Bytes, Frame, Frames, Shape};
+use super::frames::{Bytes, Frame, Frames};
 use super::held::{Held, read_some};
+use super::layout::Shape;
 use super::series::{check_grid, override_grid};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};
 use crate::error::{Error, Result};

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::OpenOptions;
 use crate::source::described::{Described, Part, check_size};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use std::path::Path;
 
 /// The frames that `--dims` and `--dtype` describe, and how many of them if `--dims` says so.

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes, State};
 use crate::sample::SampleType;
 use crate::source::described::{At, Described, Part, Stored, Units};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::{OpenOptions, Parsed, numbering};
 use choose::Choice;

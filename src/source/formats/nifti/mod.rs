@@ -12,7 +12,7 @@ use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{At, Described, Part, Stored, Units, check_size, head};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::packing::Packing;
 use header::{Header, LONGEST};

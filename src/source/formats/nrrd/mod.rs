@@ -15,7 +15,7 @@ use crate::mapped::{Access, FileBytes};
 use crate::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{Described, growing_head};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use axes::Axes;
 use header::Header;

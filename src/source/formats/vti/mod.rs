@@ -13,7 +13,7 @@ use super::directions::{Directions, Placed};
 use crate::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::described::{Described, Stored};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use extent::Extent;
 use header::{Array, Header};

@@ -8,7 +8,7 @@ use super::image::Image;
 use crate::error::{Error, Result};
 use crate::source::described::{At, Part};
 use crate::source::formats::pieces::{self, Pieces};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use std::path::Path;
 
 const MOST: usize = 1 << 14; // pieces: each is compared with every other one

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes};
 use crate::source::Parsed;
 use crate::source::described::{At, Described, Part, Stored};
-use crate::source::frames::Shape;
+use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use header::{Array, Header, sample_type};
 use std::path::Path;
