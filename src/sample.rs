@@ -86,7 +86,7 @@ fn nearest_f16(value: f64) -> f16 {
 }
 
 /// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     assert_eq!(out.len(), values.len() * ty.size(), "bytes of {} samples", values.len());
     macro_rules! run {
@@ -119,7 +119,7 @@ pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
 }
 
 /// Whether any value is missing; all are looked at, as vector code does.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut any = false;
@@ -136,7 +136,7 @@ pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
 }
 
 /// The range of some values; none if any of them is missing. For runs long enough to pay for vector code.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut all = Range::<SIDE_BY_SIDE>::NOTHING;

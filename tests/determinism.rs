@@ -50,7 +50,7 @@ fn threads_change_no_byte_and_no_pixel() {
     }
 }
 
-/// Digests of files, samples and pictures, of every scheme: the same with every kind of vector code (`--cfg portable` has none),
+/// Digests of files, samples and pictures, of every scheme: the same with every kind of vector code (`--features portable` has none),
 /// and on every machine. They change with what a file holds (the program's and zstd's version among that) and how it is
 /// splatted, and then have to be written anew.
 #[test]

@@ -175,7 +175,7 @@ impl Seen {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn look_at_singles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
@@ -183,7 +183,7 @@ fn look_at_singles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn look_at_doubles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         seen.add(decoded, decoded, source, declared);

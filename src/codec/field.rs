@@ -242,12 +242,12 @@ impl<'a> Run<'a> {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn scale(step: f64, codes: &[i32], out: &mut [f64]) {
     out.iter_mut().zip(codes).for_each(|(v, code)| *v = f64::from(*code) * step);
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }

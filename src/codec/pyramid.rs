@@ -154,12 +154,12 @@ struct Refined<'a> {
     pass: &'a Pass,
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_pass<R: Real>(refined: &Refined<'_>, step: R, codes: &[i32], field: &mut [R]) {
     refined.for_each_row(field, |first, nodes, predicted| rows::decode(nodes, predicted, &codes[first..], step));
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &mut [i32], field: &mut [R]) -> bool {
     let mut fits = true;
     refined.for_each_row(field, |first, nodes, predicted| {
@@ -169,7 +169,7 @@ fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &
 }
 
 /// Adds what leaving the pass out changes. Overwrites `field` by what is left.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &mut [R]) {
     refined.for_each_row(field, |_, nodes, predicted| {
         rows::replace(change, nodes, predicted);

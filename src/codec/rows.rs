@@ -120,7 +120,7 @@ pub(super) fn replace<R: Real>(change: &mut Change, nodes: &mut [R], others: &[R
 }
 
 /// Adds the changes from nodes to zeros.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub(super) fn add_changes_to_zero<R: Real>(change: &mut Change, nodes: &[R]) {
     let (nodes, last) = nodes.as_chunks::<LANES>();
     nodes.iter().for_each(|a| (0..LANES).for_each(|l| change.add(l, a[l], R::default())));

@@ -114,7 +114,7 @@ impl Group {
 }
 
 /// Coefficients to codes. False if a code does not fit.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> bool {
     let mut fits = true;
     for (codes, coefficients) in codes.iter_mut().zip(coefficients) {
@@ -149,7 +149,7 @@ fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
 const MOST_COMPARED: usize = 64;
 
 /// Vector code, but a square of comparisons.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     for (k, size) in sizes {
         let mut smaller = [0_i64; LANES];
@@ -163,7 +163,7 @@ fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]])
 }
 
 /// The kept coefficients as the decoder has them, zero where the lane drops one.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_kept((codes, rank): (&[[i32; LANES]], &[[i32; LANES]]), dropped: &[i32; LANES], step: f64, out: &mut [Lane]) {
     for ((out, codes), rank) in out.iter_mut().zip(codes).zip(rank) {
         for l in 0..LANES {
@@ -179,7 +179,7 @@ struct Errors {
     squares: Lane,
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn errors(decoded: &[Lane], source: &[Lane], weight: &[Lane]) -> Errors {
     let mut errors = Errors { largest: Lane::default(), squares: Lane::default() };
     for ((decoded, source), weight) in decoded.iter().zip(source).zip(weight) {

@@ -43,7 +43,7 @@ impl Amounts<'_> {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_scaled<R: Real>(amounts: &[R], factor: f64, sums: &mut [f64]) {
     sums.iter_mut().zip(amounts).for_each(|(sum, amount)| *sum += factor * amount.to_f64());
 }

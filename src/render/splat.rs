@@ -99,7 +99,7 @@ impl Tile {
 }
 
 /// Adds `amount` times the outer product of a row and a column to a plane whose rows are `width` pixels apart.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_to_plane(sums: &mut [f64], width: usize, amount: f64, row: &[f64], column: &[f64]) {
     for (weight, line) in column.iter().zip(sums.chunks_mut(width)) {
         let factor = amount * weight;
@@ -110,7 +110,7 @@ fn add_to_plane(sums: &mut [f64], width: usize, amount: f64, row: &[f64], column
 }
 
 /// The same with an amount for each of a pixel's planes, which lie side by side.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_to_pixels(sums: &mut [f64], width: usize, amounts: &[f64], row: &[f64], column: &[f64]) {
     let count = amounts.len();
     let mut factors = vec![0.0; count];

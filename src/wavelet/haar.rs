@@ -59,7 +59,7 @@ impl TimeBasis for Haar {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn forward(steps: &[Vec<(f64, f64)>], series: &[Lane], coefficients: &mut [Lane]) {
     let mut sums = series.to_vec();
     let mut end = series.len();
@@ -76,7 +76,7 @@ fn forward(steps: &[Vec<(f64, f64)>], series: &[Lane], coefficients: &mut [Lane]
     coefficients[..end].copy_from_slice(&sums);
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn inverse(steps: &[Vec<(f64, f64)>], coefficients: &[Lane], series: &mut [Lane]) {
     series[0] = coefficients[0];
     let mut len = 1;

@@ -98,7 +98,7 @@ impl TimeBasis for Learned {
 }
 
 /// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
     let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();
     let (some_out, last_out) = out.as_chunks_mut::<SIDE_BY_SIDE>();

@@ -59,7 +59,7 @@ impl TimeBasis for Multi {
     }
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
     let mut fine = series.to_vec();
     fine.resize(coefficients.len(), series[series.len() - 1]);
@@ -80,7 +80,7 @@ fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
     coefficients[..3].copy_from_slice(&fine[..3]);
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
     let mut coarse = coefficients.to_vec();
     let mut fine = coarse.clone();

@@ -68,12 +68,13 @@ fn foreign_files_are_refused() {
     work.write("text.wspl", "hello\n".repeat(100));
     for name in ["a.npy", "text.wspl"] {
         let words = [name, "not a wavesplat coefficient file"];
-        work.wavesplat(&format!("info {name}")).fails(3, &words);
         work.wavesplat(&format!("verify {name}")).fails(3, &words);
         work.wavesplat(&format!("extract {name} -o out.npy")).fails(3, &words);
     }
     work.render("text.wspl -o out.npy").fails(3, &["text.wspl", "not a wavesplat coefficient file"]);
     work.render("a.npy -o out.npy").fails(2, &["a.npy", "--method direct"]);
     work.render(". -o out.npy").fails(2, &["--method direct"]);
-    work.wavesplat("info .").fails(3, &["not a regular file"]);
+    work.wavesplat("info text.wspl").fails(3, &["text.wspl", "not a wavesplat coefficient file"]);
+    work.wavesplat("info nothing.npy").fails(1, &["nothing.npy"]);
+    work.wavesplat("verify .").fails(3, &["not a regular file"]);
 }

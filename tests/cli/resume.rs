@@ -112,7 +112,7 @@ fn frames_of_a_growing_archive_are_appended_by_number() {
     work.wavesplat("convert frames -o a.wspl --window 8 --frames 0:16 --region 2:18,:,1:9").ok();
     work.wavesplat("append a.wspl frames --frames 16:").ok();
     work.wavesplat("verify a.wspl --against frames --frames :").ok();
-    work.wavesplat("verify a.wspl --against frames").fails(2, &["--against", "16 frames", "40"]);
+    work.wavesplat("verify a.wspl --against frames").ok(); // all of them, since it has as many
 }
 
 #[test]

@@ -29,14 +29,15 @@ use wavesplat::cli::{
 };
 use wavesplat::colour::TransferFunction;
 use wavesplat::error::{Error, Result};
-use wavesplat::file::CoefficientFile;
+use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::footprint::Kernel;
 use wavesplat::output::{Output, STANDARD};
-use wavesplat::render::annotate::room;
+use wavesplat::render::annotate::{Annotation, room};
 use wavesplat::render::sink::{Depth, Made, PictureFormat, Sink};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
+use wavesplat::source::Archive;
 use wavesplat::volume::Grid;
 use wavesplat_format::Metadata;
 
@@ -203,7 +204,7 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let Opened { mut scene, file, times, colours } = self.scene()?;
+        let Opened { mut scene, file, annotation, colours } = self.scene()?;
         let metadata = file.as_ref().map(|file| file.metadata());
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
@@ -211,8 +212,8 @@ impl Cli {
         let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
-        let made = self.made(scene.as_ref(), &config, (file.as_deref(), &times), &colouring);
-        let mut sinks = self.sinks(&config, targets, &colouring, (&made, times))?;
+        let made = self.made(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
+        let mut sinks = self.sinks(&config, targets, &colouring, (&made, annotation))?;
         let unit = if config.mode.is_projection() { "pictures" } else { "rows of slabs" };
         let progress = self.common.progress("render", unit);
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
@@ -318,9 +319,11 @@ impl Cli {
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { What::Coefficients } else { What::Samples };
-            let (times, colours) = (file.metadata().times.clone(), self.along.of_file(self.colour.range, &file)?);
+            let unit = setting(file.metadata(), "time-units").map(String::from);
+            let annotation = Annotation { times: file.metadata().times.clone(), unit };
+            let colours = self.along.of_file(self.colour.range, &file)?;
             let scene = Box::new(CoefficientScene::new(file.clone(), what));
-            return Ok(Opened { scene, file: Some(file), times, colours });
+            return Ok(Opened { scene, file: Some(file), annotation, colours });
         }
         if self.skip_damaged {
             return Err(Error::usage("--skip-damaged: is for a coefficient file"));
@@ -333,7 +336,8 @@ impl Cli {
         }
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
-        let times = source.archive().times.clone();
+        let Archive { times, units, .. } = source.archive().clone();
+        let annotation = Annotation { times, unit: units.times };
         let missing_value = source.archive().missing_value(self.missing_value);
         let colours = match self.along.colours() {
             Some(name) => {
@@ -353,7 +357,7 @@ impl Cli {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };
-        Ok(Opened { scene: Box::new(scene), file: None, times, colours })
+        Ok(Opened { scene: Box::new(scene), file: None, annotation, colours })
     }
 
     fn config(
@@ -455,8 +459,8 @@ struct Opened {
     scene: Box<dyn Scene>,
     /// The file that it is from.
     file: Option<Arc<CoefficientFile>>,
-    /// Of each frame, or empty.
-    times: Vec<f64>,
+    /// The times of frames.
+    annotation: Annotation,
     /// What samples are turned into, before they are splatted or along the ray.
     colours: Option<TransferFunction>,
 }

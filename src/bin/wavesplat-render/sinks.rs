@@ -39,7 +39,7 @@ impl Cli {
         config: &RenderConfig,
         (pictures, errors): (&Targets, Option<&Targets>),
         colouring: &Colouring,
-        (made, times): (&Made, Vec<f64>),
+        (made, annotation): (&Made, Annotation),
     ) -> Result<Sinks> {
         let Colouring { pixel, of_pictures, of_errors, .. } = colouring;
         let of_pictures = SinkConfig {
@@ -52,7 +52,7 @@ impl Cli {
             colours: of_pictures.clone(),
             depth: self.depth,
             coloured_array: self.colour.is_asked(),
-            annotation: self.colour.annotate.then_some(Annotation { times }),
+            annotation: self.colour.annotate.then_some(annotation),
             force: self.force,
         };
         let Some(errors) = errors else {

@@ -13,22 +13,26 @@ use text::Letters;
 pub struct Annotation {
     /// The time of each frame; where they have none, their numbers are shown.
     pub times: Vec<f64>,
+    /// What times are measured in.
+    pub unit: Option<String>,
 }
 
 impl Annotation {
-    /// What is said of a frame.
-    fn stamp(&self, frame: usize) -> String {
-        match self.times.get(frame) {
-            Some(time) => format!("t = {}", ticks::short(*time)),
-            None => format!("frame {frame}"),
-        }
+    /// What is said of a frame, at length and in short.
+    fn stamps(&self, frame: usize) -> [String; 2] {
+        let Some(time) = self.times.get(frame) else { return [format!("frame {frame}"), format!("{frame}")] };
+        let short = format!("t = {}", ticks::short(*time));
+        // Times since a day differ late in their digits.
+        let unit = self.unit.as_deref().unwrap_or_default();
+        let long = if unit.contains(" since ") { format!("t = {time} {unit}") } else { format!("{short} {unit}") };
+        [long.trim_end().into(), short]
     }
 
     /// Draws the time of `frame` at the top left and, if there is a `scale` to show, a colour bar at the right edge. A row
     /// has `width` pixels.
     pub fn draw(&self, pixels: &mut [Rgb], width: usize, frame: usize, background: Rgb, scale: Option<&Scale>) {
         let mut sheet = Sheet::new(pixels, width, background);
-        let below = sheet.stamp(&self.stamp(frame));
+        let below = sheet.stamp(&self.stamps(frame));
         if let Some(scale) = scale {
             sheet.bar(scale, below);
         }
@@ -87,12 +91,13 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Writes at the top left, if there is room; says where the picture is free below.
-    fn stamp(&mut self, text: &str) -> usize {
+    /// Writes the first of some texts for which there is room at the top left; says where the picture is free below.
+    fn stamp(&mut self, texts: &[String]) -> usize {
         let Self { margin, letters, .. } = *self;
-        if margin + letters.width * text.len() > self.width || margin + letters.height > self.height {
+        let fits = |text: &&String| margin + letters.width * text.len() <= self.width;
+        let Some(text) = texts.iter().find(fits).filter(|_| margin + letters.height <= self.height) else {
             return margin;
-        }
+        };
         self.write(text, margin, margin / 2);
         margin + letters.height
     }
@@ -172,8 +177,12 @@ mod tests {
 
     #[test]
     fn times_are_said_where_there_are_some() {
-        let timed = Annotation { times: vec![0.0, 0.0125, 0.1 + 0.2] };
-        let stamps: Vec<String> = (0..4).map(|frame| timed.stamp(frame)).collect();
-        assert_eq!(stamps, ["t = 0", "t = 0.0125", "t = 0.3", "frame 3"]);
+        let said = |unit: Option<&str>| {
+            let timed = Annotation { times: vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0], unit: unit.map(String::from) };
+            (0..5).map(|frame| timed.stamps(frame)[0].clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(said(None), ["t = 0", "t = 0.0125", "t = 0.3", "t = 1.051956e6", "frame 4"]);
+        assert_eq!(said(Some("s"))[1], "t = 0.0125 s");
+        assert_eq!(said(Some("hours since 1900-01-01"))[3], "t = 1051956 hours since 1900-01-01");
     }
 }

@@ -137,13 +137,13 @@ impl Seen {
 }
 
 /// Whether any number is not zero.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn any(numbers: &[f64]) -> bool {
     numbers.iter().fold(0, |bits, n| bits | (n.to_bits() << 1)) != 0 // of either zero none is left
 }
 
 /// The weighted sums of the cells that a pixel sees, the first one being cell `first` of rows of `width`.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sum_cells(weights: &Weights, cells: &[f64], (first, width): (usize, usize), sums: &mut [f64]) {
     match sums.len() {
         1 => sums.copy_from_slice(&sum_planes::<1>(weights, cells, (first, width))),
@@ -171,7 +171,7 @@ fn sum_planes<const N: usize>(weights: &Weights, cells: &[f64], (first, width): 
 }
 
 /// Of one plane: neighbouring cells are taken together.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sum_plane(weights: &Weights, cells: &[f64], (first, width): (usize, usize)) -> f64 {
     let mut sums = [0.0; LANES];
     for (n, start, weights) in weights.rows() {

@@ -246,7 +246,7 @@ fn correction<R: Real>([uu, uv, vv]: &[R; 3], bends: &[[R; 4]; 2], du: R, dv: R)
 }
 
 /// The weights of all rows; the first cell of the first one is `[du, dv]` before the pixel.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn weigh(kernel: &Kernel, peak: f64, [du, dv]: [f64; 2], out: &mut Weights) {
     let (inverse, bends) = (kernel.inverse.map(|n| n as f32), kernel.bends.map(|bend| bend.map(|n| n as f32)));
     let runs = out.along.len();
@@ -301,7 +301,7 @@ fn blurred(c: &[f64]) -> Vec<f64> {
 }
 
 /// Blurs columns, which become rows.
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn blur_and_turn(gaussian: &[f64], c: &[f64], out: &mut [f64]) {
     for to in 0..SIDE {
         let mut sums = [0.0; SIDE];

@@ -171,7 +171,7 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
 }
 
-#[cfg_attr(not(portable), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn add_block<R: Real>(placed: &Placed, amounts: &[R], sums: &mut [f64], work: &mut Work) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
