@@ -122,9 +122,8 @@ impl File<'_> {
 
     /// Whether a table is for the other program, which may read the same file.
     fn is_of_another(&self, table: &str) -> bool {
-        let (own, commands) =
-            if self.program.has_subcommands() { ("wavesplat", &[][..]) } else { ("wavesplat-render", &COMMANDS[..]) };
-        commands.contains(&table) || PROGRAMS.contains(&table) && table != own
+        let is_program = PROGRAMS.contains(&table) && table != self.program.get_name();
+        is_program || !self.program.has_subcommands() && COMMANDS.contains(&table)
     }
 
     /// An error if no command has an option of this name.

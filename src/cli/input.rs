@@ -130,6 +130,24 @@ pub fn remembered<T: FromStr<Err = String>>(of: &CoefficientFile, name: &str) ->
     setting(of.metadata(), name).map(str::parse).transpose().map_err(parsed)
 }
 
+/// Which frames and voxels of an archive are meant.
+#[derive(Debug, Clone, Args)]
+pub struct SelectArgs {
+    /// Only these frames: a:b, a:b:step, the end left out
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
+    pub frames: Option<FrameRange>,
+    /// Only these voxels: x0:x1,y0:y1,z0:z1
+    #[arg(long, value_name = "BOX", help_heading = "Input")]
+    pub region: Option<RegionSpec>,
+}
+
+impl SelectArgs {
+    /// Narrows an archive to these.
+    pub fn narrow(&self, source: Box<dyn FrameSource>) -> Result<Box<dyn FrameSource>> {
+        narrow(source, self.frames, self.region)
+    }
+}
+
 /// Narrows an archive to some frames and voxels.
 pub fn narrow(
     source: Box<dyn FrameSource>,

@@ -16,7 +16,7 @@ mod values;
 
 pub use colours::{open_colours, stretched, transfer_function};
 pub use generate::{GenerateArgs, Generated};
-pub use input::{InputArgs, narrow, remembered, spare_inputs};
+pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
 pub use program::{command, main};
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};

@@ -3,9 +3,7 @@
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::bound::Bound;
-use wavesplat::cli::{
-    CommonArgs, FrameRange, InputArgs, Pair, RegionSpec, narrow, share, spare_inputs, transfer_function,
-};
+use wavesplat::cli::{CommonArgs, InputArgs, Pair, SelectArgs, share, spare_inputs, transfer_function};
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
@@ -68,12 +66,8 @@ pub(crate) struct ConvertArgs {
     /// For --bound sampled: another seed takes other pixels [default: 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = PROMISE)]
     seed: Option<u64>,
-    /// Only these frames: a:b, a:b:step, the end left out
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
-    frames: Option<FrameRange>,
-    /// Only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX", help_heading = "Input")]
-    region: Option<RegionSpec>,
+    #[command(flatten)]
+    select: SelectArgs,
     #[command(flatten)]
     input: InputArgs,
     /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's file.
@@ -170,7 +164,7 @@ enum MissingName {
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;
     let config = args.config()?;
-    let mut source = narrow(args.input.open(&args.inputs, &args.common)?, args.frames, args.region)?;
+    let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
     spare_inputs(&args.inputs, &args.output)?;
     let config = args.of_archive(config, source.as_mut())?;
     if args.resume && !args.force && args.output.is_file() {
@@ -309,8 +303,8 @@ impl ConvertArgs {
 
     /// What `verify --against` must know to read the same samples again.
     fn settings(&self) -> Vec<(String, String)> {
-        let frames = self.frames.map(|f| ("frames".to_string(), f.to_string()));
-        let region = self.region.map(|r| ("region".to_string(), r.to_string()));
+        let frames = self.select.frames.map(|f| ("frames".to_string(), f.to_string()));
+        let region = self.select.region.map(|r| ("region".to_string(), r.to_string()));
         let variable = self.input.variable.clone().map(|v| ("variable".to_string(), v));
         let axes = self.input.axes.clone().map(|a| ("axes".to_string(), a));
         [frames, region, variable, axes].into_iter().flatten().collect()

@@ -4,7 +4,7 @@ use super::InfoArgs;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
-use wavesplat::cli::{narrow, print};
+use wavesplat::cli::print;
 use wavesplat::convert::estimate::{Estimate, estimate};
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
 use wavesplat::error::{Error, Result};
@@ -42,7 +42,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
         return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
     }
     let source = args.input.open_quietly(&args.inputs, &args.common)?;
-    let mut source = narrow(source, args.frames, args.region)?;
+    let mut source = args.select.narrow(source)?;
     let archive = source.archive().clone();
     let progress = args.common.progress("estimate", "windows");
     let estimated = args

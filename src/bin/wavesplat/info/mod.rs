@@ -5,7 +5,7 @@ mod coefficients;
 
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RegionSpec, share};
+use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, share};
 use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 
@@ -25,12 +25,8 @@ pub(crate) struct InfoArgs {
     /// given]
     #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
     estimate: Option<f64>,
-    /// Of frames: only these, a:b or a:b:step, the end left out
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
-    frames: Option<FrameRange>,
-    /// Of frames: only these voxels, x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX", help_heading = "Input")]
-    region: Option<RegionSpec>,
+    #[command(flatten)]
+    select: SelectArgs,
     #[command(flatten)]
     input: InputArgs,
     #[command(flatten)]
@@ -68,8 +64,8 @@ impl InfoArgs {
     fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
         let given = [
             (self.estimate.is_some(), "--estimate"),
-            (self.frames.is_some(), "--frames"),
-            (self.region.is_some(), "--region"),
+            (self.select.frames.is_some(), "--frames"),
+            (self.select.region.is_some(), "--region"),
         ];
         match given.into_iter().find(|(given, _)| *given) {
             Some((_, name)) => {

@@ -7,27 +7,34 @@ use crate::source::layout::Counts;
 const ORDER: [Counts; 4] = [Counts::Frames, Counts::Voxels(2), Counts::Voxels(1), Counts::Voxels(0)];
 const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];
 
-/// A note on axes that were taken by their order alone; nothing if they say what they count.
-pub(super) fn note(variable: &Variable, all: &[Variable], counts: &[Counts], letters: Option<&str>) -> Option<String> {
-    let known = known(variable, all);
+/// A note on axes that were taken by their order alone, since they are not `known`; nothing if there are none.
+fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Option<String> {
     let guessed = |axis: &usize| known[*axis].is_none() && !matches!(counts[*axis], Counts::Only(_));
-    (0..counts.len()).find(guessed).filter(|_| letters.is_none())?;
+    (0..counts.len()).find(guessed)?;
     let letter = |c: &Counts| ORDER.iter().position(|role| role == c).map_or('c', |at| LETTERS[at]);
     let letters: String = counts.iter().map(letter).collect();
     Some(format!("the axes {:?} are taken as {letters}, slowest first; --axes says otherwise", variable.lengths))
 }
 
-/// What each axis counts, the slowest first; `index` is that of an axis beside space and time, `letters` what the user says.
+/// What each axis counts, the slowest first, and a note on what is guessed; `index` is that of an axis beside space and time,
+/// `letters` what the user says.
 pub(super) fn counts(
     variable: &Variable,
     all: &[Variable],
     index: Option<usize>,
     letters: Option<&str>,
-) -> Parsed<Vec<Counts>> {
-    let guess = match letters {
-        Some(letters) => by_letters(variable, letters)?,
-        None => by_order(variable, known(variable, all), index.is_some()),
+) -> Parsed<(Vec<Counts>, Option<String>)> {
+    let Some(letters) = letters else {
+        let known = known(variable, all);
+        let counts = complete(variable, by_order(variable, known.clone(), index.is_some()), index)?;
+        let note = note(variable, &known, &counts);
+        return Ok((counts, note));
     };
+    Ok((complete(variable, by_letters(variable, letters)?, index)?, None))
+}
+
+/// What is left counts nothing that an archive is continued along: of it the index is taken, or the only one.
+fn complete(variable: &Variable, guess: Vec<Option<Counts>>, index: Option<usize>) -> Parsed<Vec<Counts>> {
     let only = |(axis, counts): (usize, Option<Counts>)| match (counts, variable.lengths[axis], index) {
         (Some(counts), _, _) => Ok(counts),
         (None, 1, _) => Ok(Counts::Only(0)),
@@ -47,12 +54,7 @@ pub(super) fn counts(
 }
 
 fn shown(variable: &Variable) -> String {
-    format!(
-        "variable {} of {} axes {:?}",
-        variable.path.trim_start_matches('/'),
-        variable.lengths.len(),
-        variable.lengths
-    )
+    format!("variable {} of {} axes {:?}", variable.shown(), variable.lengths.len(), variable.lengths)
 }
 
 fn named(variable: &Variable, axis: usize, len: usize) -> String {
@@ -61,7 +63,7 @@ fn named(variable: &Variable, axis: usize, len: usize) -> String {
 }
 
 fn too_many(variable: &Variable, axis: usize, len: usize) -> String {
-    let name = variable.path.trim_start_matches('/');
+    let name = variable.shown();
     format!(
         "{}: axis {} counts neither voxels nor frames; --variable '{name}[0]' takes its first index, --axes with one letter of \
          t z y x (or c for another) for each axis, slowest first, says it otherwise",

@@ -23,7 +23,7 @@ pub(super) struct Choice<'a> {
 
 impl<'a> Choice<'a> {
     fn single(array: &'a Variable) -> Self {
-        Self { path: array.path.trim_start_matches('/').into(), arrays: vec![array], steps: Vec::new() }
+        Self { path: array.shown().into(), arrays: vec![array], steps: Vec::new() }
     }
 
     fn name(&self) -> &str {
@@ -33,21 +33,22 @@ impl<'a> Choice<'a> {
 
 /// The variable of a path, or of a name that only one has; and an index, as of a component.
 pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>, Option<usize>)> {
-    let choices = if given.contains(STEP) { choices(all.iter()) } else { all.iter().map(Choice::single).collect() };
+    let stepped = choices(all.iter());
+    let singles: Vec<_> = all.iter().map(Choice::single).collect();
+    let choices = if given.contains(STEP) { &stepped } else { &singles };
     let find = |name: &str| {
         let mut of_name = choices.iter().filter(|c| c.name() == name);
         let by_path = choices.iter().find(|c| c.path == name.trim_start_matches('/'));
         by_path.or(of_name.next().filter(|_| of_name.next().is_none())).cloned()
     };
     let (name, index) = component::named(given);
-    let stepped = self::choices(all.iter());
     let of_steps = |name: &str| {
         let mut of_name = stepped.iter().filter(|c| c.name() == name && !c.steps.is_empty());
         of_name.next().filter(|_| of_name.next().is_none()).cloned()
     };
     let found = find(given).or_else(|| of_steps(given)).map(|choice| (choice, None));
     let found = found.or_else(|| Some((find(name).or_else(|| of_steps(name))?, index)));
-    found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(&self::choices(all.iter()))))
+    found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(&stepped)))
 }
 
 /// The one variable that can be an archive, or of several the one that is `active`.

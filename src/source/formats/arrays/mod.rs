@@ -20,8 +20,7 @@ use crate::error::{Error, Result};
 use crate::mapped::{Access, FileBytes, State};
 use crate::sample::SampleType;
 use crate::source::described::{At, Described, Part, Stored, Units};
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::{OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
@@ -58,6 +57,14 @@ enum Attribute {
     Numbers(Vec<f64>),
 }
 
+/// The numbers that are said under a name; none where there are no such.
+fn numbers<'a>(attributes: &'a Attributes, name: &str) -> &'a [f64] {
+    match attributes.get(name) {
+        Some(Attribute::Numbers(numbers)) => numbers,
+        _ => &[],
+    }
+}
+
 impl Variable {
     fn text(&self, attribute: &str) -> Option<&str> {
         match self.attributes.get(attribute)? {
@@ -67,14 +74,16 @@ impl Variable {
     }
 
     fn numbers(&self, attribute: &str) -> &[f64] {
-        match self.attributes.get(attribute) {
-            Some(Attribute::Numbers(numbers)) => numbers,
-            _ => &[],
-        }
+        numbers(&self.attributes, attribute)
     }
 
     fn number(&self, attribute: &str) -> Option<f64> {
         self.numbers(attribute).first().copied()
+    }
+
+    /// Its path, as users name it.
+    fn shown(&self) -> &str {
+        self.path.trim_start_matches('/')
     }
 
     /// The last part of its path.
@@ -158,32 +167,34 @@ impl Opener {
 /// Reads what an HDF5 file holds.
 pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<Described> {
     let opener = Opener::new(path, hdf5::open, options);
+    let file = opener.open()?;
     // What the NetCDF library wrote says so, whatever its name is.
-    match opener.open()?.group("/").contains_key("_NCProperties") {
+    match file.group("/").contains_key("_NCProperties") {
         true => describe_netcdf(path, options),
-        false => describe(&opener, path, options),
+        false => describe(&opener, file.as_ref(), path, options),
     }
 }
 
 /// Reads what a NetCDF file holds.
 pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<Described> {
-    describe(&Opener::new(path, netcdf::open, options), path, options)
+    let opener = Opener::new(path, netcdf::open, options);
+    describe(&opener, opener.open()?.as_ref(), path, options)
 }
 
 /// Reads what a Zarr store, a folder, holds.
 #[cfg(feature = "zarr")]
 pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<Described> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    describe(&Opener::new(path, zarr::open, options), &metadata, options)
+    let opener = Opener::new(path, zarr::open, options);
+    describe(&opener, opener.open()?.as_ref(), &metadata, options)
 }
 
-/// Reads what is there; it changes when the file `watched` does.
-fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<Described> {
+/// Reads what is in a file that was opened; it changes when the file `watched` does.
+fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &OpenOptions) -> Result<Described> {
     let (path, state) = (opener.path.as_path(), FileBytes::open(watched, Access::Read)?.state());
-    let file = opener.open()?;
     let refused = |e| Error::input(path, e);
     let mut all = file.variables().map_err(refused)?;
-    let image = vtkhdf::Image::of(file.as_ref(), &all).map_err(refused)?;
+    let image = vtkhdf::Image::of(file, &all).map_err(refused)?;
     if let Some(image) = &image {
         all.clone_from(&image.variables);
     }
@@ -194,7 +205,7 @@ fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<De
     .map_err(refused)?;
     check_steps(path, &choice, options)?;
     let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
-    let context = Context { file: file.as_ref(), all: &all, image, index, axes, spaced };
+    let context = Context { file, all: &all, image, index, axes, spaced };
     let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
     let mut parts = Vec::new();
     for found in &found {
@@ -202,7 +213,7 @@ fn describe(opener: &Opener, watched: &Path, options: &OpenOptions) -> Result<De
         parts.push(found.part((watched, state), chunks).map_err(refused)?);
     }
     let mut described = joined(found, parts).map_err(refused)?;
-    if let Some((times, are_seconds)) = openpmd::times(file.as_ref(), &choice) {
+    if let Some((times, are_seconds)) = openpmd::times(file, &choice) {
         (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
     }
     if choice.arrays.len() > 1 {
@@ -267,16 +278,15 @@ impl Context<'_> {
         let mesh = openpmd::Mesh::of(self.file, variable);
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
-            let path = variable.path.trim_start_matches('/');
+            let path = variable.shown();
             format!("{path} is of type {ty}, which is not supported; integers up to 32 bits and floats are")
         })?;
         if variable.lengths.contains(&0) {
-            let path = variable.path.trim_start_matches('/');
-            return Err(format!("{path} has no samples: its axes are {:?}", variable.lengths));
+            return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths));
         }
-        let counts = axes::counts(&variable, self.all, self.index, self.axes)?;
+        let (counts, guessed) = axes::counts(&variable, self.all, self.index, self.axes)?;
         let mut places = Places::of((self.file, self.all), &variable, &counts, self.spaced);
-        places.notes.extend(axes::note(&variable, self.all, &counts, self.axes));
+        places.notes.extend(guessed);
         let axis = |(i, counts): (usize, &Counts)| match *counts {
             Counts::Only(_) => None,
             counts => Some(Axis { counts, len: variable.lengths[i], backwards: places.is_backwards(counts) }),

@@ -1,7 +1,7 @@
 //! Meshes of openPMD: arrays of an HDF5 file with a lattice of their own, and a time for each iteration.
 
 use super::choose::{Choice, STEP};
-use super::{ArrayFile, Attribute, Attributes, Variable};
+use super::{ArrayFile, Attribute, Attributes, Variable, numbers};
 
 /// What a mesh says of its lattice, in the order of the array's axes.
 pub(super) struct Mesh {
@@ -19,10 +19,7 @@ impl Mesh {
         let attributes =
             Some(variable.attributes.clone()).filter(says).or_else(|| Some(file.group(parent)).filter(says))?;
         let Some(Attribute::Texts(labels)) = attributes.get("axisLabels") else { return None };
-        let numbers = |name: &str| match attributes.get(name) {
-            Some(Attribute::Numbers(numbers)) => numbers.clone(),
-            _ => Vec::new(),
-        };
+        let numbers = |name: &str| numbers(&attributes, name).to_vec();
         let (mut labels, mut spacing, mut first) =
             (labels.clone(), numbers("gridSpacing"), numbers("gridGlobalOffset"));
         if attributes.get("dataOrder") == Some(&Attribute::Text("F".into())) {
@@ -61,14 +58,11 @@ impl Mesh {
 pub(super) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Option<(Vec<f64>, bool)> {
     let (before, _) = choice.path.split_once(STEP)?;
     let group = |variable: &&Variable| {
-        let rest = variable.path.trim_start_matches('/')[before.len()..].find('/').unwrap_or_default();
-        file.group(&variable.path.trim_start_matches('/')[..before.len() + rest])
+        let rest = variable.shown()[before.len()..].find('/').unwrap_or_default();
+        file.group(&variable.shown()[..before.len() + rest])
     };
     let time = |attributes: Attributes| {
-        let number = |name: &str| match attributes.get(name) {
-            Some(Attribute::Numbers(numbers)) => numbers.first().copied(),
-            _ => None,
-        };
+        let number = |name: &str| numbers(&attributes, name).first().copied();
         let second = number("timeUnitSI");
         Some((number("time")? * second.unwrap_or(1.0), second.is_some()))
     };

@@ -41,7 +41,7 @@ impl Values {
         let missing = some_may_be.then_some(f64::NAN);
         if !(packing.scale.is_finite() && packing.offset.is_finite() && packing.scale != 0.0) {
             let what = format!("scale_factor {} and add_offset {} make no numbers", packing.scale, packing.offset);
-            return Err(format!("{}: {what}", variable.path.trim_start_matches('/')));
+            return Err(format!("{}: {what}", variable.shown()));
         }
         Ok(Self { sample: packing.sample(stored), packing: Some(packing), missing, unit })
     }
