@@ -64,28 +64,14 @@
 //! 8. A transform is one replaceable part: [`wavelet::TimeBasis`] is all that the rest knows of it, and a
 //!    [`render::Scene`] turns blocks into amounts of voxels and planes into frames, whatever they are made of.
 
-pub mod bound;
-pub mod camera;
-pub mod cli;
-pub mod codec;
-pub mod colour;
-pub mod convert;
-pub mod error;
-pub mod extract;
-pub mod file;
-pub mod footprint;
-pub mod mapped;
-mod memory;
-pub mod npy;
-pub mod output;
-pub mod progress;
-pub mod recover;
-pub mod render;
-pub mod report;
-pub mod resume;
-pub mod sample;
-mod scan;
+pub mod base;
 pub mod source;
-pub mod verify;
-pub mod volume;
+pub mod colour;
 pub mod wavelet;
+pub mod codec;
+pub mod file;
+pub mod convert;
+pub mod view;
+pub mod render;
+pub mod extract;
+pub mod cli;

@@ -9,13 +9,13 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
 use std::time::Instant;
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
+use wavesplat::codec::bound::Bound;
 use wavesplat::file::CoefficientFile;
-use wavesplat::progress::Silent;
-use wavesplat::sample::SampleType;
-use wavesplat::verify::verify;
-use wavesplat::volume::Grid;
+use wavesplat::file::verify::verify;
 use wavesplat::wavelet::Basis;
 
 #[derive(Debug, Clone)]

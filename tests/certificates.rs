@@ -9,12 +9,12 @@ use crate::common::views::{SKEWED, archive, field, truth, values, view};
 use crate::common::{direct, looking, pictures, rendered, settings, stored};
 use crate::images::{bits, under_less_memory};
 use crate::reference::splat::{BACKGROUND, Images};
-use wavesplat::bound::Bound;
-use wavesplat::camera::View;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, RenderReport, Scene, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 

@@ -7,15 +7,15 @@ use crate::common::{Stored, extracted_channel, looking, pictures, rendered, sett
 use crate::images::{bits, under_less_memory};
 use crate::reference::colour::{Point, colour};
 use crate::reference::splat::Images;
-use wavesplat::bound::Bound;
-use wavesplat::camera::View;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::colour::{Space, TransferFunction};
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
 use wavesplat::source::FrameSource;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
 /// What a colour's rounding to an `f32` may come to, by both ways of computing it.

@@ -4,11 +4,11 @@ use crate::common::memory::Memory;
 use crate::common::random::Random;
 use crate::common::samples::bytes;
 use crate::common::{settings, stored};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
 use wavesplat::codec::encode::Encoder;
 use wavesplat::codec::scheme::{Axis, Basis, Pyramid, Scheme, Stencil};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat_format::{BlockId, EncodedPart};
 
 const EDGE: usize = 24;

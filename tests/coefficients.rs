@@ -6,13 +6,13 @@ use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored, windows};
 use crate::images::{bits, under_less_memory};
-use wavesplat::bound::Bound;
-use wavesplat::camera::View;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
 use wavesplat::source::FrameSource;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 19;

@@ -4,13 +4,13 @@ use crate::common::views::{archive, field, of_reference, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored};
 use crate::images::under_less_memory;
 use crate::reference::ray::{Cut, Rays};
-use wavesplat::camera::{Camera, View};
+use wavesplat::base::error::Error;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::colour::{Space, TransferFunction};
 use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::error::Error;
 use wavesplat::render::{CoefficientScene, Mode, Quantity, RenderConfig, Scene, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::{Camera, View};
 use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 5;

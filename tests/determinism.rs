@@ -7,12 +7,12 @@ use crate::common::{BASES, direct, extracted, looking, pictures, settings, store
 use crate::images::bits;
 use std::path::Path;
 use std::process::Command;
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 use xxhash_rust::xxh3::xxh3_64;
 

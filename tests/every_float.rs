@@ -9,12 +9,12 @@ use rayon::prelude::*;
 use std::ops::{Add, Range};
 use std::path::Path;
 use std::time::Instant;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
 use wavesplat::codec::decode::Block;
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::progress::Silent;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, Reader};
 

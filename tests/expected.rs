@@ -3,10 +3,10 @@
 use crate::common::memory::Memory;
 use crate::common::views::{archive, field, view};
 use crate::common::{Stored, direct, looking, pictures, report, settings, stored, windows};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Coding, ConvertConfig, Space};
 use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 16;

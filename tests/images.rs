@@ -3,11 +3,11 @@
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{MEMORY, direct, looking, pictures, rendered, rendered_if_it_can_be};
 use crate::reference::splat::BACKGROUND;
-use wavesplat::camera::View;
-use wavesplat::error::Error;
+use wavesplat::base::error::Error;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::render::{Quantity, RenderConfig};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::View;
 
 /// Grid, view and tau.
 fn scenes() -> Vec<(Grid, View, f64)> {

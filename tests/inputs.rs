@@ -4,11 +4,11 @@ use crate::common::random::Random;
 use crate::common::times;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use wavesplat::error::Result;
-use wavesplat::mapped::Access;
-use wavesplat::sample::load;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::sample::load;
 use wavesplat::source::{Archive, FrameSource, OpenOptions, open};
-use wavesplat::volume::Grid;
 
 /// A case of `manifest.json`.
 #[derive(Debug, Clone, Deserialize)]

@@ -4,11 +4,11 @@ use crate::common::views::{archive, field, largest, rounding, truth, view};
 use crate::common::{direct, looking, pictures, settings, stored};
 use crate::images::under_less_memory;
 use crate::reference::splat::Images;
-use wavesplat::camera::View;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Coding, ConvertConfig};
 use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, Scene, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 9;

@@ -4,13 +4,13 @@ use crate::common::memory::Memory;
 use crate::common::samples::bytes;
 use crate::common::views::{archive, field, view};
 use crate::common::{looking, pictures, rendered, settings, stored};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
 use wavesplat::codec::decode::Block;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 

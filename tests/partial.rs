@@ -4,11 +4,11 @@ use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::{MEMORY, report, settings, stored};
 use std::path::Path;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::extract::{ExtractConfig, ExtractReport, extract};
-use wavesplat::progress::Silent;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{
     BlockId, BlockStats, Compressor, EncodedBlock, FileId, PartKind, PartStats, Reader, Storage, WindowEnd,

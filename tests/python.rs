@@ -7,13 +7,13 @@ use crate::common::{extracted_channel, report, settings, stored, times};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Coding, ConvertConfig, Space};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 const FILES: usize = 300;

@@ -3,10 +3,10 @@
 use crate::common::views::{rounding, view};
 use crate::common::{looking, pictures, settings, stored};
 use std::path::PathBuf;
-use wavesplat::progress::Silent;
+use wavesplat::base::progress::Silent;
+use wavesplat::file::verify::verify;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, What};
 use wavesplat::source::{FrameSource, OpenOptions, open};
-use wavesplat::verify::verify;
 use wavesplat::wavelet::Basis;
 
 fn plate() -> Option<Box<dyn FrameSource>> {

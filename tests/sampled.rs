@@ -9,13 +9,13 @@ use crate::common::{direct, looking, pictures, settings, stored};
 use crate::reference::camera::Lattice;
 use crate::reference::sampled::{Line, delta};
 use std::io::Write;
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::convert::sampled::pixels;
 use wavesplat::render::{CoefficientScene, Quantity, What};
-use wavesplat::sample::SampleType;
 use wavesplat::source::FrameSource;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 /// The library cuts the kernel at six standard deviations and adds in another order.

@@ -6,14 +6,14 @@ use crate::common::samples::{append, numbers};
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::{Stored, extracted, report, settings, stored, times};
 use crate::reference::decode::{Pyramid, haar, learned, learned_functions, multi, nodes};
-use wavesplat::bound::{Bound, Promise};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
+use wavesplat::codec::bound::{Bound, Promise};
 use wavesplat::codec::decode::Block;
 use wavesplat::codec::scheme::{Axis, Scheme, Stencil, Window};
 use wavesplat::convert::{Coding, ConvertConfig, Space};
 use wavesplat::file::CoefficientFile;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::{Basis, LANES, Lane, basis};
 use wavesplat_format::{BlockEntry, Outliers, PartKind};
 

@@ -5,9 +5,9 @@ use crate::common::memory::Memory;
 use crate::common::random::Random;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::{report, settings, stored, times};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::Unfinished;
 

@@ -10,10 +10,10 @@ use crate::common::samples::bytes;
 use crate::common::{settings, stored};
 use crate::reference::transform::{Matrix, ghm_matrix, haar_matrix, inverse, transpose};
 use crate::reference::truncate::{Measure, fewest};
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::{Coding, ConvertConfig, Space};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 const VOXELS: usize = 64;

@@ -2,13 +2,13 @@
 
 use crate::common::views::{archive, field, view};
 use crate::common::{MEMORY, direct, looking, settings, stored};
-use wavesplat::camera::View;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::error::{Error, Result};
-use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
 const GRID: Grid = Grid { dims: [20, 21, 90], spacing: [1.0, 0.9, 1.1], origin: [5.0, 0.0, -3.0] };

@@ -1,11 +1,11 @@
 //! Transfer functions as options name them.
 
 use super::{CommonArgs, Pair};
+use crate::base::error::{Error, Result};
+use crate::base::output::STANDARD;
 use crate::colour::TransferFunction;
-use crate::error::{Error, Result};
-use crate::output::STANDARD;
-use crate::scan::value_range;
 use crate::source::FrameSource;
+use crate::source::scan::value_range;
 use std::path::{Path, PathBuf};
 
 /// The transfer function of a name, stretched over `range` if one is given. A map that is of no values of its own is stretched

@@ -2,7 +2,7 @@
 //! for the command of its name. They are put before the arguments of the command line, without those that are there too.
 
 use super::advice::chosen;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use std::env;

@@ -1,8 +1,8 @@
 //! What a program can say about itself for others to read: completions of shells, man pages.
 
 use super::print;
-use crate::error::{Error, Result};
-use crate::output::Output;
+use crate::base::error::{Error, Result};
+use crate::base::output::Output;
 use clap::{Command, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;

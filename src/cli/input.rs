@@ -1,12 +1,12 @@
 //! Options that say how an archive is read.
 
 use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::Access;
+use crate::base::output::part_of;
+use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
-use crate::mapped::Access;
-use crate::output::part_of;
-use crate::sample::SampleType;
 use crate::source::{self, FrameSource, OpenOptions, Selection};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};

@@ -21,7 +21,7 @@ pub use program::{command, main};
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use std::io::{self, Write};

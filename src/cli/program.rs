@@ -2,9 +2,9 @@
 
 use super::config::Config;
 use super::{advice, note};
-use crate::error::{Error, Result};
-use crate::mapped;
-use crate::output::abandon;
+use crate::base::error::{Error, Result};
+use crate::base::mapped;
+use crate::base::output::abandon;
 use clap::error::ErrorKind;
 use clap::{Command, Parser};
 use std::env;

@@ -1,7 +1,7 @@
 //! Progress on standard error: a bar for people, lines for programs, or nothing.
 
 use super::lines::Lines;
-use crate::progress::Progress;
+use crate::base::progress::Progress;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 

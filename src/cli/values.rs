@@ -1,7 +1,7 @@
 //! Values of options, parsed once into what they mean.
 
-use crate::error::{Error, Result};
-use crate::volume::{Grid, Region};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{Grid, Region};
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::str::FromStr;

@@ -1,8 +1,8 @@
 //! What the decoder gives, compared with the source: errors, range, and the samples that miss the bound.
 
 use super::WindowCodec;
-use crate::bound::Bound;
-use crate::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType};
+use crate::codec::bound::Bound;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
 
@@ -124,7 +124,7 @@ struct Seen {
     missing: Lane,
     largest: Lane,
     squares: Lane,
-    /// Of [`crate::bound::Promise::add`].
+    /// Of [`crate::codec::bound::Promise::add`].
     sums: Lane,
 }
 
@@ -193,7 +193,7 @@ fn look_at_doubles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bound::Promise;
+    use crate::codec::bound::Promise;
     use crate::codec::scheme::Scheme;
     use crate::wavelet::Basis;
 

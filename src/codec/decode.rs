@@ -5,7 +5,7 @@ use super::buffer::Buffer;
 use super::field::{Field, Plane};
 use super::pyramid::Passes;
 use super::rows::Change;
-use crate::sample;
+use crate::base::sample;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.

@@ -9,7 +9,7 @@ use super::rows::Change;
 use super::truncate::Group;
 use super::weigh::Weighing;
 use super::{WindowCodec, lane_groups};
-use crate::sample;
+use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 use wavesplat_format::{pack_cells, pack_codes, pack_exact, pack_missing, pack_outliers};
 

@@ -3,7 +3,7 @@
 use super::WindowCodec;
 use super::truncate::Group;
 use super::weigh::Weighing;
-use crate::sample;
+use crate::base::sample;
 use crate::wavelet::{LANES, Lane};
 
 /// Which samples of a block are missing, and the largest of the others.

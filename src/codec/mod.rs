@@ -4,6 +4,7 @@
 //! the one decoder that the encoder checks with, and that `extract`, `verify` and the renderer use. A scheme beyond a
 //! transform along time replaces this folder's use of [`crate::wavelet`] and nothing else.
 
+pub mod bound;
 pub mod buffer;
 mod check;
 pub mod decode;
@@ -20,8 +21,8 @@ pub(crate) mod trial;
 mod truncate;
 mod weigh;
 
-use crate::bound::{Promise, difference_up};
-use crate::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType};
+use crate::codec::bound::{Promise, difference_up};
 use crate::wavelet::{self, LANES, TimeBasis};
 use pyramid::Passes;
 use scheme::Scheme;

@@ -10,8 +10,8 @@ use super::rows::Change;
 use super::truncate::Group;
 use super::weigh::Weighing;
 use super::{WindowCodec, lane_groups};
-use crate::bound::Measure;
-use crate::sample;
+use crate::base::sample;
+use crate::codec::bound::Measure;
 use crate::wavelet::LANES;
 use wavesplat_format::{Basis, Outliers, Pyramid};
 

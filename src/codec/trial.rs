@@ -77,10 +77,10 @@ const GAP: usize = 1;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bound::{Bound, Promise};
+    use crate::base::sample::{self, SampleType};
+    use crate::codec::bound::{Bound, Promise};
     use crate::codec::encode::Encoder;
     use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
-    use crate::sample::{self, SampleType};
     use wavesplat_format::BlockId;
 
     const SIZE: [usize; 3] = [20, 18, 16];

@@ -2,7 +2,7 @@
 
 use super::WindowCodec;
 use super::real::Real;
-use crate::bound::Measure;
+use crate::codec::bound::Measure;
 use crate::wavelet::{LANES, Lane};
 
 /// The coefficients of [`LANES`] voxels while they are coded; reused from group to group.

@@ -1,8 +1,8 @@
 //! How much the errors of a block's samples weigh while its coefficients are chosen.
 
 use super::WindowCodec;
-use crate::bound::{self, Bound, Promise};
-use crate::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType};
+use crate::codec::bound::{self, Bound, Promise};
 use crate::wavelet::{LANES, Lane};
 
 /// The weights of a block's errors, with which every bound reads "the measure is at most 1"; and the step that suits them.

@@ -1,7 +1,7 @@
 //! Transfer functions from files.
 
 use super::{TransferFunction, paraview, table};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

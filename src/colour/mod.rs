@@ -17,7 +17,7 @@ use named::Named;
 pub use scale::{Norm, Scale};
 pub use space::Space;
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::path::Path;
 
 /// Red, green and blue, 0 to 1.

@@ -1,7 +1,7 @@
 //! The colours of a picture's pixels.
 
 use super::{Colour, Rgb, TransferFunction};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// How values are spread over the colours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

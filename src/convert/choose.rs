@@ -2,15 +2,15 @@
 
 use super::learn::learned_functions;
 use super::{ConvertConfig, Idle};
-use crate::bound::{Measure, Promise};
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::sample::SampleType;
 use crate::codec::WindowCodec;
+use crate::codec::bound::{Measure, Promise};
 use crate::codec::real::Real;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use crate::codec::trial::{Scratch, Trial};
-use crate::error::{Error, Result};
-use crate::sample::SampleType;
 use crate::source::{Archive, FrameWindow, read_frames};
-use crate::volume::Region;
 use crate::wavelet::Basis;
 use rayon::prelude::*;
 

@@ -1,11 +1,11 @@
 //! How large a conversion would come out, by coding some blocks of some windows.
 
 use super::{ConvertConfig, Plan, Task, convert};
-use crate::error::{Error, Result};
-use crate::progress::{Progress, Silent};
-use crate::scan::{Scan, join_ranges, scan_frame};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::progress::{Progress, Silent};
+use crate::source::scan::{Scan, join_ranges, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, open_stream};
-use crate::volume::{BlockGrid, Grid, Region};
 use serde::Serialize;
 use std::io::{self, Cursor};
 use std::path::Path;

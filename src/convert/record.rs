@@ -1,9 +1,9 @@
 //! The writer's stage: coded blocks into the file, and what their window adds up to.
 
 use super::{Begun, ConvertConfig, ConvertReport, EncodedBatch, Plan, WindowJob};
-use crate::error::{Error, Result};
-use crate::progress::Progress;
-use crate::report::{PromiseReport, WindowReport};
+use crate::base::error::{Error, Result};
+use crate::base::progress::Progress;
+use crate::file::report::{PromiseReport, WindowReport};
 use crossbeam::channel::Receiver;
 use std::io::Write;
 use std::path::Path;

@@ -5,11 +5,11 @@
 //! of every series in the window is their root mean square. Pixels darker than the mean may be off by more than the
 //! tolerance, and so may single frames: the sum over time alone is bounded (eq 13).
 
-use crate::error::Result;
-use crate::footprint::{Kernel, Method};
-use crate::sample::{self, SampleType};
+use crate::base::error::Result;
+use crate::base::grid::{Grid, Region};
+use crate::base::sample::{self, SampleType};
 use crate::source::FrameWindow;
-use crate::volume::{Grid, Region};
+use crate::view::footprint::{Kernel, Method};
 use rayon::prelude::*;
 use std::ops::Range;
 use xxhash_rust::xxh3::xxh3_64_with_seed;

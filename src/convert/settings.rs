@@ -1,7 +1,7 @@
 //! What a file remembers of how it was made: enough to verify it against its source, and to append to it.
 
 use super::{Coding, ConvertConfig, MissingPolicy, Space};
-use crate::bound::Bound;
+use crate::codec::bound::Bound;
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::setting;

@@ -1,7 +1,7 @@
 //! What is coded: the samples of an archive, or three channels of their colours.
 
 use super::ConvertConfig;
-use crate::sample;
+use crate::base::sample;
 use crate::source::{Archive, Painter};
 
 /// A conversion in terms of the samples that are coded.

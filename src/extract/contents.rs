@@ -1,10 +1,10 @@
 //! What is extracted, in words for which every format has some place.
 
 use super::ExtractConfig;
+use crate::base::grid::Grid;
+use crate::base::sample::{SampleType, missing_value, round_to};
 use crate::file::{CoefficientFile, setting};
-use crate::sample::{SampleType, missing_value, round_to};
 use crate::source::CHANNELS;
-use crate::volume::Grid;
 
 /// How far a regular time may be from where it should be, in steps.
 const REGULAR: f64 = 1e-6;

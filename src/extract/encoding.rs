@@ -1,6 +1,6 @@
 //! Samples as a format stores them.
 
-use crate::sample::{SampleType, load, store, swap_endian};
+use crate::base::sample::{SampleType, load, store, swap_endian};
 use std::io::{self, Write};
 
 /// Samples that are turned at a time.

@@ -2,7 +2,7 @@
 
 use super::contents::Contents;
 use super::encoding::Encoding;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use std::path::Path;
 
 /// How samples are written.

@@ -12,12 +12,12 @@ pub use contents::Contents;
 pub use format::SampleFormat;
 pub use sink::{Files, Sink};
 
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::memory;
+use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
-use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
-use crate::memory;
-use crate::progress::Progress;
-use crate::volume::Region;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;

@@ -5,7 +5,7 @@
 //! (CDF-2) or, where types or lengths need it, that with 64-bit counts (CDF-5), whose types are more.
 
 use super::contents::Contents;
-use crate::sample::{SampleType, store};
+use crate::base::sample::{SampleType, store};
 use std::io::{self, Write};
 
 /// What follows the samples is zeros up to a multiple of so many bytes.

@@ -1,7 +1,7 @@
 //! The header of a NRRD.
 
 use super::contents::Contents;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use std::fmt::Display;
 use std::io::{self, Write};
 

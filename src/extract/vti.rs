@@ -1,7 +1,7 @@
 //! The text around the samples of a `.vti`, and the list of a `.pvd`.
 
 use super::contents::Contents;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
 

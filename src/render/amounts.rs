@@ -1,9 +1,9 @@
 //! What a block adds to the planes of a picture, as amounts of its voxels and one plane at a time.
 
+use crate::base::error::Result;
+use crate::base::sample::{SampleType, load_as};
 use crate::codec::field::Plane;
 use crate::codec::real::Real;
-use crate::error::Result;
-use crate::sample::{SampleType, load_as};
 
 /// The amounts of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,7 @@ use super::lattice::{CellPlane, Cells, Gather, Lattice, Placed, Rectangle, Work}
 use super::place::{Place, TILE};
 use super::splat::{Splats, Tile};
 use super::terms::{Layout, Terms};
-use crate::error::Result;
+use crate::base::error::Result;
 use crate::wavelet::Lane;
 use rayon::prelude::*;
 use std::ops::Range;

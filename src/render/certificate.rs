@@ -20,8 +20,8 @@
 use super::scene::FrameBounds;
 use super::weights::PixelWeight;
 use super::{Eye, Quantity};
-use crate::footprint::Method;
-use crate::sample::magnitude;
+use crate::base::sample::magnitude;
+use crate::view::footprint::Method;
 
 /// The rounding of the inverse transform, as a share of the sum of absolute terms: at most ten levels of up to seven
 /// products each, whose intermediate sums are at most a few hundred times larger.

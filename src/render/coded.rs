@@ -2,11 +2,11 @@
 
 use super::amounts::{Amounts, BlockPlanes, Room};
 use super::coefficients::{CoefficientGroup, What};
+use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
-use crate::error::Result;
 
 /// A block of a file that has been read.
 pub(super) struct CodedBlock<'a> {
@@ -182,7 +182,7 @@ fn overridden_samples(
     frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
     let place = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
     let mut samples = vec![0.0; block.outliers.positions.len()];
-    crate::sample::load(codec.sample, &block.outliers.samples, &mut samples);
+    crate::base::sample::load(codec.sample, &block.outliers.samples, &mut samples);
     let outliers = block.outliers.positions.iter().map(|p| *p as usize).zip(samples);
     let missing = block.missing.0.iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| (i, 0.0));
     let mut targets: Vec<_> = outliers

@@ -1,10 +1,10 @@
 //! What is to be rendered, and how.
 
-use crate::camera::View;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
 use crate::colour::TransferFunction;
-use crate::error::{Error, Result};
-use crate::footprint::Kernel;
-use crate::volume::Region;
+use crate::view::camera::View;
+use crate::view::footprint::Kernel;
 
 /// What a pixel means (method.md section 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,7 +15,7 @@
 
 use super::weights::Look;
 use super::{Quantity, RenderConfig};
-use crate::volume::{Grid, Region};
+use crate::base::grid::{Grid, Region};
 use std::f64::consts::PI;
 
 /// A view that errors are seen in.

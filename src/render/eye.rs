@@ -5,10 +5,10 @@ use super::place::{TILE, overlap, pixels_reached};
 use super::scene::Scene;
 use super::slabs::Slab;
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
-use crate::camera::{Camera, View};
-use crate::error::{Error, Result};
-use crate::footprint::{Footprint, Method};
-use crate::volume::{BlockGrid, Grid, Region};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::view::camera::{Camera, View};
+use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -5,12 +5,12 @@ use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
 use super::scene::{Contents, FrameBounds, Group, Inverse, Read, SampleErrors, Scene};
 use super::terms::{Layout, Order};
+use crate::base::error::Result;
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
-use crate::error::Result;
-use crate::sample::{self, is_missing, magnitude};
-use crate::scan::{Scan, scan_frame};
+use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, CHANNELS, Coloured, FrameSource, FrameWindow, Painter};
-use crate::volume::{BlockGrid, Grid, Region};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Frames that are splatted together, so that the weights of voxels, or of pixels, are computed once for all of them.

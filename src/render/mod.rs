@@ -47,10 +47,10 @@ pub use frames::FrameScene;
 pub use report::{RenderReport, ViewReport};
 pub use scene::{LeftOut, Scene};
 
-use crate::camera::View;
-use crate::error::{Error, Result};
-use crate::footprint::Method;
-use crate::progress::Progress;
+use crate::base::error::{Error, Result};
+use crate::base::progress::Progress;
+use crate::view::camera::View;
+use crate::view::footprint::Method;
 use eye::Eye;
 use plan::Budget;
 use std::time::{Duration, Instant};

@@ -1,8 +1,8 @@
 //! Rectangles of pixels, and the rows of them that something reaches.
 
-use crate::camera::Camera;
-use crate::footprint::Footprint;
-use crate::volume::{Grid, Region};
+use crate::base::grid::{Grid, Region};
+use crate::view::camera::Camera;
+use crate::view::footprint::Footprint;
 use std::ops::Range;
 
 /// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.

@@ -10,9 +10,9 @@ use super::slabs;
 use super::splat::Splats;
 use super::terms::{Layout, Terms};
 use super::{Mode, RenderConfig};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::volume::Region;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::memory;
 use std::ops::Range;
 
 /// What is allocated at once, for some views that are rendered together.

@@ -9,8 +9,8 @@ use super::plan::{self, Budget};
 use super::scene::{Group, Read, Scene};
 use super::weights::Look;
 use super::{RenderConfig, RenderReport, Rendered, lap};
-use crate::error::Result;
-use crate::progress::Progress;
+use crate::base::error::Result;
+use crate::base::progress::Progress;
 use std::borrow::Cow;
 use std::time::Instant;
 

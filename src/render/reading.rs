@@ -2,8 +2,8 @@
 
 use super::expectation::{Expectation, Seen};
 use super::scene::LeftOut;
+use crate::base::sample::magnitude;
 use crate::codec::WindowCodec;
-use crate::sample::magnitude;
 use std::collections::BTreeMap;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 

@@ -2,7 +2,7 @@
 
 use super::eye::Eye;
 use super::scene::{Contents, LeftOut};
-use crate::camera::View;
+use crate::view::camera::View;
 use serde::Serialize;
 
 /// What a rendering did.

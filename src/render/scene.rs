@@ -7,8 +7,8 @@ use super::RenderConfig;
 use super::amounts::BlockPlanes;
 use super::expectation::Expectation;
 use super::terms::Layout;
-use crate::error::Result;
-use crate::volume::{BlockGrid, Grid, Region};
+use crate::base::error::Result;
+use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
 use serde::Serialize;
 

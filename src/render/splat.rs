@@ -6,7 +6,7 @@
 use super::eye::Eye;
 use super::place::{Place, intersect, overlap};
 use super::terms::Terms;
-use crate::footprint::Footprint;
+use crate::view::footprint::Footprint;
 use crate::wavelet::Lane;
 use std::ops::Range;
 

@@ -2,7 +2,7 @@
 
 use super::amounts::{BlockPlanes, Room};
 pub(super) use super::splat::Order;
-use crate::error::Result;
+use crate::base::error::Result;
 
 /// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
 /// missing in single frames and of what is missing in all of them, then errors, and last lengths.

@@ -3,8 +3,8 @@
 use super::eye::Eye;
 use super::lattice::Shear;
 use super::{RenderConfig, most_splat_error};
-use crate::error::Result;
-use crate::footprint::{Footprint, Method};
+use crate::base::error::Result;
+use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
 /// Leaves out voxels so deep that what they add is within what the method leaves of the splat error.

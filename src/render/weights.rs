@@ -9,9 +9,9 @@ use super::splat::Order;
 use super::terms::Layout;
 use super::uncut::Uncut;
 use super::{Quantity, RenderConfig, RenderReport};
-use crate::error::Result;
-use crate::footprint::{Footprint, Method};
-use crate::volume::BlockGrid;
+use crate::base::error::Result;
+use crate::base::grid::BlockGrid;
+use crate::view::footprint::{Footprint, Method};
 use crate::wavelet::LANES;
 use rayon::prelude::*;
 

@@ -1,10 +1,10 @@
 //! Samples as the colours that a transfer function gives them: three channels before any transform (method.md section 7).
 
 use super::FrameWindow;
+use crate::base::error::Result;
+use crate::base::grid::Region;
+use crate::base::sample::{self, SampleType};
 use crate::colour::TransferFunction;
-use crate::error::Result;
-use crate::sample::{self, SampleType};
-use crate::volume::Region;
 use std::cell::Cell;
 use std::ops::Deref;
 

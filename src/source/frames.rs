@@ -4,11 +4,11 @@ use super::FrameWindow;
 use super::described::Stored;
 use super::held::Held;
 use super::layout::Shape;
-use crate::error::{Error, Result};
-use crate::mapped::{FileBytes, State};
-use crate::output::STANDARD;
-use crate::sample::swap_endian;
-use crate::volume::Region;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::mapped::{FileBytes, State};
+use crate::base::output::STANDARD;
+use crate::base::sample::swap_endian;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -284,7 +284,7 @@ fn flattened(dims: [usize; 3], region: &Region) -> ([usize; 3], Region) {
 mod tests {
     use super::super::testing::{DIMS, check_window, payload};
     use super::*;
-    use crate::sample::SampleType;
+    use crate::base::sample::SampleType;
     use crate::source::layout::{Axis, Counts, Layout, Strides};
     use crate::source::packing::Packing;
 

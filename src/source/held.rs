@@ -1,6 +1,6 @@
 //! Bytes of frames that cannot be read in boxes where they are: in memory, or in a temporary file if they are too many.
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::FileExt;

@@ -3,8 +3,8 @@
 use super::described::Files;
 use super::formats::{self, Format, SUPPORTED, file_series, pvd};
 use super::{OpenOptions, numbering};
-use crate::error::{Error, Result};
-use crate::output::STANDARD;
+use crate::base::error::{Error, Result};
+use crate::base::output::STANDARD;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -179,7 +179,7 @@ fn name(path: &Path) -> String {
 mod tests {
     use super::super::testing::{DIMS, Folder, check_inputs, payload, refused};
     use super::*;
-    use crate::sample::SampleType;
+    use crate::base::sample::SampleType;
 
     const TY: SampleType = SampleType::U16;
 

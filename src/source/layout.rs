@@ -1,7 +1,7 @@
 //! What a frame is made of, and how the samples of some frames lie in an array: axes in any order and direction.
 
 use super::Parsed;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 
 /// The voxels and the sample type of every frame of an archive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

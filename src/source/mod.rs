@@ -13,6 +13,7 @@ mod inputs;
 mod layout;
 mod numbering;
 mod packing;
+pub(crate) mod scan;
 mod select;
 mod series;
 mod stream;
@@ -26,11 +27,11 @@ pub use formats::{ArrayHeader, array_header, endings};
 pub use inputs::files;
 pub use select::{Selection, select};
 
-use crate::error::Result;
-use crate::mapped::Access;
-use crate::output::STANDARD;
-use crate::sample::SampleType;
-use crate::volume::{Grid, Region};
+use crate::base::error::Result;
+use crate::base::grid::{Grid, Region};
+use crate::base::mapped::Access;
+use crate::base::output::STANDARD;
+use crate::base::sample::SampleType;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! Missing frames, seen from the numbers in file names.
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

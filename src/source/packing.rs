@@ -1,6 +1,6 @@
 //! Numbers that are stored as others: scaled, and with values that stand for what is missing.
 
-use crate::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType};
 
 /// How stored numbers become samples: `stored * scale + offset`, NaN for what is missing.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! Some frames and some voxels of an archive, as an archive of its own.
 
 use super::{Archive, FrameSource, FrameWindow};
-use crate::error::{Error, Result};
-use crate::volume::Region;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
 
 /// Every `step`-th frame from `first`, `frames` of them (all that come, if unknown), and in them the voxels of `region`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! What the tests of the formats share: samples with known values, files, and a slow read of boxes.
 
 use super::{FrameSource, FrameWindow, OpenOptions, open};
-use crate::error::Result;
-use crate::mapped::Access;
-use crate::sample::{SampleType, load, store, swap_endian};
-use crate::volume::{Grid, Region};
+use crate::base::error::Result;
+use crate::base::grid::{Grid, Region};
+use crate::base::mapped::Access;
+use crate::base::sample::{SampleType, load, store, swap_endian};
 use std::fs;
 use std::path::PathBuf;
 

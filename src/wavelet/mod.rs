@@ -14,7 +14,7 @@ pub use multi::Multi;
 pub use samples::Samples;
 pub use wavesplat_format::Basis;
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::fmt::Debug;
 use std::ops::Range;
 

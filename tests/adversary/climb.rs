@@ -6,8 +6,8 @@ use crate::common::random::Random;
 use crate::common::samples::TYPES;
 use crate::common::{times, tried};
 use std::time::Instant;
-use wavesplat::bound::Bound;
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::wavelet::Basis;
 
 /// Without a better series for so many rounds, a climber starts again elsewhere.

@@ -11,8 +11,8 @@ use crate::common::random::Random;
 use crate::common::samples::{TYPES, bytes, special};
 use crate::common::series::{Kind, Mask, extremes};
 use proptest::prelude::*;
-use wavesplat::bound::Bound;
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::wavelet::{Basis, LANES, Lane, TimeBasis, basis};
 
 /// What is attacked: one window in one block, whose first two voxels pin the range.

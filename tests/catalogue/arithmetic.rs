@@ -5,7 +5,7 @@ use crate::cli::Work;
 use crate::common::random::Random;
 use crate::common::samples::bytes;
 use crate::common::series::Mask;
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
 
 #[test]
 fn below_an_ulp_every_bit_is_kept() {

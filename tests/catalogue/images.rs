@@ -9,13 +9,13 @@ use crate::common::{MEMORY, direct, looking, pictures, report, settings, stored}
 use crate::reference::camera::project;
 use crate::reference::splat::{BACKGROUND, footprint};
 use std::time::Instant;
-use wavesplat::camera::View;
-use wavesplat::error::Error;
-use wavesplat::footprint::Kernel;
-use wavesplat::progress::Silent;
+use wavesplat::base::error::Error;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, What, render};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::View;
+use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 
 /// A sum that keeps what its roundings lose.

@@ -8,9 +8,9 @@ use crate::common::series::Mask;
 use crate::common::views::{SKEWED, field, rounding, truth, view};
 use crate::common::{Stored, extracted, looking, pictures, settings, stored, windows};
 use crate::images::bits;
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
 use wavesplat::wavelet::Basis;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];

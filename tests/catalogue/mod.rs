@@ -13,7 +13,7 @@ use crate::common::BASES;
 use crate::common::series::{Kind, Mask};
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
 
 /// Samples of voxels in a row, t slowest, with every basis and every bound: converts, extracts and compares exactly.
 /// Returns what came back.

@@ -9,11 +9,11 @@ use crate::common::samples::{TYPES, bytes, numbers};
 use crate::common::series::{Mask, extremes};
 use crate::common::views::{archive, view};
 use crate::common::{direct, extracted, looking, pictures, settings, stored, windows};
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::render::{CoefficientScene, Quantity, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 #[test]

@@ -4,9 +4,9 @@ use crate::cli::{Work, npy};
 use crate::common::samples::bytes;
 use crate::common::views::{archive, field, rounding, truth, view};
 use crate::common::{extracted, looking, pictures, settings, stored};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::render::{CoefficientScene, Quantity, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
 use wavesplat::wavelet::Basis;
 
 #[test]

@@ -4,8 +4,8 @@ use super::kept;
 use crate::common::random::Random;
 use crate::common::samples::{TYPES, bytes};
 use crate::common::series::{Mask, extremes};
-use wavesplat::bound::Bound;
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
 

@@ -3,8 +3,8 @@
 use super::{Archive, Work, npy, read_npy, small};
 use std::path::Path;
 use std::process::Command;
+use wavesplat::base::mapped::Access;
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
 
 /// What is extracted of [`with_places`], and the file it makes.
 const PART: &str = "--frames 3:20:4 --region 5:17,:3,4:";

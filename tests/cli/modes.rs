@@ -3,8 +3,8 @@
 use super::{Run, Work, small};
 use crate::common::memory::Memory;
 use crate::common::{settings, stored_with_a_lie};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{BlockGrid, Grid};
+use wavesplat::base::grid::{BlockGrid, Grid};
+use wavesplat::base::sample::SampleType;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{Compressor, EncodedBlock, Metadata, PartKind, PartStats, pack_missing};
 

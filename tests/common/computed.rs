@@ -1,9 +1,9 @@
 //! Archives whose samples are computed where they are read.
 
-use wavesplat::error::Result;
-use wavesplat::sample::SampleType;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, FrameSource, FrameWindow};
-use wavesplat::volume::{Grid, Region};
 
 /// An archive of `sample(frame, voxel)`, little-endian.
 #[derive(Clone)]

@@ -1,10 +1,10 @@
 //! Frames in memory.
 
 use std::sync::Arc;
-use wavesplat::error::Result;
-use wavesplat::sample::SampleType;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, FrameSource, FrameWindow};
-use wavesplat::volume::{Grid, Region};
 
 /// An archive that is nowhere but in memory.
 #[derive(Clone)]

@@ -12,17 +12,17 @@ use memory::Memory;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tempfile::TempDir;
-use wavesplat::camera::View;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
 use wavesplat::codec::encode::Encoder;
 use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Kernel;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
 use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::View;
+use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord, Writer};
 
@@ -153,7 +153,7 @@ pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32
 pub(crate) fn rendered_if_it_can_be(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-) -> wavesplat::error::Result<(Vec<f32>, Vec<f32>, RenderReport)> {
+) -> wavesplat::base::error::Result<(Vec<f32>, Vec<f32>, RenderReport)> {
     let (mut pictures, mut errors, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
     let report = render(scene, config, &Silent, &mut |rendered| {
         numbers.push(rendered.frame);

@@ -1,7 +1,7 @@
 //! Numbers to little-endian samples and back, without the library.
 
 use half::f16;
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
 
 pub(crate) const TYPES: [SampleType; 9] = [
     SampleType::U8,

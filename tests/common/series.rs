@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::samples::{append, special};
-use wavesplat::sample::SampleType;
+use wavesplat::base::sample::SampleType;
 
 /// How the values of a series run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,10 +5,10 @@ use super::random::Random;
 use super::samples::{bytes, numbers};
 use crate::reference::camera::{self, Lattice};
 use crate::reference::splat::{Images, images};
-use wavesplat::camera::View;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
 use wavesplat::render::RenderConfig;
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::View;
 
 pub(crate) fn view(azimuth: f64, elevation: f64, size: [usize; 2]) -> View {
     View { azimuth, elevation, roll: 0.0, size, scale: None, center: None }

@@ -10,13 +10,13 @@ use crate::reference::camera::project;
 use crate::reference::splat::{BACKGROUND, Images, footprint};
 use random::{Limits, scene};
 use std::time::Instant;
-use wavesplat::bound::Bound;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::sample::SampleType;
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Method;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, RenderReport, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::Grid;
+use wavesplat::view::footprint::Method;
 
 /// Everything that a picture follows from.
 #[derive(Debug, Clone)]

@@ -7,12 +7,12 @@ use crate::common::samples::{TYPES, bytes, special};
 use crate::common::series::{KINDS, Kind, Mask, volume};
 use crate::common::views::field;
 use crate::common::{BASES, looking, settings};
-use wavesplat::camera::{Camera, View};
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::footprint::Kernel;
 use wavesplat::render::{Quantity, RenderConfig, What};
-use wavesplat::sample::SampleType;
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::{Camera, View};
+use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 
 /// Which scenes are drawn.

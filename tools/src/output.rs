@@ -3,8 +3,8 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::sample::SampleType;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::sample::SampleType;
 
 /// The size and the type of an archive's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Format {
     /// Writes what comes before the samples of an array whose last axis is the fastest.
     fn begin(self, writer: &mut impl Write, ty: SampleType, shape: &[usize]) -> io::Result<()> {
         if self == Self::Npy {
-            wavesplat::npy::write_header(ty, shape, writer)?;
+            wavesplat::base::npy::write_header(ty, shape, writer)?;
         }
         Ok(())
     }

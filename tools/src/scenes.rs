@@ -1,16 +1,16 @@
 //! What the demo and the gallery have in common: archives to files, and scenes to pictures.
 
 use std::path::Path;
-use wavesplat::camera::View;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::output::Output;
+use wavesplat::base::progress::Silent;
 use wavesplat::cli::{CommonArgs, ProgressKind, Size};
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
-use wavesplat::error::Result;
-use wavesplat::footprint::Kernel;
-use wavesplat::output::Output;
-use wavesplat::progress::Silent;
 use wavesplat::render::{Mode, Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::FrameSource;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::View;
+use wavesplat::view::footprint::Kernel;
 
 /// Bytes that a conversion or a rendering may allocate.
 pub(crate) const MEMORY: usize = 512 << 20;

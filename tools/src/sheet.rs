@@ -3,7 +3,7 @@
 use crate::diff::measure::of_pixels;
 use font8x8::legacy::BASIC_LEGACY;
 use std::io::Write;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];

@@ -8,7 +8,7 @@ use crate::output::Shape;
 use crate::random::Random;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
-use wavesplat::sample;
+use wavesplat::base::sample;
 
 /// What the frames show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -196,7 +196,7 @@ fn oscillating(mut random: Random, dims: [usize; 3], time: f64) -> Vec<Term> {
 mod tests {
     use super::*;
     use clap::ValueEnum;
-    use wavesplat::sample::SampleType;
+    use wavesplat::base::sample::SampleType;
 
     fn frame(kind: Kind, ty: SampleType, seed: u64, frame: usize) -> Vec<u8> {
         let shape = Shape { dims: [17, 12, 9], frames: 8, ty };

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use wavesplat::sample::{self, SampleType};
+use wavesplat::base::sample::{self, SampleType};
 
 const WIDTH: usize = 20;
 const HEIGHT: usize = 15;
@@ -25,7 +25,7 @@ impl Folder {
 
     fn npy(&self, name: &str, ty: SampleType, shape: &[usize], values: &[f64]) -> PathBuf {
         let (mut bytes, mut samples) = (Vec::new(), vec![0; values.len() * ty.size()]);
-        wavesplat::npy::write_header(ty, shape, &mut bytes).unwrap();
+        wavesplat::base::npy::write_header(ty, shape, &mut bytes).unwrap();
         sample::store(ty, values, &mut samples);
         bytes.extend(samples);
         fs::write(self.path(name), bytes).unwrap();

@@ -9,9 +9,9 @@ use fuzz::series::Case;
 use fuzz::{TARGETS, Target};
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::bound::Bound;
+use wavesplat::base::sample::{SampleType, store};
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
-use wavesplat::sample::{SampleType, store};
 use wavesplat::wavelet::Basis;
 use wavesplat_format::*;
 

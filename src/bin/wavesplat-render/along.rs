@@ -1,9 +1,9 @@
 //! What becomes of what lies along a ray.
 
 use clap::{Args, ValueEnum};
+use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{OpacityPoints, Pair, open_colours, stretched};
 use wavesplat::colour::TransferFunction;
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::Mode;
 

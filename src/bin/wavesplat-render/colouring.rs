@@ -5,8 +5,8 @@ use crate::QuantityName;
 use crate::ranges::Ranges;
 use crate::targets::Targets;
 use serde::Serialize;
+use wavesplat::base::error::{Error, Result};
 use wavesplat::colour::{Norm, Scale, TransferFunction};
-use wavesplat::error::{Error, Result};
 use wavesplat::render::sink::PictureFormat;
 use wavesplat::render::{Pixel, RenderConfig, Scene};
 

@@ -2,9 +2,9 @@
 
 use crate::ranges::Ranges;
 use clap::{Args, ValueEnum};
+use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, Pair, open_colours};
 use wavesplat::colour::{Norm, Rgb, TransferFunction};
-use wavesplat::error::{Error, Result};
 use wavesplat::render::sink::PictureFormat;
 
 /// Options on colours.

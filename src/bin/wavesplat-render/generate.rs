@@ -2,8 +2,8 @@
 
 use crate::Cli;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
+use wavesplat::base::error::Result;
 use wavesplat::cli::{self, Generated};
-use wavesplat::error::Result;
 
 /// What the program is asked for.
 pub(crate) enum Program {

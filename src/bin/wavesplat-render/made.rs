@@ -5,9 +5,9 @@ use crate::colouring::Colouring;
 use crate::{Cli, ErrorName, MethodName, QuantityName};
 use wavesplat::colour::{Norm, Scale};
 use wavesplat::file::CoefficientFile;
+use wavesplat::file::report::PromiseReport;
 use wavesplat::render::sink::{Made, Shows};
 use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene};
-use wavesplat::report::PromiseReport;
 
 impl Cli {
     /// What pictures are made with.

@@ -22,23 +22,23 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use targets::{Targets, parse_depth, parse_format};
-use wavesplat::bound::range_bound;
-use wavesplat::camera::{Camera, View};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
+use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{
     self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share, spare_inputs, transfer_function,
 };
+use wavesplat::codec::bound::range_bound;
 use wavesplat::colour::TransferFunction;
-use wavesplat::error::{Error, Result};
 use wavesplat::file::{CoefficientFile, setting};
-use wavesplat::footprint::Kernel;
-use wavesplat::output::{Output, STANDARD};
 use wavesplat::render::annotate::{Annotation, room};
 use wavesplat::render::sink::{Depth, Made, PictureFormat, Sink};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
 };
 use wavesplat::source::Archive;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::{Camera, View};
+use wavesplat::view::footprint::Kernel;
 use wavesplat_format::Metadata;
 
 /// Render pictures of time-varying volumes.

@@ -1,9 +1,9 @@
 //! The values that colours are spread over, where nobody says them: those of small pictures.
 
 use crate::Cli;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};
-use wavesplat::error::{Error, Result};
-use wavesplat::progress::Silent;
 use wavesplat::render::{Mode, Pixel, RenderConfig, Scene, check, render};
 
 /// Slabs of small pictures that only a range is judged by.

@@ -5,7 +5,7 @@ use crate::colouring::Colouring;
 use crate::made::made_of_errors;
 use crate::targets::Targets;
 use std::sync::Arc;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
 use wavesplat::render::annotate::Annotation;
 use wavesplat::render::sink::{Made, Sink, SinkConfig};
 use wavesplat::render::{Pixel, RenderConfig, Rendered};

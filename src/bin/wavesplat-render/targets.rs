@@ -1,8 +1,8 @@
 //! Which files pictures go to.
 
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::output::{STANDARD, names_of_views};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::{STANDARD, names_of_views};
 use wavesplat::render::RenderConfig;
 use wavesplat::render::sink::{Depth, PictureFormat};
 

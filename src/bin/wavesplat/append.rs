@@ -3,12 +3,12 @@
 use super::convert::finish;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use wavesplat::convert::{Begun, ConvertConfig, of_file};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::output::{STANDARD, part_of};
-use wavesplat::resume::{Earlier, begins_with, ends_with, open_successor};
+use wavesplat::file::resume::{Earlier, begins_with, ends_with, open_successor};
 use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file

@@ -2,14 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use wavesplat::bound::Bound;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{CommonArgs, InputArgs, Pair, SelectArgs, share, spare_inputs, transfer_function};
+use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
-use wavesplat::error::{Error, Result};
-use wavesplat::output::{Output, STANDARD};
-use wavesplat::resume::{self, Earlier};
+use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{Archive, FrameSource, endings};
 use wavesplat::wavelet::Basis;
 

@@ -3,12 +3,12 @@
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
-use wavesplat::error::{Error, Result};
 use wavesplat::extract::{Contents, ExtractConfig, ExtractReport, Files, SampleFormat, Sink, check_memory, extract_to};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::output::STANDARD;
 use wavesplat::source::CHANNELS;
 
 /// Decode frames back to samples

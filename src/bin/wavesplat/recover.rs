@@ -2,12 +2,12 @@
 
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::{Access, FileBytes};
+use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{CommonArgs, print, spare_inputs};
-use wavesplat::error::{Error, Result};
-use wavesplat::mapped::{Access, FileBytes};
-use wavesplat::output::{Output, STANDARD};
-use wavesplat::recover::{RecoverReport, recover};
-use wavesplat::resume;
+use wavesplat::file::recover::{RecoverReport, recover};
+use wavesplat::file::resume;
 
 /// Save what is whole of a damaged coefficient file
 #[derive(Debug, Args)]

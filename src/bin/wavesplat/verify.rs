@@ -2,12 +2,12 @@
 
 use clap::Args;
 use std::path::PathBuf;
+use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print, remembered};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::report::PromiseReport;
+use wavesplat::file::report::PromiseReport;
+use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
-use wavesplat::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 
 /// Check a coefficient file, and its promise against the source
 #[derive(Debug, Args)]

@@ -316,8 +316,8 @@ fn blur_and_turn(gaussian: &[f64], c: &[f64], out: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Camera, View};
-    use crate::volume::Grid;
+    use crate::base::grid::Grid;
+    use crate::view::camera::{Camera, View};
 
     #[test]
     fn weights_are_the_kernel_at_every_cell() {

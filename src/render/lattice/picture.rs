@@ -6,11 +6,11 @@ use super::kernel::{Kernel, SINGLES};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
-use crate::camera::Camera;
-use crate::footprint::{Footprint, Kernel as Gaussian, Method};
+use crate::base::grid::{Grid, Region};
 use crate::render::place::{Place, TILE, pixels_around};
 use crate::render::slabs::Slab;
-use crate::volume::{Grid, Region};
+use crate::view::camera::Camera;
+use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
 use std::ops::Range;
 
 /// The lattice of a view.

@@ -9,8 +9,8 @@
 //!
 //! and voxels of one slice k are whole cells apart: a footprint in a slice is another one, moved by whole cells.
 
-use crate::camera::Camera;
-use crate::volume::Grid;
+use crate::base::grid::Grid;
+use crate::view::camera::Camera;
 
 /// The sheared lattice of one view.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +73,7 @@ impl Shear {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::View;
+    use crate::view::camera::View;
 
     #[test]
     fn voxels_are_where_the_camera_sees_them() {

@@ -7,11 +7,11 @@ use super::Spreading;
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
 use super::shares::Shares;
 use super::spline::{MOST_DEGREE, Spread, spread};
+use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::render::amounts::Amounts;
 use crate::render::place::intersect;
 use crate::render::slabs::Slab;
-use crate::volume::Region;
 use std::ops::Range;
 
 /// Where the voxels of a block are in cells: the same for all planes.

@@ -3,9 +3,9 @@
 use super::cells::Rectangle;
 use super::spline::spread;
 use super::*;
-use crate::camera::{Camera, View};
+use crate::base::grid::{Grid, Region};
 use crate::render::amounts::Amounts;
-use crate::volume::{Grid, Region};
+use crate::view::camera::{Camera, View};
 use std::collections::BTreeMap;
 
 /// splitmix64.

@@ -11,9 +11,9 @@ pub use made::{Made, Shows};
 
 use super::annotate::Annotation;
 use super::{Picture, Pixel, Rendered};
+use crate::base::error::{Error, Result};
+use crate::base::output::{Numbered, Output, STANDARD};
 use crate::colour::{Rgb, Scale};
-use crate::error::{Error, Result};
-use crate::output::{Numbered, Output, STANDARD};
 use png::Animation;
 use sheet::Sheet;
 use std::path::{Path, PathBuf};

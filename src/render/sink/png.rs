@@ -1,9 +1,9 @@
 //! PNG files, still and moving.
 
 use super::{Depth, Picture, Pixel, Rendered, SinkConfig};
+use crate::base::error::{Error, Result};
+use crate::base::output::Output;
 use crate::colour::Rgb;
-use crate::error::{Error, Result};
-use crate::output::Output;
 use std::cell::RefCell;
 use std::io::{self, Write};
 use std::rc::Rc;

@@ -2,8 +2,8 @@
 
 use super::png::{self, Samples};
 use super::{Picture, Rendered, SinkConfig};
-use crate::error::{Error, Result};
-use crate::output::Output;
+use crate::base::error::{Error, Result};
+use crate::base::output::Output;
 
 /// More pixels a side than most programs show.
 const MOST_SIDE: usize = 1 << 15;

@@ -1,10 +1,10 @@
 //! Pictures one after another in one file.
 
 use super::{PictureFormat, SinkConfig, exr, png};
+use crate::base::npy;
+use crate::base::sample::SampleType;
 use crate::colour::Rgb;
-use crate::npy;
 use crate::render::{Picture, Pixel, Rendered};
-use crate::sample::SampleType;
 use std::io::{self, Write};
 
 /// Writes what comes before the first picture of a stream.

@@ -2,10 +2,10 @@
 
 use super::slab::Slab;
 use super::visible::Visible;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{Grid, Region};
 use crate::render::RenderConfig;
 use crate::render::eye::Eye;
-use crate::volume::{Grid, Region};
 
 /// More slabs than this are refused.
 const MOST_SLABS: usize = 1 << 16;

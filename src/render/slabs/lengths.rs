@@ -1,13 +1,13 @@
 //! What a group of frames adds to slabs: its own planes, and the lengths of rays.
 
-use crate::error::Result;
+use crate::base::error::Result;
+use crate::base::grid::BlockGrid;
 use crate::render::RenderReport;
 use crate::render::amounts::{Amounts, BlockPlanes, OnesOf, Room};
 use crate::render::canvas::Blocks;
 use crate::render::eye::Eye;
 use crate::render::scene::{Group, Inverse};
 use crate::render::terms::Layout;
-use crate::volume::BlockGrid;
 use crate::wavelet::Lane;
 use std::collections::HashSet;
 

@@ -1,7 +1,7 @@
 //! A slab across the view direction: how much of each voxel's kernel lies in it.
 
-use crate::camera::Camera;
-use crate::volume::{Grid, Region};
+use crate::base::grid::{Grid, Region};
+use crate::view::camera::Camera;
 
 /// A slab: depths, in world units behind the nearest corner.
 #[derive(Debug, Clone, Copy, PartialEq)]

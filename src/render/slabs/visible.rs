@@ -1,11 +1,11 @@
 //! Which tiles of which slabs can show anything, and the blocks that these need.
 
 use super::blend::Blend;
-use crate::error::Result;
+use crate::base::error::Result;
+use crate::base::grid::Region;
 use crate::render::eye::Eye;
 use crate::render::place::Place;
 use crate::render::scene::Group;
-use crate::volume::Region;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

@@ -2,7 +2,7 @@
 
 use super::text::Characters;
 use super::words::wrong;
-use crate::mapped::FileBytes;
+use crate::base::mapped::FileBytes;
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
 use std::io::{self, Read};

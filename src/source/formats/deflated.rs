@@ -1,8 +1,8 @@
 //! Frames in one compressed stream, of gzip or zlib: taken one after another, from the beginning again if need be.
 
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes, State};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes, State};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{At, Decode, Part, Stored};
 use crate::source::held::{Held, read_some};

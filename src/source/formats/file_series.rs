@@ -1,6 +1,6 @@
 //! ParaView's `.vti.series` and the like: a list of files and their times, in JSON.
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::described::Files;
 use serde::Deserialize;
@@ -36,7 +36,7 @@ fn parse(bytes: &[u8], folder: &Path) -> Parsed<Files> {
 
 #[cfg(test)]
 mod tests {
-    use crate::sample::SampleType;
+    use crate::base::sample::SampleType;
     use crate::source::testing::{Folder, check_inputs, payload, refused};
     use crate::source::{OpenOptions, open};
 

@@ -24,8 +24,8 @@ mod xml;
 pub use npy::{ArrayHeader, array_header};
 
 use super::OpenOptions;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
 use crate::source::described::{Described, head};
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x), in C or Fortran order.
 
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{At, Described, Part, Stored, check_size};
 use crate::source::layout::Layout;

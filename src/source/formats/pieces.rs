@@ -1,8 +1,8 @@
 //! Frames that are put together from pieces: boxes of voxels, each of which is decoded from its first byte to its last.
 
 use super::deflated::{Compression, FileReader, expect_end, hold};
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes, State};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes, State};
 use crate::source::described::Decode;
 use crate::source::held::Held;
 use std::fmt::Debug;

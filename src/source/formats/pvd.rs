@@ -1,7 +1,7 @@
 //! ParaView's `.pvd`: a list of files and their times.
 
 use super::xml::{attribute, required};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::described::Files;
 use quick_xml::Reader;

@@ -1,7 +1,7 @@
 //! Headerless samples: the user says what they are.
 
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
 use crate::source::OpenOptions;
 use crate::source::described::{Described, Part, check_size};
 use crate::source::layout::Shape;
@@ -57,7 +57,7 @@ fn advice(len: u64, shape: &Shape, options: &OpenOptions) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample::SampleType;
+    use crate::base::sample::SampleType;
     use crate::source::testing::{DIMS, Folder, check_inputs, payload, refused};
 
     fn options(frames: Option<usize>, sample: SampleType) -> OpenOptions {

@@ -2,8 +2,8 @@
 
 use super::pieces::Packed;
 use super::words::wrong;
-use crate::mapped::FileBytes;
-use crate::sample::{self, SampleType, swap_endian};
+use crate::base::mapped::FileBytes;
+use crate::base::sample::{self, SampleType, swap_endian};
 use std::io::{self, Read};
 
 const PIECE: usize = 64 << 10; // bytes read at a time

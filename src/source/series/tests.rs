@@ -1,7 +1,7 @@
 //! Tests of files as one archive.
 
 use super::*;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use crate::source::described::{Decode, Stored, Units, Unlike};
 use crate::source::open;
 use crate::source::testing::{DIMS, Folder, message, payload, refused};

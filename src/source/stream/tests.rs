@@ -1,7 +1,7 @@
 //! Tests of streams.
 
 use super::*;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use crate::source::open_stream;
 use crate::source::testing::{DIMS, check_source, check_window, message, payload};
 

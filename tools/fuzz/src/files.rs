@@ -6,11 +6,11 @@ use super::seeds::seed;
 use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
+use wavesplat::base::grid::Region;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
-use wavesplat::volume::Region;
 use wavesplat_format::*;
 
 /// Bytes once decompressed that are read of a file, and blocks.

@@ -4,16 +4,16 @@ use super::files::{read_all, with_file};
 use super::input::Input;
 use std::io::Cursor;
 use std::path::Path;
-use wavesplat::bound::Bound;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::{SampleType, is_missing, load, store};
+use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy, Space, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
-use wavesplat::sample::{SampleType, is_missing, load, store};
+use wavesplat::file::verify::verify;
 use wavesplat::source::{FrameSource, OpenOptions, open_stream};
-use wavesplat::verify::verify;
 use wavesplat::wavelet::Basis;
 
 /// What rounding may add to a sum or a product of the checks here.

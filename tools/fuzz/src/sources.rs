@@ -3,8 +3,8 @@
 use super::input::Input;
 use std::io::Cursor;
 use std::path::Path;
-use wavesplat::mapped::Access;
-use wavesplat::sample::{SampleType, swap_endian};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::sample::{SampleType, swap_endian};
 use wavesplat::source::{FrameSource, OpenOptions, open, open_stream};
 
 /// Bytes of a frame that are read; larger ones are opened only.

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 use std::path::Path;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// A figure.
 pub(super) struct Figure {

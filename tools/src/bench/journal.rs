@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// The name of the file.
 const NAME: &str = "points.jsonl";

@@ -9,16 +9,16 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
 use wavesplat::convert::{Coding, ConvertConfig, convert};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Kernel;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render,
 };
 use wavesplat::source::{self, OpenOptions};
+use wavesplat::view::footprint::Kernel;
 
 /// The number of the layout of `layers.json`; a change of a key's meaning changes it.
 pub const SCHEMA: u32 = 1;

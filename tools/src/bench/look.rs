@@ -1,7 +1,7 @@
 //! From where pictures are taken, and which of their pixels are compared with the truth.
 
 use serde::{Deserialize, Serialize};
-use wavesplat::camera::View;
+use wavesplat::view::camera::View;
 
 /// Standard deviation of the kernel in voxels; there is no attenuation.
 pub(super) const SIGMA: f64 = 0.75;

@@ -11,12 +11,12 @@ use crate::output::{Format, Shape, Target};
 use crate::synth::{Kind, Synth};
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::{self, SampleType};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
-use wavesplat::sample::{self, SampleType};
-use wavesplat::verify::{Comparison, verify};
+use wavesplat::file::verify::{Comparison, verify};
 
 /// What all groups share.
 pub(super) struct Bench<'a> {

@@ -48,7 +48,7 @@ use point::Results;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Instant;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// The number of the layout of `results.json` and `points.jsonl`; a change of a key's meaning changes it.
 pub const SCHEMA: u32 = 1;

@@ -4,10 +4,10 @@ use crate::synth::Kind;
 use clap::ValueEnum;
 use std::fmt;
 use std::iter::successors;
-use wavesplat::bound::Bound;
-use wavesplat::error::{Error, Result};
-use wavesplat::footprint::Method;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::codec::bound::Bound;
 use wavesplat::render::{Quantity, default_splat_error, splat_method};
+use wavesplat::view::footprint::Method;
 use wavesplat::wavelet::Basis;
 
 /// A basis, and the window it is measured with.

@@ -6,7 +6,7 @@ use super::plan::{BASES, BOUNDS, BasisRow, BoundRow};
 use super::point::{Conversion, Point, Results};
 use super::report::kinds;
 use std::path::Path;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
 
 /// Colours that are told apart by everyone (Okabe & Ito, 2008).
 const BLUE: (u8, u8, u8) = (0, 114, 178);

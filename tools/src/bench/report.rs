@@ -5,7 +5,7 @@ use super::{Settings, bad_json};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 const HEAD: &str = "\
 Every stage ran in a process of its own, the contenders of a group in turns. Errors are shares of the value range.

@@ -9,15 +9,15 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Instant;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::output::Output;
+use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Kernel;
-use wavesplat::mapped::Access;
-use wavesplat::output::Output;
-use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, What};
 use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
+use wavesplat::view::footprint::Kernel;
 
 /// The programs' default budget.
 pub(super) const MEMORY: usize = 512 << 20;

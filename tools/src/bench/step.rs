@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// What a process is to do.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -7,10 +7,10 @@
 
 use super::look::{Look, SIGMA};
 use rayon::prelude::*;
-use wavesplat::camera::Camera;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::Grid;
 use wavesplat::source::FrameSource;
-use wavesplat::volume::Grid;
+use wavesplat::view::camera::Camera;
 
 /// Positions within a pixel along each axis.
 const POSITIONS: usize = 32;

@@ -2,9 +2,9 @@
 
 use super::{Demo, Run};
 use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, titled, with_bar};
+use wavesplat::base::error::Result;
+use wavesplat::base::output::Output;
 use wavesplat::colour::{Norm, Scale, TransferFunction};
-use wavesplat::error::Result;
-use wavesplat::output::Output;
 use wavesplat::source::CHANNELS;
 
 /// The frames that are shown.

@@ -12,18 +12,18 @@ use crate::output::{Format, Shape, Target};
 use crate::scenes::{MEMORY, converted, pictures, projection, quietly};
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::camera::View;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample::SampleType;
 use wavesplat::cli::transfer_function;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{ConvertConfig, ConvertReport};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
+use wavesplat::file::verify::{Comparison, verify};
 use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, What};
-use wavesplat::sample::SampleType;
 use wavesplat::source::{self, FrameSource, OpenOptions};
-use wavesplat::verify::{Comparison, verify};
+use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
 /// Frames of the experiment.

@@ -5,8 +5,8 @@ use super::measure::{largest, of_pixels};
 use super::report::number;
 use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, heat, titled, with_bar};
 use std::path::Path;
-use wavesplat::error::Result;
-use wavesplat::output::Output;
+use wavesplat::base::error::Result;
+use wavesplat::base::output::Output;
 
 /// At most so many frames are shown.
 const SHOWN: usize = 16;

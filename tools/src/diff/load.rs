@@ -3,9 +3,9 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::mapped::{Access, FileBytes};
-use wavesplat::sample::{self, SampleType};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::{Access, FileBytes};
+use wavesplat::base::sample::{self, SampleType};
 use wavesplat::source;
 
 const PNG_MAGIC: &[u8] = b"\x89PNG";

@@ -12,10 +12,10 @@ use load::{Shape, Stack};
 use measure::Differences;
 use ssim::{Picture, Scope, ssim};
 use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::Output;
+use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{self, spare_inputs};
-use wavesplat::error::{Error, Result};
-use wavesplat::output::Output;
-use wavesplat::sample::SampleType;
 
 // Each paragraph is one line, which is broken to fit the terminal.
 const HELP: &str = "\
@@ -202,7 +202,7 @@ fn scope(a: &Stack) -> Result<Scope> {
 }
 
 fn sample_limit(ty: SampleType, beyond: f64) -> f64 {
-    wavesplat::sample::round_to(ty, beyond)
+    wavesplat::base::sample::round_to(ty, beyond)
 }
 
 /// The smallest and the largest finite number of all frames.

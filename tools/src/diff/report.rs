@@ -201,7 +201,7 @@ pub(super) fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wavesplat::sample::SampleType;
+    use wavesplat::base::sample::SampleType;
 
     #[test]
     fn numbers_have_six_digits() {

@@ -14,17 +14,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tiles::{Look, Tile, short};
-use wavesplat::camera::View;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::output::Output;
+use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::output::Output;
 use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, What};
-use wavesplat::sample::SampleType;
 use wavesplat::source::FrameSource;
+use wavesplat::view::camera::View;
 
 /// What is shown unless archives are given.
 pub const USUAL: [&str; 2] = ["demo", "smooth"];

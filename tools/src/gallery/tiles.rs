@@ -1,11 +1,11 @@
 //! The pictures of a row: which options suit an archive, and how its pixels are coloured.
 
 use crate::sheet::{Image, Rgb};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
 use wavesplat::cli::OpacityPoints;
 use wavesplat::colour::{Norm, Scale, TransferFunction};
-use wavesplat::error::{Error, Result};
 use wavesplat::render::Mode;
-use wavesplat::volume::Grid;
 
 const BACKGROUND: Rgb = [0; 3];
 /// Paths through such shares of the volume's least extent have the opacities that are asked for: haze, and shells, which

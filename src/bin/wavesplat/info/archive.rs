@@ -4,11 +4,11 @@ use super::InfoArgs;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::STANDARD;
 use wavesplat::cli::print;
 use wavesplat::convert::estimate::{Estimate, estimate};
 use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
-use wavesplat::error::{Error, Result};
-use wavesplat::output::STANDARD;
 use wavesplat::source::Archive;
 
 /// The window of a conversion that says nothing of it.

@@ -3,12 +3,12 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use wavesplat::bound::Bound;
+use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
+use wavesplat::codec::bound::Bound;
 use wavesplat::convert::options;
-use wavesplat::error::Result;
 use wavesplat::file::CoefficientFile;
-use wavesplat::report::{PromiseReport, WindowReport};
+use wavesplat::file::report::{PromiseReport, WindowReport};
 use wavesplat::source::CHANNELS;
 
 /// The keys of `--json`.

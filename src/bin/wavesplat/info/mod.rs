@@ -5,8 +5,8 @@ mod coefficients;
 
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, share};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
 
 /// Say what a coefficient file holds, promises and reached; or what an archive holds, and how it is read

@@ -1,8 +1,8 @@
 //! Reads a variable chunk by chunk, each once.
 
 use super::{ArrayFile, Opener, Variable};
-use crate::error::{Error, Result};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{Decode, Stored};
 use crate::source::held::Held;
@@ -168,7 +168,7 @@ impl fmt::Debug for Chunks {
 mod tests {
     use super::super::{Attributes, How};
     use super::*;
-    use crate::mapped::Access;
+    use crate::base::mapped::Access;
     use std::sync::{Arc, Mutex};
 
     const LENGTHS: [usize; 5] = [7, 2, 5, 4, 6]; // t, one of two, z, y, x

@@ -1,9 +1,9 @@
 //! HDF5 files, as [`super::ArrayFile`].
 
 use super::{ArrayFile, Attribute, Attributes, How, Variable};
-use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::FileBytes;
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use hdf5_reader::error::Error as Hdf5Error;
 use hdf5_reader::group::Group;

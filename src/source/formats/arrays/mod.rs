@@ -16,9 +16,9 @@ mod vtkhdf;
 mod zarr;
 
 use super::component;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes, State};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes, State};
+use crate::base::sample::SampleType;
 use crate::source::described::{At, Described, Part, Stored, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::{OpenOptions, Parsed, numbering};

@@ -1,9 +1,9 @@
 //! NetCDF files, classic and version 4, as [`super::ArrayFile`].
 
 use super::{ArrayFile, Attribute, Attributes, How, Variable, hdf5};
-use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::FileBytes;
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use hdf5_reader::Hdf5File;
 use netcdf_reader::{NcAttrValue, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};

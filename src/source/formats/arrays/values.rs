@@ -1,7 +1,7 @@
 //! What the numbers of a variable mean, by the attributes of the NetCDF conventions.
 
 use super::Variable;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::packing::Packing;
 
@@ -49,7 +49,7 @@ impl Values {
 
 /// A number as it is among the stored ones: attributes may be of another type.
 fn as_stored(stored: SampleType, value: f64) -> f64 {
-    if stored.is_float() { crate::sample::round_to(stored, value) } else { value }
+    if stored.is_float() { crate::base::sample::round_to(stored, value) } else { value }
 }
 
 /// The least and the largest stored number that is valid; what is no number is no limit.

@@ -1,8 +1,8 @@
 //! Zarr stores of versions 2 and 3, as [`super::ArrayFile`].
 
 use super::{ArrayFile, Attribute, Attributes, How, Variable};
-use crate::error::{Error, Result};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use serde_json::Value;
 use std::ops::Range;
@@ -40,7 +40,7 @@ impl ArrayFile for Opened {
         let bytes = bytes.map_err(|e| e.to_string())?.into_fixed().map_err(|e| e.to_string())?;
         let mut bytes = bytes.into_owned();
         if cfg!(target_endian = "big") {
-            crate::sample::swap_endian(sample, &mut bytes);
+            crate::base::sample::swap_endian(sample, &mut bytes);
         }
         Ok(bytes)
     }

@@ -2,8 +2,8 @@
 
 use super::Samples;
 use super::header::Header;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
 use crate::source::described::{At, Part, check_size};
 use crate::source::formats::deflated::{Compression, Deflated, Place, check_room};

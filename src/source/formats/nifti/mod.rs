@@ -7,9 +7,9 @@ pub(in crate::source) use header::is_nifti;
 
 use super::component;
 use super::deflated::{Compression, Stream};
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{At, Described, Part, Stored, Units, check_size, head};
 use crate::source::layout::Shape;

@@ -3,8 +3,8 @@
 use super::Array;
 use super::files::Files;
 use super::header::Header;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
 use crate::source::described::{At, Part, Stored, check_size};
 use crate::source::formats::deflated::{Compression, Stream, check_room};

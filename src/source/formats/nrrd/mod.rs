@@ -10,9 +10,9 @@ pub(in crate::source) use header::MAGIC;
 
 use super::component;
 use super::directions::Placed;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::described::{Described, growing_head};
 use crate::source::layout::Shape;

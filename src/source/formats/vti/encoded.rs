@@ -1,9 +1,9 @@
 //! Where an array is in a file, and how it is written there.
 
 use super::blocks::Blocks;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::SampleType;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::SampleType;
 use crate::source::formats::base64::Text;
 use crate::source::formats::deflated::FileReader;
 use crate::source::formats::pieces::Packed;

@@ -3,9 +3,9 @@
 use super::encoded::{Count, Encoded, Form};
 use super::header::{self, Array, Header};
 use super::skeleton::Skeleton;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::{self, SampleType, swap_endian};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::{self, SampleType, swap_endian};
 use crate::source::formats::pieces::Packed;
 use std::io::Read;
 use std::path::Path;

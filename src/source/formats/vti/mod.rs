@@ -10,7 +10,7 @@ mod skeleton;
 
 use super::component::{self, Chosen};
 use super::directions::{Directions, Placed};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::described::{Described, Stored};
 use crate::source::layout::Shape;

@@ -5,7 +5,7 @@ use super::encoded::Encoded;
 use super::extent::{Extent, check_pieces};
 use super::header::{Array, Piece};
 use super::image::Image;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use crate::source::described::{At, Part};
 use crate::source::formats::pieces::{self, Pieces};
 use crate::source::layout::Shape;

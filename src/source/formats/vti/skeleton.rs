@@ -1,7 +1,7 @@
 //! The XML of a file without the samples that are text among it, which may be more than memory holds.
 
-use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::FileBytes;
 
 const PIECE: usize = 64 << 10; // bytes read at a time
 const KEPT: usize = 64; // bytes of a text that stay
@@ -103,7 +103,7 @@ impl Skeleton {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mapped::Access;
+    use crate::base::mapped::Access;
     use crate::source::testing::Folder;
 
     #[test]

@@ -3,7 +3,7 @@
 mod pieced;
 
 use super::encoded::Count;
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use crate::source::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
 use crate::source::{OpenOptions, open};
 use ::base64::Engine;
@@ -240,7 +240,7 @@ fn straight_directions_are_turned() {
     let ty = SampleType::U16;
     let all: Vec<u8> = payload(ty, 0..1, false);
     let flipped = |[x, y, z]: [usize; 3]| all[2 * (((2 - z) * 5 + y) * 7 + (6 - x))..][..2].to_vec();
-    let voxels = crate::volume::Region { start: [0; 3], end: [7, 5, 3] };
+    let voxels = crate::base::grid::Region { start: [0; 3], end: [7, 5, 3] };
     let samples: Vec<u8> = voxels.iter().flat_map(flipped).collect();
     let [before, blocks] = zlib(&samples, TAGS[0].1, 64);
     let packed = appended(&compressed(TAGS[0].0), "UInt16", "raw", &[before, blocks].concat());
@@ -254,7 +254,7 @@ fn straight_directions_are_turned() {
     }
     // Axes of 5, 3, 7 voxels that go along y, z, x.
     let order = |[y, z, x]: [usize; 3]| all[2 * ((z * 5 + y) * 7 + x)..][..2].to_vec();
-    let voxels = crate::volume::Region { start: [0; 3], end: [5, 3, 7] };
+    let voxels = crate::base::grid::Region { start: [0; 3], end: [5, 3, 7] };
     let samples: Vec<u8> = voxels.iter().flat_map(order).collect();
     let bytes = directed(&raw(TAGS[0], "UInt16", &samples), "0 0 1 1 0 0 0 1 0");
     let at = bytes.windows(4).position(|w| w == b"\n  _").expect("appended");

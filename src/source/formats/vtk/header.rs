@@ -1,9 +1,9 @@
 //! What the text of a legacy VTK file says, and where its arrays are.
 
 use super::lines::Lines;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::{self, SampleType};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::{self, SampleType};
 use crate::source::Parsed;
 use crate::source::formats::association::Association;
 use crate::source::formats::pieces::Packed;

@@ -1,7 +1,7 @@
 //! The text between the binary arrays of a file.
 
-use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::FileBytes;
 
 const PIECE: usize = 256; // bytes read at a time
 const LONGEST: usize = 16 << 10; // bytes of a line

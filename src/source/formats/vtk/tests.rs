@@ -1,6 +1,6 @@
 //! Tests of legacy VTK files.
 
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use crate::source::testing::{Folder, check_inputs, check_window, message, payload, refused, survives_damage, value};
 use crate::source::{OpenOptions, open};
 

@@ -7,8 +7,8 @@ use crate::synth::{Kind, Synth};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::sample::{self, SampleType};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::sample::{self, SampleType};
 use wavesplat::source::{self, OpenOptions, read_frames};
 
 /// An archive that can be made.

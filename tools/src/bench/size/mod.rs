@@ -31,7 +31,7 @@ use peers::PeersTask;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// The number of the layout of `size.json`; a change of a key's meaning changes it.
 pub const SCHEMA: u32 = 1;

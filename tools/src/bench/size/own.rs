@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use wavesplat::bound::difference_up;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Region;
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
+use wavesplat::base::sample;
 use wavesplat::codec::WindowCodec;
+use wavesplat::codec::bound::difference_up;
 use wavesplat::codec::decode::Block;
 use wavesplat::convert::{ConvertReport, convert};
-use wavesplat::error::{Error, Result};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
-use wavesplat::sample;
 use wavesplat::source::{self, OpenOptions, read_frames};
-use wavesplat::volume::Region;
 
 /// What a process is to measure.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// The peer whose times the targets are about; of the others times are taken once.
 pub(super) const TIMED: &str = "sz3-4d";

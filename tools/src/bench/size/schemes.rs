@@ -1,7 +1,7 @@
 //! The ways of converting that are measured: all that this benchmark knows of them is a name and a configuration.
 
+use wavesplat::base::error::{Error, Result};
 use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::error::{Error, Result};
 use wavesplat::wavelet::Basis;
 
 /// A way of converting.

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
 
 /// Asks the system to drop what it has cached of a file; whether it did, [`from_storage`] tells.
 #[cfg(target_os = "linux")]

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::PathBuf;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::progress::Silent;
 use wavesplat::convert::{Coding, ConvertConfig, convert};
-use wavesplat::error::{Error, Result};
-use wavesplat::progress::Silent;
 use wavesplat::source::{self, OpenOptions};
 use wavesplat::wavelet::Basis;
 

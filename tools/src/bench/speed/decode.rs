@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::path::Path;
-use wavesplat::error::{Error, Result};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::file::CoefficientFile;
-use wavesplat::mapped::{Access, FileBytes};
 use wavesplat_format::{BlockEntry, Reader};
 
 /// From opening a file to the codes of all of its blocks, which are not kept; returns the bytes that were read of blocks.

@@ -6,7 +6,7 @@ use super::work::{Task, Work};
 use super::{Bench, Subject};
 use crate::bench::stages::MEMORY;
 use crate::synth::Kind;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
 
 /// How much the peaks may differ where they are to be equal: what the allocator and the looks make of it.
 const EQUAL: f64 = 1.05;

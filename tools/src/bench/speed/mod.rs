@@ -43,8 +43,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::sample::SampleType;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::sample::SampleType;
 
 /// The number of the layout of `speed.json`; a change of a key's meaning changes it.
 pub const SCHEMA: u32 = 1;

@@ -10,7 +10,7 @@ use crate::bench::look::Look;
 use crate::bench::size::Subject;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
 
 /// The paper's tolerance, about 5/256.
 const TOLERANCE: f64 = 0.02;

@@ -6,7 +6,7 @@ use super::{Archive, Bench};
 use crate::bench::size::Peers;
 use crate::bench::size::peers::PeersTask;
 use serde::Deserialize;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
 
 /// SZ3, every frame by itself.
 const SZ3: &str = "sz3-3d";

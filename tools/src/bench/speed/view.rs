@@ -9,15 +9,15 @@ use crate::bench::textbook;
 use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::path::PathBuf;
-use wavesplat::camera::Camera;
-use wavesplat::error::Result;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
 use wavesplat::file::CoefficientFile;
-use wavesplat::footprint::Kernel;
-use wavesplat::mapped::Access;
-use wavesplat::progress::Silent;
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, Scene, What, render};
 use wavesplat::source::{self, FrameSource, OpenOptions};
-use wavesplat::volume::{Grid, Region};
+use wavesplat::view::camera::Camera;
+use wavesplat::view::footprint::Kernel;
 
 /// What to show.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -8,8 +8,8 @@ use super::view::{self, View};
 use crate::bench::size::clock::{stay_on_one_core, work_with};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use wavesplat::error::{Error, Result};
-use wavesplat::mapped::{Access, FileBytes};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::mapped::{Access, FileBytes};
 
 /// What a process is to do, with how many threads.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! The header of an `.npy` file or stream, written without a seek; the payload follows as raw little-endian bytes.
 
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use npyz::{DType, TypeStr, WriteOptions, WriterBuilder};
 use std::io::{self, Write};
 

@@ -6,7 +6,7 @@
 //! call [`explain_sigbus`] so that the user reads which file failed instead of "Bus error".
 #![allow(unsafe_code)]
 
-use crate::error::{BecameShorter, Error, Result};
+use crate::base::error::{BecameShorter, Error, Result};
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::fs::{File, Metadata};

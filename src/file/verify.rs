@@ -1,16 +1,16 @@
 //! Is a coefficient file whole, and does it keep its promise?
 
-use crate::bound;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::memory::MOST_BLOCKS;
+use crate::base::progress::Progress;
+use crate::base::sample;
 use crate::codec::WindowCodec;
+use crate::codec::bound;
 use crate::codec::decode::Block;
-use crate::error::{Error, Result};
 use crate::file::CoefficientFile;
-use crate::memory::MOST_BLOCKS;
-use crate::progress::Progress;
-use crate::sample;
-use crate::scan::join_ranges;
+use crate::source::scan::join_ranges;
 use crate::source::{CHANNELS, Coloured, FrameSource, FrameWindow, read_frames};
-use crate::volume::Region;
 use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_format::{BlockEntry, PartKind};

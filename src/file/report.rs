@@ -1,6 +1,6 @@
 //! What a coefficient file promises and what it reached, in numbers and words, for `convert` and `info`.
 
-use crate::bound::Bound;
+use crate::codec::bound::Bound;
 use crate::codec::scheme::Scheme;
 use serde::Serialize;
 use wavesplat_format::Window;

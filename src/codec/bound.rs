@@ -6,7 +6,7 @@
 
 pub use wavesplat_format::Bound;
 
-use crate::sample::SampleType;
+use crate::base::sample::SampleType;
 use half::f16;
 
 /// x - y and what rounding took from it: the exact difference is their sum. Not numbers if x - y overflows.

@@ -3,8 +3,8 @@
 //! f(x, y) = sx sy sz exp(tau^2 sigma^2 / 2) / (2 pi sigma^2) exp(-(x^2 + y^2) / (2 sigma^2)) is a product of one
 //! Gaussian along x and one along y, so a footprint is a row of weights times a column of weights.
 
-use crate::error::{Error, Result};
-use crate::volume::Grid;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
 use std::ops::Range;
 
 /// The kernel, as a user gives it.

@@ -1,13 +1,13 @@
 //! An open coefficient file: the format's reader over a mapped file, in this library's terms.
 
+use crate::base::error::{Error, Result};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::sample::SampleType;
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::error::{Error, Result};
-use crate::mapped::{Access, FileBytes};
-use crate::sample::SampleType;
-use crate::scan::join_ranges;
+use crate::source::scan::join_ranges;
 use crate::source::{CHANNELS, Painter};
-use crate::volume::{BlockGrid, Grid, Region};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;

@@ -3,11 +3,11 @@
 //! Both are the same: whole windows at the beginning of `NAME.part`, after which writing goes on. Those of a finished file are
 //! copied there first, so that it stays what it is until its successor takes its name.
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::output::Output;
 use crate::file::CoefficientFile;
-use crate::mapped::{Access, FileBytes};
-use crate::output::Output;
-use crate::scan::scan;
+use crate::source::scan::scan;
 use crate::source::{Archive, FrameSource};
 use std::fs::File;
 use std::io::{self, Read};

@@ -1,10 +1,10 @@
 //! One look at all samples of a window before it is coded: value range, missing samples, a digest.
 
-use crate::error::Result;
-use crate::progress::Progress;
-use crate::sample::{self, SampleType};
+use crate::base::error::Result;
+use crate::base::grid::{Grid, Region};
+use crate::base::progress::Progress;
+use crate::base::sample::{self, SampleType};
 use crate::source::{FrameSource, FrameWindow};
-use crate::volume::{Grid, Region};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 

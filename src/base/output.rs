@@ -4,7 +4,7 @@ mod names;
 
 pub use names::{Numbered, names_of_views};
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, Permissions, TryLockError};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};

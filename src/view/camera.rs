@@ -1,7 +1,7 @@
 //! The parallel camera of method.md section 2: world positions to pixels and depth.
 
-use crate::error::{Error, Result};
-use crate::volume::Grid;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
 
 /// What a user asks of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]

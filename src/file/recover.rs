@@ -1,8 +1,8 @@
 //! A damaged coefficient file to a whole one of what can be saved. The damaged one is only read.
 
-use crate::error::{Error, Result};
-use crate::mapped::FileBytes;
-use crate::progress::Progress;
+use crate::base::error::{Error, Result};
+use crate::base::mapped::FileBytes;
+use crate::base::progress::Progress;
 use crate::source::CHANNELS;
 use serde::Serialize;
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! Names of files, by frame and by view.
 
 use super::STANDARD;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// Names of numbered files, a frame in each.

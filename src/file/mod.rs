@@ -1,0 +1,12 @@
+//! The `.wspl` file and its safety: opening it, reporting what it promises, checking it, and saving what is whole.
+//!
+//! [`CoefficientFile`] is the only door from the format package to this library. Nothing here writes blocks (that is
+//! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
+
+mod coefficient_file;
+pub mod report;
+pub mod verify;
+pub mod recover;
+pub mod resume;
+
+pub use coefficient_file::{CoefficientFile, setting};
