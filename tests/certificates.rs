@@ -13,7 +13,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, RenderReport, Scene, What};
+use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, RenderReport, Scene, SplatSource};
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
@@ -80,11 +80,11 @@ impl<'a> Truth<'a> {
 }
 
 fn coefficients(trial: &Trial) -> CoefficientScene {
-    CoefficientScene::new(trial.file.open(), What::Coefficients)
+    CoefficientScene::new(trial.file.open(), SplatSource::Coefficients)
 }
 
 fn samples(trial: &Trial) -> CoefficientScene {
-    CoefficientScene::new(trial.file.open(), What::Samples)
+    CoefficientScene::new(trial.file.open(), SplatSource::Samples)
 }
 
 #[test]

@@ -11,9 +11,9 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
-use wavesplat::colour::{Space, TransferFunction};
+use wavesplat::colour::{ColourSpace, TransferFunction};
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
@@ -53,7 +53,7 @@ impl Painted {
         let paint = |v: &f64| if missing_at(*v) { [0.0; 3] } else { colour(&points, *v) };
         let painted: Vec<[f64; 3]> = samples.iter().map(paint).collect();
         let channels = [0, 1, 2].map(|c| painted.iter().map(|colour| colour[c]).collect());
-        let colours = TransferFunction::of_points(points.to_vec(), Space::Rgb, None, Some([0.5; 3])).unwrap();
+        let colours = TransferFunction::of_points(points.to_vec(), ColourSpace::Rgb, None, Some([0.5; 3])).unwrap();
         let config = ConvertConfig { colours: Some(colours), ..config };
         Self { memory, config, missing, channels }
     }
@@ -155,7 +155,7 @@ fn a_sampled_bound_holds_for_every_channel_that_is_not_dark() {
     let mut painted = Painted::new(archive(SKEWED, SampleType::F32, &samples), config);
     let points = vec![(0.0, [0.0, 1.0, 0.0]), (1.0, [1.0, 0.5, 0.0])];
     painted.channels = [0, 1, 2].map(|c| samples.iter().map(|v| colour(&points, f64::from(*v as f32))[c]).collect());
-    painted.config.colours = Some(TransferFunction::of_points(points, Space::Rgb, None, None).unwrap());
+    painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
     let stored = painted.file();
     assert!(stored.report.delta > 0.0 && stored.report.delta < 0.05 * 0.5, "{}", stored.report.delta);
     painted.check("sampled");
@@ -188,8 +188,8 @@ fn pictures_of_colours_are_within_the_bound_of_those_by_the_conventional_method_
             for quantity in [Quantity::Mean, Quantity::Emission] {
                 let config = looking(view, tau, quantity, &painted.grid(), painted.frames());
                 let (a, report) = pictures(&mut painted.direct(), &config);
-                let (b, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &config);
-                let (c, _) = pictures(&mut CoefficientScene::new(file.open(), What::Samples), &config);
+                let (b, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &config);
+                let (c, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Samples), &config);
                 assert_eq!((a.len(), b.len()), (3 * 19 * 36 * 28, a.len()));
                 for channel in 0..3 {
                     let of = |all: &[f32]| all.iter().skip(channel).step_by(3).copied().collect::<Vec<_>>();
@@ -230,7 +230,7 @@ fn no_number_of_a_coloured_pixel_is_beyond_its_certificate() {
                 let plain = looking(view, tau, quantity, &painted.grid(), painted.frames());
                 for allowed in [None, Some(0.1)] {
                     let config = RenderConfig { certify: true, splat_error, allowed, ..plain.clone() };
-                    let mut scene = CoefficientScene::new(file.open(), What::Coefficients);
+                    let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
                     let (found, errors, report) = rendered(&mut scene, &config);
                     for channel in 0..3 {
                         let truth = painted.truth(&config, report.views[0].scale, channel);
@@ -263,14 +263,14 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
     let samples: Vec<f64> = (0..16).flat_map(|t| grid.whole().iter().map(move |voxel| wave(voxel, t))).collect();
     let mut painted = Painted::new(archive(grid, SampleType::F32, &samples), config);
     let points = vec![(-1.0, [0.0, 0.2, 1.0]), (1.2, [1.0, 0.8, 0.0])]; // steps leave nothing to leave out
-    painted.config.colours = Some(TransferFunction::of_points(points, Space::Rgb, None, None).unwrap());
+    painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
     let file = painted.file();
     let plain = looking(view(40.0, 20.0, [60, 50]), 0.0, Quantity::Mean, &grid, 16);
-    let (exact, whole) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &plain);
+    let (exact, whole) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &plain);
     assert_eq!((whole.blocks, whole.left_out.coefficients), (3 * file.open().blocks.len() as u64, 0));
     for limited in [Limit::Certified, Limit::Expected] {
         let loose = RenderConfig { allowed: Some(ALLOWED), limited, ..plain.clone() };
-        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &loose);
+        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &loose);
         let (left, read) = (report.left_out.coefficients, report.bytes_read);
         assert!(left > 0 && read < whole.bytes_read, "{limited:?}: {left} left out, {read} of {}", whole.bytes_read);
         assert!(limited == Limit::Expected || report.certified_sample_error <= ALLOWED);
@@ -291,7 +291,7 @@ fn neither_threads_nor_memory_change_a_bit_of_coloured_pictures() {
         let config = ConvertConfig { block: Some(8), ..settings(basis, window, 0.01) };
         let painted = Painted::new(archive(grid, SampleType::F32, &samples), config);
         let file = painted.file();
-        let scene = || CoefficientScene::new(file.open(), What::Coefficients);
+        let scene = || CoefficientScene::new(file.open(), SplatSource::Coefficients);
         let look = looking(view(30.0, 25.0, [80, 60]), 0.05, Quantity::Mean, &grid, 19);
         let certified = RenderConfig { certify: true, frames: vec![3, 4, 5], ..look.clone() };
         assert!(under_less_memory(&mut scene(), &look) >= 4);

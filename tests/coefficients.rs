@@ -10,7 +10,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
@@ -39,7 +39,7 @@ impl Trial {
         self.memory.archive().sample
     }
 
-    fn of(&self, what: What, config: &RenderConfig) -> Vec<f32> {
+    fn of(&self, what: SplatSource, config: &RenderConfig) -> Vec<f32> {
         pictures(&mut CoefficientScene::new(self.file.open(), what), config).0
     }
 
@@ -146,7 +146,7 @@ fn coefficients_show_what_the_decoded_samples_show() {
         for (view, tau) in views() {
             for quantity in [Quantity::Mean, Quantity::Emission] {
                 let config = looking(view, tau, quantity, &trial.grid(), trial.file.open().frames());
-                let (a, b) = (trial.of(What::Coefficients, &config), trial.of(What::Samples, &config));
+                let (a, b) = (trial.of(SplatSource::Coefficients, &config), trial.of(SplatSource::Samples, &config));
                 let most = 1e-9 * largest(&Vec::from_iter(a.iter().map(|v| f64::from(*v))));
                 for (a, b) in a.into_iter().zip(b) {
                     assert_eq!(a.is_nan(), b.is_nan(), "{}", trial.name);
@@ -173,7 +173,8 @@ fn check_within_the_bound(trial: &Trial, region: Option<Region>) {
         let mut scene = direct(&trial.memory, trial.config.missing_value);
         let (g, report) = pictures(&mut scene, &mean);
         let (i, _) = pictures(&mut scene, &emission);
-        let (g_found, i_found) = (trial.of(What::Coefficients, &mean), trial.of(What::Coefficients, &emission));
+        let (g_found, i_found) =
+            (trial.of(SplatSource::Coefficients, &mean), trial.of(SplatSource::Coefficients, &emission));
         let truth = truth(&trial.grid(), &mean, report.views[0].scale, &vec![0.0; missing.len()], Some(&missing));
         let left = if missing.contains(&true) { 1e-15 * largest(&samples) * truth.largest_weight } else { 0.0 };
         let weights = truth.weight;
@@ -222,10 +223,10 @@ fn some_frames_from_coefficients_are_the_same_as_in_all() {
     for trial in doubles().into_iter().filter(|t| t.file.open().frames() == FRAMES) {
         let (view, tau) = views()[2];
         let config = looking(view, tau, Quantity::Mean, &trial.grid(), FRAMES);
-        let all = trial.of(What::Coefficients, &config);
+        let all = trial.of(SplatSource::Coefficients, &config);
         let pixels = view.size[0] * view.size[1];
         for frames in [vec![0], vec![7, 8], vec![2, 9, 11, 18], vec![18]] {
-            let some = trial.of(What::Coefficients, &RenderConfig { frames: frames.clone(), ..config.clone() });
+            let some = trial.of(SplatSource::Coefficients, &RenderConfig { frames: frames.clone(), ..config.clone() });
             for (frame, picture) in frames.iter().zip(some.chunks_exact(pixels)) {
                 let expected = &all[frame * pixels..(frame + 1) * pixels];
                 assert_eq!(bits(picture), bits(expected), "{}, frame {frame}", trial.name);
@@ -247,7 +248,7 @@ fn memory_changes_no_bit_of_a_picture_from_coefficients() {
             let config = settings(basis, window, 0.01);
             let trial = Trial::new("memory", archive(grid, SampleType::F64, &samples), config);
             let config = looking(view(30.0, 25.0, [200, 150]), 0.05, Quantity::Mean, &grid, FRAMES);
-            let mut scene = CoefficientScene::new(trial.file.open(), What::Coefficients);
+            let mut scene = CoefficientScene::new(trial.file.open(), SplatSource::Coefficients);
             assert!(under_less_memory(&mut scene, &config) >= 4);
         }
     }

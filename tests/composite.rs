@@ -7,9 +7,9 @@ use crate::reference::ray::{Cut, Rays};
 use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::colour::{Space, TransferFunction};
-use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::render::{CoefficientScene, Mode, Quantity, RenderConfig, Scene, What};
+use wavesplat::colour::{ColourSpace, TransferFunction};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::render::{CoefficientScene, Mode, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::wavelet::Basis;
 
@@ -22,7 +22,7 @@ const OPACITIES: [(f64, f64); 3] = [(0.0, 0.0), (2.0, 0.3), (3.5, 0.9)];
 const UNIT: f64 = 1.5;
 
 fn transfer() -> TransferFunction {
-    TransferFunction::of_points(COLOURS.to_vec(), Space::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
+    TransferFunction::of_points(COLOURS.to_vec(), ColourSpace::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
 }
 
 /// What the transfer function is, in the reference's own words.
@@ -84,13 +84,13 @@ fn largest_difference(
 }
 
 /// Exactly stored, so that nothing but splatting is approximate; blocks are small, so that there are many.
-fn exact(samples: &[f64], coding: impl Into<Coding>) -> Stored {
+fn exact(samples: &[f64], coding: impl Into<SchemeConstraint>) -> Stored {
     let config = ConvertConfig { block: Some(5), coding: coding.into(), ..settings(Basis::Haar, 4, 0.0) };
     stored(&mut archive(GRID, SampleType::F64, samples), &config)
 }
 
 fn scene(stored: &Stored) -> CoefficientScene {
-    CoefficientScene::new(stored.open(), What::Coefficients)
+    CoefficientScene::new(stored.open(), SplatSource::Coefficients)
 }
 
 fn with_holes(mut samples: Vec<f64>) -> Vec<f64> {
@@ -154,7 +154,7 @@ fn the_largest_value_is_that_of_the_slabs() {
         let samples = if n == 1 { with_holes(samples) } else { samples };
         for (splat_error, most) in [(0.0, 1e-4), (1e-3, 2e-2)] {
             let config = RenderConfig { splat_error, ..seen(view, &GRID, Mode::Mip { slabs: Some(20) }) };
-            let file = exact(&samples, Coding::AUTO);
+            let file = exact(&samples, SchemeConstraint::AUTO);
             let (found, _) = pictures(&mut scene(&file), &config);
             let off = largest_difference(&found, (&GRID, &config, 20), &samples, |(rays, cut), pixel| {
                 vec![rays.slabs(pixel, cut).into_iter().map(|slab| slab.1).fold(f64::NAN, f64::max)]
@@ -175,7 +175,7 @@ fn the_bound_holds_for_the_largest_value() {
         let delta = lossy.report.delta;
         let config = seen(view(30.0, 25.0, [30, 26]), &GRID, Mode::Mip { slabs: None });
         let (expected, _) = pictures(&mut scene(&whole), &config);
-        let (found, _) = pictures(&mut CoefficientScene::new(lossy.open(), What::Coefficients), &config);
+        let (found, _) = pictures(&mut CoefficientScene::new(lossy.open(), SplatSource::Coefficients), &config);
         for (found, expected) in found.iter().zip(&expected) {
             let off = f64::from((found - expected).abs());
             assert!(found.is_nan() && expected.is_nan() || off <= delta * (1.0 + 1e-6), "{found} for {expected}");
@@ -202,7 +202,7 @@ fn what_is_clear_or_hidden_is_not_read() {
     let file = stored(&mut memory.clone(), &config);
     let close = View { scale: Some(6.0), ..view(0.0, 0.0, [96, 96]) };
     let config = RenderConfig { splat_error: 1e-4, ..seen(close, &grid, composite(None)) };
-    let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &config);
+    let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &config);
     let (whole, of_all) = pictures(&mut direct(&memory, None), &config);
     assert_eq!(found.len(), whole.len());
     let off = found.iter().zip(&whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -215,7 +215,7 @@ fn what_is_clear_or_hidden_is_not_read() {
 #[test]
 fn memory_changes_no_bit_of_a_composite() {
     let samples = with_holes(field(&GRID, FRAMES, 3));
-    let files = [exact(&samples, Basis::Haar), exact(&samples, Coding::AUTO)];
+    let files = [exact(&samples, Basis::Haar), exact(&samples, SchemeConstraint::AUTO)];
     let part = Region { start: [6, 5, 5], end: [13, 9, 10] };
     for (splat_error, mode, region) in [
         (0.0, composite(Some(8)), Some(part)),

@@ -12,7 +12,7 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 use wavesplat::wavelet::Basis;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -41,7 +41,7 @@ fn threads_change_no_byte_and_no_pixel() {
                 let file = stored(&mut memory.clone(), &config(basis));
                 let look = looking(view(30.0, 20.0, [140, 90]), 0.01, Quantity::Mean, &GRID, 20);
                 let (a, _) = pictures(&mut direct(&memory, None), &look);
-                let (b, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+                let (b, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &look);
                 (file.bytes(), extracted(&file.open()), bits(&a), bits(&b))
             })
         };
@@ -69,7 +69,7 @@ fn files_and_pictures_are_those_of_every_machine() {
     let mut found = vec![digest(pictures(&mut direct(&memory, None), &look).0)];
     for basis in BASES {
         let file = stored(&mut memory.clone(), &config(basis));
-        let (of_file, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+        let (of_file, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &look);
         found.extend([xxh3_64(&file.bytes()), xxh3_64(&extracted(&file.open())), digest(of_file)]);
     }
     assert_eq!(found, DIGESTS);

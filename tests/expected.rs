@@ -5,8 +5,8 @@ use crate::common::views::{archive, field, view};
 use crate::common::{Stored, direct, looking, pictures, report, settings, stored, windows};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{Coding, ConvertConfig, Space};
-use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, What};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
+use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, SplatSource};
 use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 16;
@@ -58,7 +58,7 @@ impl View {
 
     /// The true root mean square error of pictures of a file, and the report.
     fn error(&self, file: &Stored, allowed: Option<f64>) -> (f64, RenderReport) {
-        let mut scene = CoefficientScene::new(file.open(), What::Coefficients);
+        let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
         let (found, report) = pictures(&mut scene, &RenderConfig { allowed, ..self.config.clone() });
         let off: Vec<f32> = found.iter().zip(&self.truth).map(|(a, b)| a - b).collect();
         (root_mean_square(&off, &self.shown), report)
@@ -74,7 +74,8 @@ fn root_mean_square(picture: &[f32], shown: &[bool]) -> f64 {
 fn conversions() -> Vec<(String, ConvertConfig)> {
     let plain = windows(FRAMES).map(|(basis, window)| (format!("{basis:?}"), settings(basis, window, 1e-3)));
     let learned = settings(Basis::Learned, FRAMES, 1e-3);
-    let alone = ConvertConfig { coding: Coding { space: Space::Alone, ..learned.coding }, ..learned };
+    let alone =
+        ConvertConfig { coding: SchemeConstraint { space: SpatialPredictor::Alone, ..learned.coding }, ..learned };
     plain.into_iter().chain([("Learned alone".into(), alone)]).collect()
 }
 

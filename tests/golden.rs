@@ -11,7 +11,7 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{Coding, ConvertConfig, Space};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
 use wavesplat::file::verify::verify;
@@ -64,7 +64,7 @@ fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
     }
     let plain = |basis| settings(basis, window(basis), 0.01);
     let pyramid = |basis, stencil, tolerance| {
-        let coding = Coding { basis: Some(basis), space: Space::Pyramid(stencil) };
+        let coding = SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Pyramid(stencil) };
         ConvertConfig { coding, tolerance, ..plain(basis) }
     };
     let mut add = |name: &str, kind, mask, config| found.push((name.to_string(), F32, kind, mask, config));

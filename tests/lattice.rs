@@ -6,8 +6,8 @@ use crate::images::under_less_memory;
 use crate::reference::splat::Images;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, Scene, What};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
@@ -25,7 +25,7 @@ fn scenes() -> [(Grid, View, f64); 3] {
 
 fn configs() -> [ConvertConfig; 3] {
     let haar = settings(Basis::Haar, 8, 0.01);
-    let auto = ConvertConfig { coding: Coding::AUTO, ..settings(Basis::Haar, 9, 0.01) };
+    let auto = ConvertConfig { coding: SchemeConstraint::AUTO, ..settings(Basis::Haar, 9, 0.01) };
     [ConvertConfig { block: Some(16), ..haar }, auto.clone(), ConvertConfig { block: Some(13), ..auto }]
 }
 
@@ -39,7 +39,7 @@ fn a_lattice_keeps_the_error_that_it_states() {
         for (i, convert) in configs().into_iter().enumerate() {
             let mut memory = archive(grid, SampleType::F64, &samples);
             let stored = stored(&mut memory, &convert);
-            let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+            let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
             for quantity in [Quantity::Emission, Quantity::Mean] {
                 let plain = looking(view, tau, quantity, &grid, FRAMES);
                 let region = Region { start: [1, 2, 3], ..grid.whole() };
@@ -139,7 +139,7 @@ fn memory_changes_no_bit_of_a_lattice() {
     let (grid, view, tau) = scenes()[0];
     let mut memory = archive(grid, SampleType::F64, &field(&grid, FRAMES, 7));
     let stored = stored(&mut memory, &configs()[2]);
-    let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+    let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
     let view = View { size: [150, 140], scale: Some(3.0), ..view };
     let config = RenderConfig { splat_error: 5e-3, ..looking(view, tau, Quantity::Emission, &grid, FRAMES) };
     assert_eq!(pictures(&mut scene, &config).1.views[0].method, "lattice");
@@ -163,7 +163,7 @@ fn what_is_too_deep_to_be_seen_is_left_out_within_the_stated_error() {
             let exact = looking(view, tau, quantity, &grid, FRAMES);
             let quick = RenderConfig { splat_error: 5e-3, ..exact.clone() };
             let seen = truth(&grid, &exact, scale, &vec![0.0; grid.whole().voxels()], None);
-            let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+            let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
             keeps_its_error(&mut scene, [&exact, &quick], (largest, &seen), &format!("tau {tau}, {quantity:?}"));
             let (all, some) = (pictures(&mut scene, &exact).1, pictures(&mut scene, &quick).1);
             assert!((tau == 0.0) == (some.blocks_dimmed == 0) && all.blocks_dimmed == 0, "{tau}");
@@ -186,7 +186,7 @@ fn parts_of_other_frames_are_counted_and_not_read() {
     };
     let mut memory = archive(grid, SampleType::F64, &Vec::from_iter((0..noise.len()).map(value)));
     let stored = stored(&mut memory, &settings(Basis::Samples, 16, 1e-4));
-    let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+    let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
     let all = looking(view(30.0, 30.0, [30, 30]), 0.0, Quantity::Mean, &grid, 16);
     let whole = pictures(&mut scene, &all).1;
     assert_eq!(whole.other_frames, LeftOut::default());
@@ -207,7 +207,7 @@ fn few_frames_by_their_values_are_as_in_all() {
     for (samples, (basis, window)) in [&samples, &holes].into_iter().zip([(Basis::Haar, 32), (Basis::Learned, 33)]) {
         let mut memory = archive(grid, SampleType::F64, samples);
         let stored = stored(&mut memory, &ConvertConfig { block: Some(16), ..settings(basis, window, 0.05) });
-        let mut scene = CoefficientScene::new(stored.open(), What::Coefficients);
+        let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
         for splat_error in [0.0, 5e-3] {
             let plain = looking(view, tau, Quantity::Mean, &grid, 33);
             let config = RenderConfig { splat_error, ..plain };

@@ -10,7 +10,7 @@ use wavesplat::codec::WindowCodec;
 use wavesplat::codec::decode::Block;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 
@@ -83,7 +83,7 @@ fn a_looser_tolerance_reads_fewer_parts_of_a_pyramid_and_certifies_what_it_shows
         for tolerance in [0.0, 0.003, 0.03, 0.3] {
             let allowed = Some(tolerance * file.report.delta / 1e-4).filter(|a| *a > 0.0);
             let config = RenderConfig { certify: true, allowed, ..plain.clone() };
-            let mut scene = CoefficientScene::new(file.open(), What::Coefficients);
+            let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
             let (found, errors, report) = rendered(&mut scene, &config);
             for ((found, error), truth) in found.iter().zip(&errors).zip(&truth) {
                 assert!(truth.is_nan() && found.is_nan() || (found - truth).abs() <= *error, "{found} {truth} {error}");

@@ -12,7 +12,7 @@ use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{Coding, ConvertConfig, Space};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::file::CoefficientFile;
 use wavesplat::wavelet::Basis;
 
@@ -41,7 +41,7 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let bases = [None, Some(Basis::Haar), Some(Basis::Multi), Some(Basis::Samples), Some(Basis::Learned)];
     let basis = bases[random.below(bases.len())];
     let alone = matches!(basis, Some(Basis::Haar | Basis::Multi | Basis::Learned)) && random.below(2) == 0;
-    let space = if alone { Space::Alone } else { Space::Any };
+    let space = if alone { SpatialPredictor::Alone } else { SpatialPredictor::Any };
     let window = 1 << random.below(6);
     let window = if basis == Some(Basis::Multi) { window.max(2) + 1 } else { window };
     let plain = settings(Basis::Haar, window, [0.0, 0.2, 0.02, 1e-3, 1e-6][random.below(5)]);
@@ -49,7 +49,7 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let rainbow = TransferFunction::open("rainbow").unwrap();
     let colours = (random.below(8) == 0).then_some(rainbow); // of which most values are beyond the ends
     let block = Some(1 + random.below(24));
-    let config = ConvertConfig { coding: Coding { basis, space }, bound, block, colours, ..plain };
+    let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()
 }
 

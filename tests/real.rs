@@ -5,7 +5,7 @@ use crate::common::{looking, pictures, settings, stored};
 use std::path::PathBuf;
 use wavesplat::base::progress::Silent;
 use wavesplat::file::verify::verify;
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, What};
+use wavesplat::render::{CoefficientScene, FrameScene, Quantity, SplatSource};
 use wavesplat::source::{FrameSource, OpenOptions, open};
 use wavesplat::wavelet::Basis;
 
@@ -37,7 +37,7 @@ fn the_plate_keeps_its_bound_in_samples_and_pixels() {
             let against = verify(&file.open(), Some(source.as_mut()), 64 << 20, &Silent).unwrap().against.unwrap();
             assert_eq!(against.series_outside, 0);
             assert!(against.largest_error <= tolerance * (hi - lo) && against.largest_error > 0.0);
-            let mut scene = CoefficientScene::new(file.open(), What::Coefficients);
+            let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
             for (look, expected) in looks.iter().zip(&expected) {
                 let (found, _) = pictures(&mut scene, look);
                 for (a, b) in found.iter().zip(expected) {

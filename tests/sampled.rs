@@ -14,7 +14,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::convert::sampled::pixels;
-use wavesplat::render::{CoefficientScene, Quantity, What};
+use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::wavelet::Basis;
 
@@ -93,7 +93,7 @@ fn errors_of_pixels(memory: &Memory, bound: Bound) -> [f64; 3] {
     for (azimuth, elevation) in [(0.0, 0.0), (90.0, 0.0), (0.0, 90.0)] {
         let look = looking(view(azimuth, elevation, [32, 32]), 0.0, Quantity::Mean, &GRID, FRAMES);
         let (g, _) = pictures(&mut direct(memory, None), &look);
-        let (found, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+        let (found, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &look);
         for (g, found) in g.into_iter().zip(found).filter(|(g, _)| !g.is_nan()) {
             let off = (f64::from(g) - f64::from(found)).abs() - rounding(g) - rounding(found);
             let share = off / (TOLERANCE * f64::from(g));

@@ -9,10 +9,10 @@ use crate::reference::decode::{Pyramid, haar, learned, learned_functions, multi,
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::WindowCodec;
-use wavesplat::codec::bound::{Bound, Promise};
+use wavesplat::codec::bound::{Bound, ErrorBound};
 use wavesplat::codec::decode::Block;
 use wavesplat::codec::scheme::{Axis, Scheme, Stencil, Window};
-use wavesplat::convert::{Coding, ConvertConfig, Space};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::file::CoefficientFile;
 use wavesplat::wavelet::{Basis, LANES, Lane, basis};
 use wavesplat_format::{BlockEntry, Outliers, PartKind};
@@ -71,7 +71,7 @@ fn pyramids_decode_to_the_specified_bits() {
         let expected = spelled_out(&pyramid).decode(extents, step, &codes);
         let what = format!("case {case}: {pyramid:?}, {extents:?}, step {step:e}");
         let scheme = Scheme { pyramid: Some(pyramid), ..Scheme::along_time(Basis::Samples) };
-        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+        let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
         let codec = WindowCodec::new(scheme, extents[3], SampleType::F64, promise, 20);
         let block = Block {
             size: [extents[0], extents[1], extents[2]],
@@ -246,7 +246,12 @@ fn check_file(stored: &Stored) -> usize {
     coded
 }
 
-const SPACES: [Space; 4] = [Space::Any, Space::Alone, Space::Pyramid(Stencil::Linear), Space::Pyramid(Stencil::Cubic)];
+const SPACES: [SpatialPredictor; 4] = [
+    SpatialPredictor::Any,
+    SpatialPredictor::Alone,
+    SpatialPredictor::Pyramid(Stencil::Linear),
+    SpatialPredictor::Pyramid(Stencil::Cubic),
+];
 
 #[test]
 fn files_decode_as_specified() {
@@ -257,7 +262,7 @@ fn files_decode_as_specified() {
     let (mut random, mut coded) = (Random(13), 0);
     for (n, basis) in bases.into_iter().enumerate() {
         for (m, space) in SPACES.into_iter().enumerate() {
-            if space == Space::Alone && matches!(basis, None | Some(Basis::Samples)) {
+            if space == SpatialPredictor::Alone && matches!(basis, None | Some(Basis::Samples)) {
                 continue;
             }
             for (l, kind) in kinds.into_iter().enumerate() {
@@ -269,8 +274,12 @@ fn files_decode_as_specified() {
                 let tolerance = [0.2, 0.02, 1e-3, 1e-6][random.below(4)];
                 let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor: 0.1 }][random.below(3)];
                 let plain = settings(Basis::Haar, window, tolerance);
-                let config =
-                    ConvertConfig { coding: Coding { basis, space }, bound, block: Some(1 + random.below(9)), ..plain };
+                let config = ConvertConfig {
+                    coding: SchemeConstraint { basis, space },
+                    bound,
+                    block: Some(1 + random.below(9)),
+                    ..plain
+                };
                 coded += check_file(&stored(&mut Memory::new(Grid::unit(dims), ty, data), &config));
             }
         }
@@ -290,7 +299,7 @@ fn every_node_is_within_half_a_step_of_its_level() {
         for stencil in [Stencil::Linear, Stencil::Cubic] {
             let ty = SampleType::F64;
             let data = volume(kind, ty, Mask::None, dims.iter().product(), frames, seed as u64);
-            let coding = Coding { basis: Some(Basis::Samples), space: Space::Pyramid(stencil) };
+            let coding = SchemeConstraint { basis: Some(Basis::Samples), space: SpatialPredictor::Pyramid(stencil) };
             let config = ConvertConfig { coding, block: Some(10), ..settings(Basis::Samples, 16, 1e-5) };
             let mut memory = Memory::new(Grid::unit(dims), ty, data);
             let file = stored(&mut memory, &config).open();

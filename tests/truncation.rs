@@ -13,7 +13,7 @@ use crate::reference::truncate::{Measure, fewest};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
-use wavesplat::convert::{Coding, ConvertConfig, Space};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::wavelet::Basis;
 
 const VOXELS: usize = 64;
@@ -92,7 +92,7 @@ fn the_coefficients_kept_are_near_the_fewest_possible() {
             let (mut ours, mut best, mut cases) = (0.0, 0.0, 0.0);
             for kind in ["noise", "ramp", "wave", "flash", "step"] {
                 for tolerance in [0.02, 0.1, 0.25] {
-                    let coding = Coding { basis: Some(basis), space: Space::Alone };
+                    let coding = SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Alone };
                     let config = ConvertConfig { bound, coding, ..settings(basis, frames, tolerance) };
                     let [found, fewest] = compare(kind, frames, &config, known.as_ref());
                     let what = format!("{basis:?} {bound:?} {kind} {tolerance}: {found:.2} kept, {fewest:.2} needed");

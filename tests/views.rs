@@ -6,8 +6,8 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{Coding, ConvertConfig};
-use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, render};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render};
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
@@ -71,22 +71,22 @@ fn every_view_of_a_run_is_what_it_is_alone() {
     let samples = field(&GRID, FRAMES, 5);
     let mut memory = archive(GRID, SampleType::F32, &samples);
     let haar = ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) };
-    let auto = ConvertConfig { coding: Coding::AUTO, block: Some(20), ..settings(Basis::Haar, 8, 0.02) };
+    let auto = ConvertConfig { coding: SchemeConstraint::AUTO, block: Some(20), ..settings(Basis::Haar, 8, 0.02) };
     let (haar, auto) = (stored(&mut memory, &haar), stored(&mut memory, &auto));
     for (quantity, tau) in [(Quantity::Mean, 0.0), (Quantity::Emission, 0.3)] {
         let plain = looking(view(0.0, 0.0, [70, 66]), tau, quantity, &GRID, FRAMES);
         let config = RenderConfig { views: views(), splat_error: 5e-3, ..plain };
         for file in [&haar, &auto] {
-            for what in [What::Coefficients, What::Samples] {
+            for what in [SplatSource::Coefficients, SplatSource::Samples] {
                 let sufficed = each_as_alone(&mut CoefficientScene::new(file.open(), what), &config);
                 assert!(sufficed >= 2, "{sufficed} budgets sufficed");
             }
         }
         each_as_alone(&mut direct(&memory, None), &config);
         let certified = RenderConfig { certify: true, ..config.clone() };
-        each_as_alone(&mut CoefficientScene::new(haar.open(), What::Coefficients), &certified);
+        each_as_alone(&mut CoefficientScene::new(haar.open(), SplatSource::Coefficients), &certified);
         let limited = RenderConfig { allowed: Some(0.2), limited: Limit::Expected, ..config };
-        each_as_alone(&mut CoefficientScene::new(auto.open(), What::Coefficients), &limited);
+        each_as_alone(&mut CoefficientScene::new(auto.open(), SplatSource::Coefficients), &limited);
     }
 }
 
@@ -94,7 +94,7 @@ fn every_view_of_a_run_is_what_it_is_alone() {
 fn each_block_is_decoded_once_for_all_views() {
     let mut memory = archive(GRID, SampleType::F32, &field(&GRID, FRAMES, 5));
     let file = stored(&mut memory, &ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) });
-    let mut scene = CoefficientScene::new(file.open(), What::Coefficients);
+    let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
     for splat_error in [0.0, 5e-3] {
         let plain = looking(view(30.0, 75.0, [70, 66]), 0.0, Quantity::Mean, &GRID, FRAMES);
         let one = RenderConfig { splat_error, ..plain };

@@ -13,7 +13,7 @@ use crate::structure::check_padding;
 use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
 use crate::{Result, Storage};
 
-/// Whole windows at the beginning of a file, from which [`crate::Writer::go_on`] goes on.
+/// Whole windows at the beginning of a file, from which [`crate::Writer::resume`] goes on.
 #[derive(Debug, Clone)]
 pub struct Unfinished {
     pub(crate) id: FileId,

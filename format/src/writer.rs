@@ -65,7 +65,7 @@ impl<W: Write> Writer<W> {
     }
 
     /// Goes on after the whole windows of a file that was not finished; `out` is where they end.
-    pub fn go_on(out: W, unfinished: Unfinished) -> Self {
+    pub fn resume(out: W, unfinished: Unfinished) -> Self {
         Self::at(out, unfinished)
     }
 

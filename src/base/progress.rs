@@ -5,7 +5,7 @@ pub trait Progress: Sync {
     /// The work has this many steps, or an unknown number.
     fn start(&self, steps: Option<u64>);
     /// So many of them were done before, by an earlier run: they say nothing of the speed.
-    fn go_on(&self, steps: u64) {
+    fn resume(&self, steps: u64) {
         self.advance(steps);
     }
     /// So many more steps are done.

@@ -64,7 +64,7 @@ const HEADERLESS: [&str; 3] = ["raw", "bin", "img"];
 fn is_frames(word: &str) -> bool {
     let word = word.to_lowercase();
     let ends = |ending| word.strip_suffix(ending).is_some_and(|name: &str| name.ends_with('.'));
-    source::endings().chain(HEADERLESS).any(ends)
+    source::extensions().chain(HEADERLESS).any(ends)
 }
 
 /// Who takes an option that a command does not know.

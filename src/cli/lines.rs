@@ -50,7 +50,7 @@ impl Lines {
         self.tell(&mut state);
     }
 
-    pub(super) fn go_on(&self, steps: u64) {
+    pub(super) fn resume(&self, steps: u64) {
         let mut state = self.state();
         (state.done, state.before) = (steps, steps);
     }

@@ -45,10 +45,10 @@ impl Progress for TerminalProgress {
         }
     }
 
-    fn go_on(&self, steps: u64) {
+    fn resume(&self, steps: u64) {
         match self {
-            Self::Bar(bar) => bar.go_on(steps),
-            Self::Lines(lines) => lines.go_on(steps),
+            Self::Bar(bar) => bar.resume(steps),
+            Self::Lines(lines) => lines.resume(steps),
         }
     }
 
@@ -88,7 +88,7 @@ impl Bar {
         }
     }
 
-    fn go_on(&self, steps: u64) {
+    fn resume(&self, steps: u64) {
         self.bar.set_position(steps);
         self.bar.reset_eta();
     }

@@ -62,7 +62,7 @@ pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
 
 /// What is promised of the samples of one window.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Promise {
+pub struct ErrorBound {
     /// Of which kind.
     pub bound: Bound,
     /// As asked for: the share of the value range, or of the magnitude of each sample.
@@ -80,7 +80,7 @@ pub enum Measure {
     RootMeanSquare,
 }
 
-impl Promise {
+impl ErrorBound {
     /// How the shares of samples make up that of a series.
     pub fn measure(&self) -> Measure {
         match self.bound {
@@ -228,14 +228,14 @@ mod tests {
     #[test]
     fn errors_of_just_delta_keep_the_root_mean_square() {
         for delta in [0.0, 5e-324, 1e-200, 0.1, 4.0, f64::MAX] {
-            let promise = Promise { bound: Bound::Rms, tolerance: 0.1, delta };
+            let promise = ErrorBound { bound: Bound::Rms, tolerance: 0.1, delta };
             assert!(promise.holds([(delta, delta); 3].into_iter()), "{delta}");
             assert!(!promise.holds([(delta.next_up(), delta); 3].into_iter()), "{delta}");
         }
     }
 
-    fn relative(tolerance: f64, floor: f64) -> Promise {
-        Promise { bound: Bound::Relative { floor }, tolerance, delta: relative_bound(tolerance, floor, -8.0) }
+    fn relative(tolerance: f64, floor: f64) -> ErrorBound {
+        ErrorBound { bound: Bound::Relative { floor }, tolerance, delta: relative_bound(tolerance, floor, -8.0) }
     }
 
     #[test]
@@ -289,7 +289,7 @@ mod tests {
             values in proptest::collection::vec((-1e3..1e3, 0.0..30.0), 1..40), kind in 0..3_usize, floor in 0.0..10.0,
         ) {
             let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor }][kind];
-            let promise = Promise { bound, tolerance: 0.02, delta: 20.0 };
+            let promise = ErrorBound { bound, tolerance: 0.02, delta: 20.0 };
             let mut sums = [0.0];
             values.iter().for_each(|(v, e)| promise.add(&[*e], &[*v], &mut sums));
             let fast = promise.largest_share(&sums, values.len());

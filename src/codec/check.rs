@@ -124,7 +124,7 @@ struct Seen {
     missing: Lane,
     largest: Lane,
     squares: Lane,
-    /// Of [`crate::codec::bound::Promise::add`].
+    /// Of [`crate::codec::bound::ErrorBound::add`].
     sums: Lane,
 }
 
@@ -193,7 +193,7 @@ fn look_at_doubles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::codec::bound::Promise;
+    use crate::codec::bound::ErrorBound;
     use crate::codec::scheme::Scheme;
     use crate::wavelet::Basis;
 
@@ -203,7 +203,7 @@ mod tests {
         let lanes = |first: usize| (0..40).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
         let (source, mut decoded): (Vec<Lane>, Vec<Lane>) = (lanes(0), lanes(5));
         (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
-        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
+        let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
         for ty in [SampleType::F32, SampleType::F64] {
             let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), 40, ty, promise, 8);
             codec.missing_value = Some(-9.5);

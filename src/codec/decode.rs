@@ -3,7 +3,7 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::field::{Field, Plane};
-use super::pyramid::Passes;
+use super::pyramid::PredictionPasses;
 use super::rows::Change;
 use crate::base::sample;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
@@ -121,7 +121,7 @@ impl Block {
             let ranges = codec.part_ranges(self.size).into_iter();
             return ranges.map(|part| self.codes.get(part).map_or(0.0, of_codes)).collect();
         };
-        let passes = Passes::new(pyramid, codec.shape(self.size));
+        let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
         self.field(codec).changes(&passes).iter().map(Change::largest).collect()
     }
 

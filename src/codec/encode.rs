@@ -3,11 +3,11 @@
 use super::buffer::clear;
 use super::check::Tally;
 use super::load::{Missing, load_group};
-use super::pyramid::Passes;
+use super::pyramid::PredictionPasses;
 use super::refine::{Coded, Source};
 use super::rows::Change;
 use super::truncate::Group;
-use super::weigh::Weighing;
+use super::weigh::QuantizerSetup;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
@@ -79,7 +79,7 @@ impl Encoder {
     fn series(&mut self, block: &Source<'_>) -> Option<Coded> {
         let &Source { codec, samples, missing, .. } = block;
         let voxels = block.voxels();
-        let weighing = Weighing::of(codec, samples, missing.magnitude)?;
+        let weighing = QuantizerSetup::of(codec, samples, missing.magnitude)?;
         let step = weighing.step;
         clear(&mut self.codes).resize(codec.basis.coefficients() * voxels, 0);
         let mut group = Group::new(codec);
@@ -113,7 +113,7 @@ impl Encoder {
     /// The parts of a block coded by coefficients.
     fn coded_parts(&mut self, block: &Source<'_>, coded: &Coded) -> wavesplat_format::Result<Parts> {
         let codec = block.codec;
-        let passes = codec.scheme.pyramid.as_ref().map(|p| Passes::new(p, codec.shape(block.size)));
+        let passes = codec.scheme.pyramid.as_ref().map(|p| PredictionPasses::new(p, codec.shape(block.size)));
         let mut parts = Vec::new();
         for (level, range) in (0..).zip(codec.part_ranges(block.size)) {
             let codes = &self.codes[range];

@@ -2,7 +2,7 @@
 
 use super::WindowCodec;
 use super::buffer::{Buffer, Pooled};
-use super::pyramid::Passes;
+use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::wavelet::{LANES, Lane, TimeBasis};
@@ -58,7 +58,7 @@ impl<'a> Plane<'a> {
             let voxels: usize = size.iter().product();
             return Self::scaled(step, codes.get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
         };
-        let passes = Passes::new(pyramid, codec.shape(size));
+        let passes = PredictionPasses::new(pyramid, codec.shape(size));
         match pyramid.single {
             _ if codes.is_empty() => Self::Zero,
             true if passes.decode_one(k, step, codes, single) => Self::Single(single),
@@ -115,7 +115,7 @@ impl<'a> Field<'a> {
     }
 
     /// What leaving out each level part of a pyramid and all finer ones changes.
-    pub(super) fn changes(&self, passes: &Passes<'_>) -> Vec<Change> {
+    pub(super) fn changes(&self, passes: &PredictionPasses<'_>) -> Vec<Change> {
         match &self.values {
             Values::Single(field) => passes.changes(field, &mut Vec::new()),
             Values::Double(field) => passes.changes(field, &mut Vec::new()),
@@ -260,6 +260,6 @@ fn refined<'a, R: Real + Pooled>(
     values: fn(Buffer<R>) -> Values<'a>,
 ) -> (Values<'a>, Vec<bool>) {
     let mut field = Buffer::of(codes.len());
-    let marked = Passes::new(pyramid, shape).decode(step, codes, &mut field);
+    let marked = PredictionPasses::new(pyramid, shape).decode(step, codes, &mut field);
     (values(field), marked)
 }

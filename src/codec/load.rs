@@ -2,7 +2,7 @@
 
 use super::WindowCodec;
 use super::truncate::Group;
-use super::weigh::Weighing;
+use super::weigh::QuantizerSetup;
 use crate::base::sample;
 use crate::wavelet::{LANES, Lane};
 
@@ -41,7 +41,7 @@ impl Missing {
 /// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
 pub(super) fn load_group(
     codec: &WindowCodec,
-    weighing: &Weighing,
+    weighing: &QuantizerSetup,
     samples: &[u8],
     missing: &Missing,
     first: usize,

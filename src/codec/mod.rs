@@ -22,9 +22,9 @@ mod truncate;
 mod weigh;
 
 use crate::base::sample::{self, SampleType};
-use crate::codec::bound::{Promise, difference_up};
+use crate::codec::bound::{ErrorBound, difference_up};
 use crate::wavelet::{self, LANES, TimeBasis};
-use pyramid::Passes;
+use pyramid::PredictionPasses;
 use scheme::Scheme;
 use std::ops::Range;
 use wavesplat_format::{Metadata, Pyramid, Window};
@@ -43,7 +43,7 @@ pub struct WindowCodec {
     /// The type of the samples.
     pub sample: SampleType,
     /// What is promised.
-    pub promise: Promise,
+    pub promise: ErrorBound,
     /// The sample that stands for "missing" besides NaN and infinities.
     pub missing_value: Option<f64>,
     /// Without a pyramid: the coefficients in each level part of a block, coarse to fine.
@@ -52,7 +52,7 @@ pub struct WindowCodec {
 
 impl WindowCodec {
     /// The codec of a window of `frames` frames whose blocks are at most `edge` voxels a side.
-    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, promise: Promise, edge: usize) -> Self {
+    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, promise: ErrorBound, edge: usize) -> Self {
         let basis = scheme.time_basis(frames);
         let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
         Self::with_levels(scheme, basis, sample, promise, &levels)
@@ -62,7 +62,7 @@ impl WindowCodec {
         scheme: Scheme,
         basis: Box<dyn TimeBasis>,
         sample: SampleType,
-        promise: Promise,
+        promise: ErrorBound,
         levels: &[usize],
     ) -> Self {
         let synthesis = wavelet::synthesis(basis.as_ref());
@@ -81,7 +81,7 @@ impl WindowCodec {
             return Err(wavesplat_format::Error::Invalid(what));
         }
         let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
-        let promise = Promise { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
+        let promise = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
         let codec = Self::with_levels(scheme, basis, file.sample, promise, &levels);
         Ok(Self { missing_value: file.missing_value, ..codec })
     }
@@ -110,7 +110,7 @@ impl WindowCodec {
     fn part_ranges(&self, size: [usize; 3]) -> Vec<Range<usize>> {
         let voxels: usize = size.iter().product();
         match &self.scheme.pyramid {
-            Some(pyramid) => wavelet::ranges(&Passes::new(pyramid, self.shape(size)).part_lengths()),
+            Some(pyramid) => wavelet::ranges(&PredictionPasses::new(pyramid, self.shape(size)).part_lengths()),
             None => self.levels.iter().map(|k| k.start * voxels..k.end * voxels).collect(),
         }
     }

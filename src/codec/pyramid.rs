@@ -15,7 +15,7 @@ const PARTS: usize = Pyramid::PARTS as usize;
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
-pub(crate) struct Passes<'a> {
+pub(crate) struct PredictionPasses<'a> {
     pyramid: &'a Pyramid,
     /// Nodes that are refined together: all, or those of one k where k is not refined.
     shape: [usize; 4],
@@ -24,7 +24,7 @@ pub(crate) struct Passes<'a> {
     passes: Vec<Pass>,
 }
 
-impl<'a> Passes<'a> {
+impl<'a> PredictionPasses<'a> {
     pub(crate) fn new(pyramid: &'a Pyramid, [x, y, z, k]: [usize; 4]) -> Self {
         let apart = !pyramid.order.contains(&Axis::T);
         let (shape, slices) = if apart { ([x, y, z, 1], k) } else { ([x, y, z, k], 1) };

@@ -4,11 +4,11 @@ use super::buffer::clear;
 use super::check::{Compared, Tally};
 use super::field::Used;
 use super::load::{Missing, load_group};
-use super::pyramid::Passes;
+use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
-use super::weigh::Weighing;
+use super::weigh::QuantizerSetup;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use crate::codec::bound::Measure;
@@ -48,11 +48,11 @@ impl Source<'_> {
         [field, rest]: &mut [Vec<R>; 2],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
-        let weighing = Weighing::of(self.codec, self.samples, self.missing.magnitude)?;
+        let weighing = QuantizerSetup::of(self.codec, self.samples, self.missing.magnitude)?;
         let step = self.step::<R>(pyramid, &weighing)?;
         self.load(&weighing, field);
         codes.resize(field.len(), 0);
-        let passes = Passes::new(pyramid, self.codec.shape(self.size));
+        let passes = PredictionPasses::new(pyramid, self.codec.shape(self.size));
         if !passes.encode(step, field, codes) {
             return None;
         }
@@ -67,7 +67,7 @@ impl Source<'_> {
     }
 
     /// The step of the finest codes. None if the block must be stored exactly.
-    pub(super) fn step<R: Real>(&self, pyramid: &Pyramid, weighing: &Weighing) -> Option<f64> {
+    pub(super) fn step<R: Real>(&self, pyramid: &Pyramid, weighing: &QuantizerSetup) -> Option<f64> {
         let rounding = if pyramid.single { self.missing.magnitude * SINGLE_ROUNDING } else { 0.0 };
         let step = weighing.step * self.codec.scheme.coarseness - rounding;
         (step.is_normal() && step >= 0.0 && self.missing.magnitude <= R::LARGEST).then_some(step)
@@ -79,7 +79,7 @@ impl Source<'_> {
     }
 
     /// The nodes that the pyramid refines.
-    pub(super) fn load<R: Real>(&self, weighing: &Weighing, field: &mut Vec<R>) {
+    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup, field: &mut Vec<R>) {
         field.resize(self.codec.basis.coefficients() * self.voxels(), R::default());
         if self.plain() {
             self.load_samples(field);
@@ -98,7 +98,7 @@ impl Source<'_> {
     }
 
     /// The coefficients of all series.
-    fn load_series<R: Real>(&self, weighing: &Weighing, field: &mut [R]) {
+    fn load_series<R: Real>(&self, weighing: &QuantizerSetup, field: &mut [R]) {
         let (codec, voxels) = (self.codec, self.voxels());
         let mut group = Group::new(codec);
         for (first, count) in lane_groups(voxels) {
@@ -118,7 +118,7 @@ impl Source<'_> {
     fn check_samples<R: Real>(&self, field: &[R]) -> Option<Tally> {
         let (mut tally, mut decoded) = (Tally::new(), Vec::new());
         sample::for_each_run(self.codec.sample, self.samples, |first, values| {
-            if !self.few(tally.places.len()) {
+            if !self.outliers_affordable(tally.places.len()) {
                 return;
             }
             clear(&mut decoded).extend(field[first..][..values.len()].iter().map(|node| node.to_f64()));
@@ -134,11 +134,11 @@ impl Source<'_> {
                 tally.add_series(self.codec, &Compared { source, decoded }, last_source.len(), present, place(first));
             }
         });
-        self.few(tally.places.len()).then_some(tally)
+        self.outliers_affordable(tally.places.len()).then_some(tally)
     }
 
     /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
-    fn check_series<R: Real>(&self, weighing: &Weighing, field: &[R], marked: &[bool]) -> Option<Tally> {
+    fn check_series<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> Option<Tally> {
         let used = Used::of(self.codec.basis.as_ref(), marked);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()) {
@@ -151,7 +151,7 @@ impl Source<'_> {
     /// A group of series, and what the decoder makes of the field there.
     fn decode_group<R: Real>(
         &self,
-        weighing: &Weighing,
+        weighing: &QuantizerSetup,
         (field, used): (&[R], &Used),
         (first, count): (usize, usize),
         group: &mut Group,
@@ -170,7 +170,7 @@ impl Source<'_> {
     }
 
     /// About how many samples miss the bound: a few of the series are looked at.
-    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &Weighing, field: &[R], marked: &[bool]) -> usize {
+    pub(super) fn estimate_outliers<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> usize {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
             return 0;
         }
@@ -186,7 +186,7 @@ impl Source<'_> {
     /// Compares a group's decoded series with the source. None if too many samples miss the bound by now.
     pub(super) fn check(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) -> Option<()> {
         self.add(group, (first, count), tally);
-        self.few(tally.places.len()).then_some(())
+        self.outliers_affordable(tally.places.len()).then_some(())
     }
 
     fn add(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) {
@@ -201,7 +201,7 @@ impl Source<'_> {
     }
 
     /// Whether so few samples miss the bound that storing them is cheaper than storing all.
-    pub(super) fn few(&self, outliers: usize) -> bool {
+    pub(super) fn outliers_affordable(&self, outliers: usize) -> bool {
         outliers <= self.missing.mask.len() / MOST_OUTLIERS
     }
 }

@@ -3,10 +3,10 @@
 use super::WindowCodec;
 use super::buffer::clear;
 use super::load::Missing;
-use super::pyramid::Passes;
+use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::refine::Source;
-use super::weigh::Weighing;
+use super::weigh::QuantizerSetup;
 use wavesplat_format::{Pyramid, estimate_cells};
 
 /// A box of samples, and the nodes that pyramids refine: the same for all schemes with one transform along time.
@@ -14,7 +14,7 @@ pub(crate) struct Trial<'a, R> {
     size: [usize; 3],
     samples: &'a [u8],
     missing: Missing,
-    weighing: Option<Weighing>,
+    weighing: Option<QuantizerSetup>,
     nodes: Vec<R>,
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct Scratch<R> {
 impl<'a, R: Real> Trial<'a, R> {
     pub(crate) fn new(codec: &WindowCodec, size: [usize; 3], samples: &'a [u8]) -> Self {
         let missing = Missing::find(codec, samples);
-        let weighing = Weighing::of(codec, samples, missing.magnitude);
+        let weighing = QuantizerSetup::of(codec, samples, missing.magnitude);
         let mut nodes = Vec::new();
         if let Some(weighing) = &weighing {
             Source { codec, size, samples, missing: &missing }.load(weighing, &mut nodes);
@@ -58,7 +58,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let step = source.step::<R>(pyramid, weighing)?;
         clear(field).extend_from_slice(&self.nodes);
         codes.resize(field.len(), 0);
-        let passes = Passes::new(pyramid, codec.shape(self.size));
+        let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
         if !passes.encode(step, field, codes) {
             return None;
         }
@@ -66,7 +66,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let parts = (0..).zip(codec.part_ranges(self.size));
         let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
         // Where there are too many, all is stored exactly; the fewer, the nearer is a step that does.
-        let rest = if source.few(outliers) { packed } else { self.samples.len() };
+        let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
         Some(rest + outliers * (GAP + codec.sample.size()))
     }
 }
@@ -78,7 +78,7 @@ const GAP: usize = 1;
 mod tests {
     use super::*;
     use crate::base::sample::{self, SampleType};
-    use crate::codec::bound::{Bound, Promise};
+    use crate::codec::bound::{Bound, ErrorBound};
     use crate::codec::encode::Encoder;
     use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
     use wavesplat_format::BlockId;
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn estimates_are_close_to_what_is_stored() {
         let (samples, xyzt) = (samples(), [Axis::X, Axis::Y, Axis::Z, Axis::T]);
-        let promise = Promise { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
         for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
             let (order, stencil) = (order.to_vec(), Stencil::Cubic);
             let pyramid = Pyramid { order, stencil, growth: 1.5, most: 3.0, single: true };

@@ -2,15 +2,15 @@
 
 use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
-use crate::codec::bound::{self, Bound, Promise};
+use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::wavelet::{LANES, Lane};
 
 /// The weights of a block's errors, with which every bound reads "the measure is at most 1"; and the step that suits them.
 ///
 /// They are a good guess: rounding to the samples' type comes after, and what is decoded decides.
 #[derive(Debug)]
-pub(super) struct Weighing {
-    promise: Promise,
+pub(super) struct QuantizerSetup {
+    promise: ErrorBound,
     sample: SampleType,
     /// Smaller samples weigh as this one: those that then miss a relative bound are few, and stored exactly.
     floor: f64,
@@ -20,7 +20,7 @@ pub(super) struct Weighing {
     pub(super) step: f64,
 }
 
-impl Weighing {
+impl QuantizerSetup {
     /// Of a block whose largest sample is `magnitude`. None if no error is left, so that the block must be stored exactly.
     pub(super) fn of(codec: &WindowCodec, samples: &[u8], magnitude: f64) -> Option<Self> {
         let found = match codec.promise.bound {

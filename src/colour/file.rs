@@ -156,9 +156,9 @@ mod tests {
             space in 0..6_usize,
             value in -1e300..1e300,
         ) {
-            use crate::colour::{Colour, Space};
+            use crate::colour::{Colour, ColourSpace};
             points.sort_by(|a: &(f64, Colour), b| a.0.total_cmp(&b.0));
-            let spaces = [Space::Rgb, Space::Hsv, Space::HsvWrapped, Space::Lab, Space::Diverging, Space::Step];
+            let spaces = [ColourSpace::Rgb, ColourSpace::Hsv, ColourSpace::HsvWrapped, ColourSpace::Lab, ColourSpace::Diverging, ColourSpace::Step];
             let map = TransferFunction::of_points(points, spaces[space], None, None).map_err(TestCaseError::reject)?;
             for map in [map.over((-3.3, 7.7)).expect("a range"), map] {
                 let again = TransferFunction::of_text(&map.text()).expect("the same");

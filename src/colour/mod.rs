@@ -15,7 +15,7 @@ mod table;
 pub use named::NAMES;
 use named::Named;
 pub use scale::{Norm, Scale};
-pub use space::Space;
+pub use space::ColourSpace;
 
 use crate::base::error::{Error, Result};
 use std::path::Path;
@@ -45,7 +45,7 @@ enum Colours {
     /// One of [`NAMES`].
     Named(&'static Named),
     /// (value, colour), ascending, two or more, and how to get from one to the next.
-    Points(Vec<(f64, Colour)>, Space),
+    Points(Vec<(f64, Colour)>, ColourSpace),
 }
 
 impl TransferFunction {
@@ -74,7 +74,7 @@ impl TransferFunction {
     /// 0 to 1: in words that follow a name.
     pub fn of_points(
         points: Vec<(f64, Colour)>,
-        space: Space,
+        space: ColourSpace,
         opacity: Option<Vec<(f64, f64)>>,
         nan: Option<Colour>,
     ) -> std::result::Result<Self, String> {
@@ -159,7 +159,7 @@ impl TransferFunction {
     pub fn is_diverging(&self) -> bool {
         match &self.colours {
             Colours::Named(named) => named.is_diverging(),
-            Colours::Points(_, space) => *space == Space::Diverging,
+            Colours::Points(_, space) => *space == ColourSpace::Diverging,
         }
     }
 
@@ -212,7 +212,7 @@ impl TransferFunction {
     fn is_slow(&self) -> bool {
         match &self.colours {
             Colours::Named(_) => false,
-            Colours::Points(_, space) => !matches!(space, Space::Rgb | Space::Step),
+            Colours::Points(_, space) => !matches!(space, ColourSpace::Rgb | ColourSpace::Step),
         }
     }
 
@@ -238,7 +238,7 @@ impl TransferFunction {
         };
         let point = |text: &str| numbers(text)?.try_into().ok().map(|[v, r, g, b]: [f64; 4]| (v, [r, g, b]));
         let points = points.split(';').map(point).collect::<Option<Vec<_>>>()?;
-        Self::of_points(points, Space::named(space)?, None, None).ok()
+        Self::of_points(points, ColourSpace::named(space)?, None, None).ok()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The maps of the field by their names.
 
 use super::Colour;
-use super::space::Space;
+use super::space::ColourSpace;
 use std::sync::LazyLock;
 
 /// The names of the colour maps.
@@ -25,7 +25,7 @@ impl Named {
     pub(super) fn colour(&self, t: f64) -> Colour {
         let place = t * (self.colours.len() - 1) as f64;
         let n = (place as usize).min(self.colours.len() - 2);
-        Space::Rgb.between(self.colours[n], self.colours[n + 1], place - n as f64)
+        ColourSpace::Rgb.between(self.colours[n], self.colours[n + 1], place - n as f64)
     }
 }
 
@@ -49,7 +49,9 @@ fn colours(name: &str) -> Vec<Colour> {
         "magma" => colorous::MAGMA,
         "cividis" => colorous::CIVIDIS,
         "turbo" => colorous::TURBO,
-        "coolwarm" => return (0..=256).map(|n| Space::Diverging.between(COOL, WARM, f64::from(n) / 256.0)).collect(),
+        "coolwarm" => {
+            return (0..=256).map(|n| ColourSpace::Diverging.between(COOL, WARM, f64::from(n) / 256.0)).collect();
+        }
         "grey" => return vec![[0.0; 3], [1.0; 3]],
         _ => return BLUE_TO_RED.to_vec(),
     };

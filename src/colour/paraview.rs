@@ -1,6 +1,6 @@
 //! ParaView's colour maps: JSON as its colour map editor exports and imports it.
 
-use super::{Colour, Space, TransferFunction};
+use super::{Colour, ColourSpace, TransferFunction};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -87,11 +87,11 @@ fn fours<'a>(name: &str, what: &str, numbers: &'a [f64]) -> Result<&'a [[f64; 4]
     }
 }
 
-fn space(map: &Map) -> Result<Space, String> {
+fn space(map: &Map) -> Result<ColourSpace, String> {
     let wrapped = map.wrapped.as_ref().is_some_and(|w| w.as_bool().unwrap_or(w.as_f64() != Some(0.0)));
-    let Some(name) = map.space.as_deref() else { return Ok(Space::Rgb) };
-    match Space::named(if name.eq_ignore_ascii_case("CIELAB") { "Lab" } else { name }) {
-        Some(Space::Hsv) if wrapped => Ok(Space::HsvWrapped),
+    let Some(name) = map.space.as_deref() else { return Ok(ColourSpace::Rgb) };
+    match ColourSpace::named(if name.eq_ignore_ascii_case("CIELAB") { "Lab" } else { name }) {
+        Some(ColourSpace::Hsv) if wrapped => Ok(ColourSpace::HsvWrapped),
         Some(space) => Ok(space),
         None => Err(format!("has the ColorSpace '{name}', where RGB, HSV, Lab, Diverging or Step is expected")),
     }

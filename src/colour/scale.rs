@@ -152,7 +152,8 @@ mod tests {
     #[test]
     fn a_table_is_off_by_no_more_than_rounding() {
         let points = vec![(0.0, [0.2, 0.3, 0.8]), (1.0, [0.7, 0.0, 0.1])];
-        let map = TransferFunction::of_points(points, crate::colour::Space::Diverging, None, None).expect("two points");
+        let map =
+            TransferFunction::of_points(points, crate::colour::ColourSpace::Diverging, None, None).expect("two points");
         let scale = Scale::new(&map, (0.0, 1.0), Norm::Linear, [0; 3]).expect("a range");
         assert!(!scale.table.is_empty());
         for share in (0..=9999).map(|i| f64::from(i) / 9999.0) {

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 /// How colours are interpolated: as VTK does, so that maps look as in ParaView.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Space {
+pub enum ColourSpace {
     /// Red, green and blue each by itself.
     Rgb,
     /// Hue, saturation and value each by itself; hue is a number of 0 to 1, and does not pass 0.
@@ -21,7 +21,7 @@ pub enum Space {
     Step,
 }
 
-impl Space {
+impl ColourSpace {
     const ALL: [Self; 6] = [Self::Rgb, Self::Hsv, Self::HsvWrapped, Self::Lab, Self::Diverging, Self::Step];
 
     /// Its name.
@@ -150,10 +150,11 @@ mod tests {
     #[test]
     fn the_ends_of_every_way_are_the_colours() {
         let colours = [[0.0; 3], [1.0; 3], COOL, WARM, [0.0, 1.0, 0.25], [0.5; 3], [1.0, 0.0, 1.0]];
-        for (space, a, b) in Space::ALL.iter().flat_map(|s| colours.map(|a| colours.map(|b| (s, a, b))).concat()) {
+        for (space, a, b) in ColourSpace::ALL.iter().flat_map(|s| colours.map(|a| colours.map(|b| (s, a, b))).concat())
+        {
             near(space.between(a, b, 0.0), a, 2e-3);
             near(space.between(a, b, 1.0), b, 2e-3);
-            assert_eq!(Space::named(space.name()), Some(*space));
+            assert_eq!(ColourSpace::named(space.name()), Some(*space));
         }
     }
 
@@ -163,28 +164,28 @@ mod tests {
         let table = [[59, 76, 192], [141, 176, 254], [221, 221, 221], [244, 154, 123], [180, 4, 38]];
         for (i, bytes) in table.into_iter().enumerate() {
             let expected = bytes.map(|b: u8| f64::from(b) / 255.0);
-            near(Space::Diverging.between(COOL, WARM, i as f64 / 4.0), expected, 1.5 / 255.0);
+            near(ColourSpace::Diverging.between(COOL, WARM, i as f64 / 4.0), expected, 1.5 / 255.0);
         }
-        near(Space::Diverging.between(COOL, WARM, 0.5), [0.865, 0.865, 0.865], 2e-3);
+        near(ColourSpace::Diverging.between(COOL, WARM, 0.5), [0.865, 0.865, 0.865], 2e-3);
     }
 
     #[test]
     fn hues_pass_0_only_when_wrapped() {
         let (blue, red) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
-        near(Space::Hsv.between(blue, red, 0.5), [0.0, 1.0, 0.0], 1e-12);
-        near(Space::HsvWrapped.between(blue, red, 0.5), [1.0, 0.0, 1.0], 1e-12);
-        near(Space::HsvWrapped.between(red, blue, 0.5), [1.0, 0.0, 1.0], 1e-12);
-        near(Space::Hsv.between([0.5, 0.25, 0.25], [1.0, 0.5, 0.5], 0.5), [0.75, 0.375, 0.375], 1e-12);
+        near(ColourSpace::Hsv.between(blue, red, 0.5), [0.0, 1.0, 0.0], 1e-12);
+        near(ColourSpace::HsvWrapped.between(blue, red, 0.5), [1.0, 0.0, 1.0], 1e-12);
+        near(ColourSpace::HsvWrapped.between(red, blue, 0.5), [1.0, 0.0, 1.0], 1e-12);
+        near(ColourSpace::Hsv.between([0.5, 0.25, 0.25], [1.0, 0.5, 0.5], 0.5), [0.75, 0.375, 0.375], 1e-12);
     }
 
     #[test]
     fn lab_mixes_by_lightness() {
-        near(Space::Lab.between([0.0; 3], [1.0; 3], 0.5), [0.4663; 3], 1e-3); // L* = 50
+        near(ColourSpace::Lab.between([0.0; 3], [1.0; 3], 0.5), [0.4663; 3], 1e-3); // L* = 50
         near(lab::of_rgb([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20], 0.05);
     }
 
     #[test]
     fn a_step_has_the_colour_of_its_upper_end() {
-        assert_eq!([0.0, 0.1, 1.0].map(|t| Space::Step.between(COOL, WARM, t)), [COOL, WARM, WARM]);
+        assert_eq!([0.0, 0.1, 1.0].map(|t| ColourSpace::Step.between(COOL, WARM, t)), [COOL, WARM, WARM]);
     }
 }

@@ -1,6 +1,6 @@
 //! Transfer functions as tables: CSV.
 
-use super::{Colour, Space, TransferFunction};
+use super::{Colour, ColourSpace, TransferFunction};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 /// What a header may call each column.
@@ -46,7 +46,7 @@ fn transfer_function(rows: &[Row]) -> Result<TransferFunction, String> {
     let colours = rows.iter().map(|row| Ok((row.value, if in_bytes { of_bytes(row)? } else { row.colour })));
     let colours = colours.collect::<Result<Vec<_>, String>>()?;
     let opacities: Vec<_> = rows.iter().filter_map(|row| row.opacity.map(|a| (row.value, a))).collect();
-    TransferFunction::of_points(colours, Space::Rgb, (!opacities.is_empty()).then_some(opacities), None)
+    TransferFunction::of_points(colours, ColourSpace::Rgb, (!opacities.is_empty()).then_some(opacities), None)
 }
 
 /// The colour of a line in a table of bytes.

@@ -1,12 +1,12 @@
 //! Which scheme a window is coded with: the one that makes some of its boxes smallest.
 
 use super::learn::learned_functions;
-use super::{ConvertConfig, Idle};
+use super::{ConvertConfig, Pool};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::sample::SampleType;
 use crate::codec::WindowCodec;
-use crate::codec::bound::{Measure, Promise};
+use crate::codec::bound::{ErrorBound, Measure};
 use crate::codec::real::Real;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use crate::codec::trial::{Scratch, Trial};
@@ -16,16 +16,16 @@ use rayon::prelude::*;
 
 /// What of a scheme is fixed; the rest is chosen for each window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Coding {
+pub struct SchemeConstraint {
     /// The transform along time; none: any.
     pub basis: Option<Basis>,
     /// The pyramid.
-    pub space: Space,
+    pub space: SpatialPredictor,
 }
 
 /// What refines coefficients in space, or samples in space and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Space {
+pub enum SpatialPredictor {
     /// Whichever stencil suits.
     Any,
     /// Nothing: every series by itself.
@@ -34,16 +34,16 @@ pub enum Space {
     Pyramid(Stencil),
 }
 
-impl Coding {
+impl SchemeConstraint {
     /// Everything is chosen.
-    pub const AUTO: Self = Self { basis: None, space: Space::Any };
+    pub const AUTO: Self = Self { basis: None, space: SpatialPredictor::Any };
 }
 
-impl From<Basis> for Coding {
+impl From<Basis> for SchemeConstraint {
     /// The paper's bases along time alone, others with a pyramid.
     fn from(basis: Basis) -> Self {
         let alone = matches!(basis, Basis::Haar | Basis::Multi);
-        Self { basis: Some(basis), space: if alone { Space::Alone } else { Space::Any } }
+        Self { basis: Some(basis), space: if alone { SpatialPredictor::Alone } else { SpatialPredictor::Any } }
     }
 }
 
@@ -59,12 +59,12 @@ pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
 }
 
 /// What a choice rests on.
-pub(super) struct Chooser<'a> {
+pub(super) struct SchemeSelector<'a> {
     pub(super) config: &'a ConvertConfig,
     pub(super) archive: &'a Archive,
     /// The window's samples, channel by channel.
     pub(super) channels: &'a [&'a dyn FrameWindow],
-    pub(super) promise: Promise,
+    pub(super) promise: ErrorBound,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
     /// [`most_samples`]
@@ -88,13 +88,13 @@ struct Transformed<'a, R> {
 /// What schemes are tried on, and with.
 struct Trials<'a, R> {
     boxes: Vec<Transformed<'a, R>>,
-    idle: Idle<Scratch<R>>,
+    idle: Pool<Scratch<R>>,
 }
 
-impl Chooser<'_> {
+impl SchemeSelector<'_> {
     /// The scheme that codes some boxes of the window in the fewest bytes. The same for any number of threads.
     pub(super) fn choose(&self) -> Result<Scheme> {
-        if let Coding { basis: Some(basis), space: Space::Alone } = self.config.coding
+        if let SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Alone } = self.config.coding
             && basis != Basis::Learned
         {
             return Ok(Scheme::along_time(basis));
@@ -113,7 +113,7 @@ impl Chooser<'_> {
     /// The smallest of some families and their variants, all of which have a pyramid.
     fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
         let boxes = self.boxes()?;
-        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Idle::default() };
+        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
         let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
         let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
@@ -218,8 +218,8 @@ impl Chooser<'_> {
 
     /// One scheme of each kind that is allowed.
     fn families(&self) -> Result<Vec<Scheme>> {
-        let Coding { basis, space } = self.config.coding;
-        let stencil = if let Space::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
+        let SchemeConstraint { basis, space } = self.config.coding;
+        let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
             None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
             Some(Basis::Samples) => None,
@@ -228,10 +228,11 @@ impl Chooser<'_> {
         let mut found = Vec::new();
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
-            let pyramid = (space != Space::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
+            let pyramid =
+                (space != SpatialPredictor::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
             found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
-        if basis.is_none_or(|b| b == Basis::Samples) && space != Space::Alone {
+        if basis.is_none_or(|b| b == Basis::Samples) && space != SpatialPredictor::Alone {
             let coarseness = self.coarseness(1.0);
             let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
             found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
@@ -268,7 +269,7 @@ impl Chooser<'_> {
         normal && self.promise.delta >= self.magnitude * SINGLE
     }
 
-    /// Steps under a bound of means leave room for dropping coefficients, too ([`Promise::step`]).
+    /// Steps under a bound of means leave room for dropping coefficients, too ([`ErrorBound::step`]).
     fn coarseness(&self, of_largest: f64) -> f64 {
         match self.promise.measure() {
             Measure::Largest => of_largest,
@@ -283,7 +284,9 @@ impl Chooser<'_> {
 
     fn stencils(&self, best: &Scheme) -> Vec<Scheme> {
         match self.config.coding.space {
-            Space::Any => variants(best, |pyramid| vec![Pyramid { stencil: Stencil::Linear, ..pyramid.clone() }]),
+            SpatialPredictor::Any => {
+                variants(best, |pyramid| vec![Pyramid { stencil: Stencil::Linear, ..pyramid.clone() }])
+            }
             _ => Vec::new(),
         }
     }

@@ -1,16 +1,16 @@
 //! The reader's stage: windows of frames in, batches of blocks out.
 
-use super::choose::{Chooser, most_samples};
+use super::choose::{SchemeSelector, most_samples};
 use super::sampled::{self, Pixel};
 use super::task::BRIGHTNESS;
-use super::{ConvertConfig, Done, Idle, MissingPolicy, Plan, WindowJob};
+use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
 use crate::base::error::{Error, Result};
 use crate::base::sample;
 use crate::codec::WindowCodec;
-use crate::codec::bound::{self, Bound, Promise};
+use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::codec::scheme::Scheme;
 use crate::source::scan::{Scan, join_ranges, scan};
-use crate::source::{Archive, Coloured, FrameSource, FrameWindow, read_frames_into};
+use crate::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
 use crossbeam::channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -31,8 +31,8 @@ pub(super) fn read(
     source: &mut dyn FrameSource,
     (config, archive): (&ConvertConfig, &Archive),
     plan: &Plan<'_>,
-    done: &Done,
-    idle: &Idle<Vec<u8>>,
+    done: &WindowsDone,
+    idle: &Pool<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
     let pixels = match config.bound {
@@ -74,7 +74,7 @@ struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// Room for the samples of blocks.
-    idle: &'a Idle<Vec<u8>>,
+    idle: &'a Pool<Vec<u8>>,
     /// Of the samples that are coded.
     archive: &'a Archive,
     /// Where a sampled bound looks.
@@ -102,7 +102,7 @@ impl WindowReader<'_> {
     }
 
     /// The error of a source that goes on after what was its end, in a window that is short.
-    fn has_grown(&self, done: &Done) -> Error {
+    fn has_grown(&self, done: &WindowsDone) -> Error {
         let (name, frames) = (done.name.display(), self.frames);
         let what = format!(
             "the input ended after {frames} frames and has grown: --frames 0:{frames} makes {name} of these, to \
@@ -112,7 +112,7 @@ impl WindowReader<'_> {
     }
 
     /// The error of a source that has fewer frames than it had.
-    fn ended(&self, done: &Done) -> Error {
+    fn ended(&self, done: &WindowsDone) -> Error {
         let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
         let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
         Error::Changed { path: done.name.clone(), what }
@@ -131,7 +131,7 @@ impl WindowReader<'_> {
     }
 
     /// Goes on after a window that is done; an error if its frames are not those that the source has now.
-    fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &Done) -> Result<()> {
+    fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
         let seen = self.scan(window)?;
         window.check_unchanged()?;
         let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
@@ -150,7 +150,7 @@ impl WindowReader<'_> {
     /// Looks at the samples of a window as they are read.
     fn scan(&self, window: &dyn FrameWindow) -> Result<Scan> {
         let plain = (self.archive.sample, self.config.missing_value);
-        let (ty, missing_value) = self.plan.painter.map_or(plain, |p| (p.sample, p.missing_value));
+        let (ty, missing_value) = self.plan.colour_transform.map_or(plain, |p| (p.sample, p.missing_value));
         scan(window, &self.archive.grid, ty, missing_value)
     }
 
@@ -159,7 +159,7 @@ impl WindowReader<'_> {
         let (config, ty, first) = (self.config, self.archive.sample, self.first());
         let seen = self.scan(window)?;
         self.refuse_missing(window, first, &seen)?;
-        let of_window = if self.plan.painter.is_some() { BRIGHTNESS } else { seen.range };
+        let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { seen.range };
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
         let range = config.range.unwrap_or(range);
@@ -169,11 +169,12 @@ impl WindowReader<'_> {
             coloured => coloured.iter().map(|channel| channel as _).collect(),
         };
         let delta = self.delta(&channels, of_window, range)?;
-        let promise = Promise { bound: config.bound, tolerance: config.tolerance, delta };
+        let promise = ErrorBound { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(of_window);
         let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
         let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
-        let scheme = Chooser { config, archive: self.archive, channels: &channels, promise, magnitude, most, before };
+        let scheme =
+            SchemeSelector { config, archive: self.archive, channels: &channels, promise, magnitude, most, before };
         let scheme = scheme.choose()?;
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
@@ -253,16 +254,17 @@ impl WindowReader<'_> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let region = self.plan.blocks.region(block);
         let mut samples = self.idle.take().unwrap_or_default();
-        let sample = self.plan.painter.map_or(self.archive.sample, |painter| painter.sample);
+        let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
         Ok((BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples))
     }
 }
 
 /// What a window's samples are coded as, if not as they are: the channels of their colours.
-fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<Coloured<'a, &'a dyn FrameWindow>> {
-    let of = |painter| (0..plan.channels()).map(move |channel| Coloured { window, painter, channel });
-    plan.painter.into_iter().flat_map(of).collect()
+fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {
+    let of =
+        |colour_transform| (0..plan.channels()).map(move |channel| ColourWindow { window, colour_transform, channel });
+    plan.colour_transform.into_iter().flat_map(of).collect()
 }
 
 /// Every so many windows a scheme is chosen anew; the others begin with that of the window before.

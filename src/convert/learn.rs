@@ -1,7 +1,7 @@
 //! Functions along time that suit the series of some boxes: the principal components of their samples.
 
 use crate::base::sample::{self, SampleType};
-use crate::codec::bound::Promise;
+use crate::codec::bound::ErrorBound;
 use crate::wavelet::Learned;
 
 /// The functions of [`Learned::new`], the most important first: as many as matter under the promise. `boxes` hold samples
@@ -11,7 +11,7 @@ pub(super) fn learned_functions<'a>(
     ty: SampleType,
     frames: usize,
     missing_value: Option<f64>,
-    promise: &Promise,
+    promise: &ErrorBound,
 ) -> Vec<i16> {
     let mut products = Products::new(frames);
     for samples in boxes {
@@ -160,7 +160,8 @@ mod tests {
                 .flat_map(|c| [1.0, -2.0, 3.0].map(|v: f64| v * c * scale))
                 .flat_map(f64::to_le_bytes)
                 .collect();
-            let promise = Promise { bound: crate::codec::bound::Bound::Pointwise, tolerance: 0.01, delta: 0.1 * scale };
+            let promise =
+                ErrorBound { bound: crate::codec::bound::Bound::Pointwise, tolerance: 0.01, delta: 0.1 * scale };
             let functions = learned_functions([&values[..]].into_iter(), SampleType::F64, 4, None, &promise);
             let ratio: Vec<f64> = functions.iter().map(|f| f64::from(*f) / f64::from(functions[0])).collect();
             assert_eq!(functions.len(), 4);

@@ -12,7 +12,7 @@
 //! no first pass over the data is needed, and a pipe gives the same bytes as files.
 //!
 //! A window is ended in the file once its source was seen unchanged; then `out` is flushed. So what a killed conversion
-//! leaves is whole up to its last window, and [`go_on`] continues there: to the bytes that the conversion would have had
+//! leaves is whole up to its last window, and [`resume`] continues there: to the bytes that the conversion would have had
 //! without the kill, since what one window tells the next is in its record.
 
 mod choose;
@@ -32,10 +32,10 @@ use crate::codec::WindowCodec;
 use crate::codec::bound::Bound;
 use crate::codec::encode::{Encoded, Encoder};
 use crate::colour::TransferFunction;
-use crate::file::report::{PromiseReport, WindowReport};
-use crate::source::{Archive, CHANNELS, FrameSource, Painter};
+use crate::file::report::{BoundReport, WindowReport};
+use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
 use crate::wavelet;
-pub use choose::{Coding, Space};
+pub use choose::{SchemeConstraint, SpatialPredictor};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
@@ -62,7 +62,7 @@ pub enum MissingPolicy {
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
     /// The scheme, or what of it is fixed.
-    pub coding: Coding,
+    pub coding: SchemeConstraint,
     /// Frames in a window.
     pub window: usize,
     /// The error allowed, as a share of what the bound refers to; 0 keeps every bit.
@@ -90,7 +90,7 @@ pub struct ConvertConfig {
 
 impl ConvertConfig {
     /// Pointwise within a share of the range; missing samples refused, and all else as the program has it by default.
-    pub fn new(coding: impl Into<Coding>, window: usize, tolerance: f64, memory: usize) -> Self {
+    pub fn new(coding: impl Into<SchemeConstraint>, window: usize, tolerance: f64, memory: usize) -> Self {
         Self {
             coding: coding.into(),
             window,
@@ -131,7 +131,7 @@ pub struct ConvertReport {
     pub missing: u64,
     /// What is promised.
     #[serde(flatten)]
-    pub promise: PromiseReport,
+    pub promise: BoundReport,
     /// Value range, which a pointwise or rms tolerance refers to.
     pub range: (f64, f64),
     /// The largest bound in any window.
@@ -154,7 +154,7 @@ pub struct ConvertReport {
 
 /// What a file holds to which frames are added.
 #[derive(Debug)]
-pub struct Begun {
+pub struct PartialFile {
     /// Its whole windows.
     pub unfinished: Unfinished,
     /// The first of these windows whose frames the source still holds, from its first frame on; those before it are not
@@ -172,32 +172,32 @@ pub fn convert<W: Write>(
     out: W,
     progress: &dyn Progress,
 ) -> Result<ConvertReport> {
-    go_on(source, config, None, name, out, progress)
+    resume(source, config, None, name, out, progress)
 }
 
 /// As [`convert`], after the whole windows of a file that was begun; `out` is where they end.
 ///
 /// # Errors
 /// Also where the file was begun with other settings, or from other frames.
-pub fn go_on<W: Write>(
+pub fn resume<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
-    begun: Option<Begun>,
+    begun: Option<PartialFile>,
     name: &Path,
     out: W,
     progress: &dyn Progress,
 ) -> Result<ConvertReport> {
     let started = Instant::now();
-    let Task { config, archive, painter } = &Task::new(config, source.archive());
-    let plan = Plan::new(config, archive, painter.as_ref())?;
-    let done = Done::of(begun.as_ref(), &plan, name)?;
+    let Task { config, archive, colour_transform } = &Task::new(config, source.archive());
+    let plan = Plan::new(config, archive, colour_transform.as_ref())?;
+    let done = WindowsDone::of(begun.as_ref(), &plan, name)?;
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.before);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
-    progress.go_on((done.windows.len() * plan.blocks_of_window()) as u64);
+    progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
     let mut recorder = Recorder::new(config, &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
-    let idle = Idle::default();
+    let idle = Pool::default();
     let (read_time, encode_time) = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
         let (plan, done, idle) = (&plan, &done, &idle);
@@ -213,9 +213,9 @@ pub fn go_on<W: Write>(
 }
 
 /// What a file of `archive` says before its first frame: all that is decided without looking at samples.
-pub fn beginning(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
-    let Task { config, archive, painter } = &Task::new(config, archive);
-    Plan::new(config, archive, painter.as_ref()).map(|plan| plan.start)
+pub fn open_partial(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
+    let Task { config, archive, colour_transform } = &Task::new(config, archive);
+    Plan::new(config, archive, colour_transform.as_ref()).map(|plan| plan.start)
 }
 
 /// Passes a panic of a stage on; it is a bug, not an error.
@@ -227,7 +227,7 @@ fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
 #[derive(Debug)]
 struct Plan<'a> {
     /// What makes samples into channels, if there are several.
-    painter: Option<&'a Painter>,
+    colour_transform: Option<&'a ColourTransform>,
     /// What the file says before its first frame.
     start: Metadata,
     blocks: BlockGrid,
@@ -237,17 +237,17 @@ struct Plan<'a> {
 
 /// Voxels a side of a block unless one is given: 32, less for long windows so that a block stays near 4 MiB. With a
 /// pyramid up to 48, which it codes in fewer bytes, and so that the blocks along the longest axis are alike.
-fn block_edge(coding: Coding, dims: [usize; 3], window: usize) -> usize {
+fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usize {
     let (largest, samples) =
-        if coding.space == Space::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
+        if coding.space == SpatialPredictor::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
     let fits = |e: &usize| e * e * e * window <= samples;
     let edge = [largest, largest / 2, largest / 4, 4, 2].into_iter().find(fits).unwrap_or(1);
     let longest = dims.into_iter().max().unwrap_or(1);
-    if coding.space == Space::Alone { edge } else { longest.div_ceil(longest.div_ceil(edge)) }
+    if coding.space == SpatialPredictor::Alone { edge } else { longest.div_ceil(longest.div_ceil(edge)) }
 }
 
 impl<'a> Plan<'a> {
-    fn new(config: &ConvertConfig, archive: &Archive, painter: Option<&'a Painter>) -> Result<Self> {
+    fn new(config: &ConvertConfig, archive: &Archive, colour_transform: Option<&'a ColourTransform>) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         if !(0.0..=1.0).contains(&config.tolerance) {
             return Err(Error::usage("--tolerance: a share, 0 to 1; 2 % is 0.02"));
@@ -262,8 +262,8 @@ impl<'a> Plan<'a> {
         if u32::try_from(blocks.len()).is_err() {
             return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
         }
-        let batch = batch_len(config, blocks, archive, painter)?;
-        Ok(Self { start: start(config, archive, painter, edge), painter, blocks, batch })
+        let batch = batch_len(config, blocks, archive, colour_transform)?;
+        Ok(Self { start: start(config, archive, colour_transform, edge), colour_transform, blocks, batch })
     }
 
     fn channels(&self) -> usize {
@@ -276,14 +276,19 @@ impl<'a> Plan<'a> {
 }
 
 /// What the file says before its first frame.
-fn start(config: &ConvertConfig, archive: &Archive, painter: Option<&Painter>, edge: usize) -> Metadata {
+fn start(
+    config: &ConvertConfig,
+    archive: &Archive,
+    colour_transform: Option<&ColourTransform>,
+    edge: usize,
+) -> Metadata {
     Metadata {
         dims: archive.grid.dims.map(|n| n as u64),
         spacing: archive.grid.spacing,
         origin: archive.grid.origin,
         sample: archive.sample,
         block_edge: edge as u32,
-        channels: painter.map_or(1, |_| CHANNELS.len() as u16),
+        channels: colour_transform.map_or(1, |_| CHANNELS.len() as u16),
         frames: 0,
         times: Vec::new(),
         variable: archive.variable.clone(),
@@ -291,24 +296,24 @@ fn start(config: &ConvertConfig, archive: &Archive, painter: Option<&Painter>, e
         tolerance: config.tolerance,
         missing_value: config.missing_value,
         windows: Vec::new(),
-        settings: settings::remembered(config, archive, painter),
+        settings: settings::remembered(config, archive, colour_transform),
         program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
     }
 }
 
 /// The windows that a file holds already, and how the source's frames lie to them.
 #[derive(Debug, Default)]
-struct Done {
+struct WindowsDone {
     id: Option<FileId>,
     windows: Vec<Window>,
-    /// [`Begun::before`]
+    /// [`PartialFile::before`]
     before: usize,
     name: PathBuf,
 }
 
-impl Done {
-    fn of(begun: Option<&Begun>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
-        let Some(Begun { unfinished, before }) = begun else { return Ok(Self::default()) };
+impl WindowsDone {
+    fn of(begun: Option<&PartialFile>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
+        let Some(PartialFile { unfinished, before }) = begun else { return Ok(Self::default()) };
         let held = unfinished.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
             return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
@@ -319,14 +324,20 @@ impl Done {
 
 /// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, a worker's scratch, and what
 /// choosing the next window's scheme takes.
-fn batch_len(config: &ConvertConfig, blocks: BlockGrid, archive: &Archive, painter: Option<&Painter>) -> Result<usize> {
+fn batch_len(
+    config: &ConvertConfig,
+    blocks: BlockGrid,
+    archive: &Archive,
+    colour_transform: Option<&ColourTransform>,
+) -> Result<usize> {
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
-    let raw = samples * painter.map_or(sample.size(), |painter| painter.sample.size().max(sample.size()));
-    let painted = painter.map_or(0, |_| samples * sample.size());
+    let raw = samples
+        * colour_transform.map_or(sample.size(), |colour_transform| colour_transform.sample.size().max(sample.size()));
+    let painted = colour_transform.map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
-    let alone = config.coding.space == Space::Alone || config.tolerance == 0.0; // then no pyramid is tried
+    let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // then no pyramid is tried
     let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
     let choice = if alone { 0 } else { choose::bytes(samples, sample) };
     let scratch = samples + 2 * codes + field + raw + painted + ZSTD_SCRATCH;
@@ -359,18 +370,18 @@ const MIB: f64 = 1_048_576.0;
 fn encode(
     level: i32,
     plan: &Plan<'_>,
-    read: &Idle<Vec<u8>>,
+    read: &Pool<Vec<u8>>,
     batches: &Receiver<Batch>,
     out: &Sender<EncodedBatch>,
 ) -> Result<Duration> {
-    let idle = Idle::default();
+    let idle = Pool::default();
     let mut busy = Duration::ZERO;
     for Batch { window, blocks, last } in batches {
         let started = Instant::now();
         let encode = |(id, samples): (BlockId, Vec<u8>)| {
             let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
             let size = plan.blocks.region(id.block as usize).dims();
-            let samples = painted(plan.painter, id, samples, read);
+            let samples = painted(plan.colour_transform, id, samples, read);
             let encoded = encoder.block(&window.codec, id, size, &samples).map_err(bug);
             idle.put(encoder);
             read.put(samples);
@@ -387,26 +398,26 @@ fn encode(
 }
 
 /// The samples of a block as its channel has them.
-fn painted(painter: Option<&Painter>, id: BlockId, samples: Vec<u8>, idle: &Idle<Vec<u8>>) -> Vec<u8> {
-    let Some(painter) = painter else { return samples };
+fn painted(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Vec<u8>, idle: &Pool<Vec<u8>>) -> Vec<u8> {
+    let Some(colour_transform) = colour_transform else { return samples };
     let mut channel = idle.take().unwrap_or_default();
-    channel.resize(samples.len() / painter.sample.size() * Painter::SAMPLE.size(), 0);
-    painter.paint(id.channel.into(), &samples, &mut channel);
+    channel.resize(samples.len() / colour_transform.sample.size() * ColourTransform::SAMPLE.size(), 0);
+    colour_transform.paint(id.channel.into(), &samples, &mut channel);
     idle.put(samples);
     channel
 }
 
 /// Things to use again: new memory costs about as much as what is done with it.
 #[derive(Debug)]
-struct Idle<T>(Mutex<Vec<T>>);
+struct Pool<T>(Mutex<Vec<T>>);
 
-impl<T> Default for Idle<T> {
+impl<T> Default for Pool<T> {
     fn default() -> Self {
         Self(Mutex::new(Vec::new()))
     }
 }
 
-impl<T> Idle<T> {
+impl<T> Pool<T> {
     fn take(&self) -> Option<T> {
         self.0.lock().ok().and_then(|mut idle| idle.pop())
     }

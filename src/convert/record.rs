@@ -1,9 +1,9 @@
 //! The writer's stage: coded blocks into the file, and what their window adds up to.
 
-use super::{Begun, ConvertConfig, ConvertReport, EncodedBatch, Plan, WindowJob};
+use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
-use crate::file::report::{PromiseReport, WindowReport};
+use crate::file::report::{BoundReport, WindowReport};
 use crossbeam::channel::Receiver;
 use std::io::Write;
 use std::path::Path;
@@ -29,11 +29,11 @@ impl<'a, W: Write> Recorder<'a, W> {
         plan: &'a Plan<'a>,
         name: &'a Path,
         out: W,
-        begun: Option<Begun>,
+        begun: Option<PartialFile>,
     ) -> Self {
         let frames_before = begun.as_ref().map_or(0, |b| b.unfinished.metadata().frames);
         let (writer, out) = match begun {
-            Some(begun) => (Some(Writer::go_on(out, begun.unfinished)), None),
+            Some(begun) => (Some(Writer::resume(out, begun.unfinished)), None),
             None => (None, Some(out)),
         };
         Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
@@ -90,7 +90,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         let (Metadata { dims, frames, windows, .. }, range) = (metadata, metadata.range());
         let voxels = dims.iter().product::<u64>();
         let (samples, voxels) = (voxels * frames, voxels * u64::from(metadata.channels));
-        let of_source = self.plan.painter.map_or(metadata.sample, |painter| painter.sample);
+        let of_source = self.plan.colour_transform.map_or(metadata.sample, |colour_transform| colour_transform.sample);
         let sum = |part: fn(&Window) -> u64| windows.iter().map(part).sum::<u64>();
         let largest = |part: fn(&Window) -> f64| windows.iter().map(part).fold(0.0, f64::max);
         let [read_seconds, encode_seconds, write_seconds, seconds] = seconds.map(|d| d.as_secs_f64());
@@ -104,7 +104,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,
             outliers: sum(|w| w.outliers),
             missing: sum(|w| w.missing),
-            promise: PromiseReport::new(self.config.bound, self.config.tolerance, range),
+            promise: BoundReport::new(self.config.bound, self.config.tolerance, range),
             range,
             delta: largest(|w| w.delta),
             reached: largest(|w| w.reached),

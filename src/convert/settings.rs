@@ -1,11 +1,11 @@
 //! What a file remembers of how it was made: enough to verify it against its source, and to append to it.
 
-use super::{Coding, ConvertConfig, MissingPolicy, Space};
+use super::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use crate::codec::bound::Bound;
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::setting;
-use crate::source::{Archive, Painter, Units};
+use crate::source::{Archive, ColourTransform, Units};
 use crate::wavelet::Basis;
 use std::str::FromStr;
 use wavesplat_format::Metadata;
@@ -14,7 +14,7 @@ use wavesplat_format::Metadata;
 pub(super) fn remembered(
     config: &ConvertConfig,
     archive: &Archive,
-    painter: Option<&Painter>,
+    colour_transform: Option<&ColourTransform>,
 ) -> Vec<(String, String)> {
     let ConvertConfig { coding, window, level, missing, range, .. } = config;
     let basis = BASES.iter().find(|(_, basis)| *basis == coding.basis).map_or("auto", |(name, _)| name);
@@ -23,7 +23,11 @@ pub(super) fn remembered(
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
     let more = [("level", level.to_string()), ("missing", missing.into())];
-    let all = given.into_iter().chain(more).chain(range).chain(painter.into_iter().flat_map(Painter::settings));
+    let all = given
+        .into_iter()
+        .chain(more)
+        .chain(range)
+        .chain(colour_transform.into_iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
     all.chain(units).map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
 }
@@ -46,7 +50,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         _ => file.missing_value,
     };
     Some(ConvertConfig {
-        coding: Coding { basis, space },
+        coding: SchemeConstraint { basis, space },
         window: number(named("window")?)?,
         tolerance: file.tolerance,
         bound: file.bound,
@@ -108,7 +112,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             .into_iter()
             .chain(Units::SETTINGS)
             .chain(["frames", "region"])
-            .chain(Painter::SETTINGS.map(|(name, _)| name));
+            .chain(ColourTransform::SETTINGS.map(|(name, _)| name));
         let settings = ours.map(|name| (option(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
@@ -119,7 +123,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
 
 /// What a setting is called in messages.
 fn option(setting: &'static str) -> &'static str {
-    let of_colours = Painter::SETTINGS.into_iter().find(|(name, _)| *name == setting);
+    let of_colours = ColourTransform::SETTINGS.into_iter().find(|(name, _)| *name == setting);
     of_colours.map_or(setting, |(_, option)| option)
 }
 
@@ -135,7 +139,9 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
 
 /// Whether [`remembered`] adds a setting by itself.
 fn is_ours(name: &str) -> bool {
-    OURS.contains(&name) || Units::SETTINGS.contains(&name) || Painter::SETTINGS.iter().any(|(ours, _)| *ours == name)
+    OURS.contains(&name)
+        || Units::SETTINGS.contains(&name)
+        || ColourTransform::SETTINGS.iter().any(|(ours, _)| *ours == name)
 }
 
 /// The names of what [`remembered`] adds by itself, besides those of colours.
@@ -149,9 +155,9 @@ const BASES: [(&str, Option<Basis>); 5] = [
     ("pyramid", Some(Basis::Samples)),
 ];
 
-const SPACES: [(&str, Space); 4] = [
-    ("auto", Space::Any),
-    ("none", Space::Alone),
-    ("linear", Space::Pyramid(Stencil::Linear)),
-    ("cubic", Space::Pyramid(Stencil::Cubic)),
+const SPACES: [(&str, SpatialPredictor); 4] = [
+    ("auto", SpatialPredictor::Any),
+    ("none", SpatialPredictor::Alone),
+    ("linear", SpatialPredictor::Pyramid(Stencil::Linear)),
+    ("cubic", SpatialPredictor::Pyramid(Stencil::Cubic)),
 ];

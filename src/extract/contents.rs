@@ -41,7 +41,7 @@ impl Contents {
     pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Self {
         let m = file.metadata();
         let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
-        let channel = file.painter().map(|_| CHANNELS[config.channel]);
+        let channel = file.colour_transform().map(|_| CHANNELS[config.channel]);
         let name = channel.or(m.variable.as_deref()).map(plain).filter(|name| !name.is_empty());
         let numbered = m.times.is_empty();
         let time = |frame: &usize| if numbered { *frame as f64 } else { m.times[*frame] };

@@ -7,7 +7,7 @@ use crate::base::sample::SampleType;
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::source::scan::join_ranges;
-use crate::source::{CHANNELS, Painter};
+use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -25,7 +25,7 @@ pub struct CoefficientFile {
     /// How it is cut into blocks.
     pub blocks: BlockGrid,
     /// What made samples into channels, if there are several.
-    painter: Option<Painter>,
+    colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
     skipped: Option<Damage>,
 }
@@ -61,8 +61,8 @@ impl CoefficientFile {
         let dims = m.dims.map(|n| n as usize);
         let grid = Grid { dims, spacing: m.spacing, origin: m.origin };
         let blocks = BlockGrid { dims, edge: m.block_edge as usize };
-        let painter = painter(m).map_err(failed)?;
-        Ok(Self { path: path.into(), grid, blocks, painter, reader, skipped: None })
+        let colour_transform = colour_transform(m).map_err(failed)?;
+        Ok(Self { path: path.into(), grid, blocks, colour_transform, reader, skipped: None })
     }
 
     /// Its path.
@@ -96,14 +96,16 @@ impl CoefficientFile {
     }
 
     /// What made the samples of the source into the file's channels, if it holds colours.
-    pub fn painter(&self) -> Option<&Painter> {
-        self.painter.as_ref()
+    pub fn colour_transform(&self) -> Option<&ColourTransform> {
+        self.colour_transform.as_ref()
     }
 
     /// The type of the source's samples, and what stands for a missing one.
     pub fn of_source(&self) -> (SampleType, Option<f64>) {
         let plain = (self.sample(), self.metadata().missing_value);
-        self.painter.as_ref().map_or(plain, |painter| (painter.sample, painter.missing_value))
+        self.colour_transform
+            .as_ref()
+            .map_or(plain, |colour_transform| (colour_transform.sample, colour_transform.missing_value))
     }
 
     /// Number of frames.
@@ -304,13 +306,16 @@ pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
 }
 
 /// What made the channels of a file; an error where it has several, and does not say of what.
-fn painter(m: &Metadata) -> std::result::Result<Option<Painter>, wavesplat_format::Error> {
+fn colour_transform(m: &Metadata) -> std::result::Result<Option<ColourTransform>, wavesplat_format::Error> {
     if m.channels == 1 {
         return Ok(None);
     }
-    let coloured = usize::from(m.channels) == CHANNELS.len() && m.sample == Painter::SAMPLE;
-    let painter =
-        if coloured && m.missing_value.is_none() { Painter::of_settings(|name| setting(m, name)) } else { None };
+    let coloured = usize::from(m.channels) == CHANNELS.len() && m.sample == ColourTransform::SAMPLE;
+    let colour_transform = if coloured && m.missing_value.is_none() {
+        ColourTransform::of_settings(|name| setting(m, name))
+    } else {
+        None
+    };
     let unsupported = || wavesplat_format::Error::Unsupported(format!("{} channels of no known colours", m.channels));
-    painter.map(Some).ok_or_else(unsupported)
+    colour_transform.map(Some).ok_or_else(unsupported)
 }

@@ -7,7 +7,7 @@ use wavesplat_format::Window;
 
 /// What the tolerance promises.
 #[derive(Debug, Clone, Serialize)]
-pub struct PromiseReport {
+pub struct BoundReport {
     /// The kind of bound.
     pub bound: &'static str,
     /// Whether the tolerance is guaranteed; false where the bound that is kept is itself an estimate.
@@ -24,7 +24,7 @@ pub struct PromiseReport {
     pub promise: String,
 }
 
-impl PromiseReport {
+impl BoundReport {
     /// Of a tolerance that refers, where it does to one, to the value range `range`.
     pub fn new(bound: Bound, tolerance: f64, range: (f64, f64)) -> Self {
         let promise = if tolerance == 0.0 { "every bit is kept".into() } else { words(bound, tolerance, range) };
@@ -38,7 +38,7 @@ impl PromiseReport {
     }
 }
 
-impl PromiseReport {
+impl BoundReport {
     /// What a line that says that the bound is kept must add.
     pub fn caution(&self) -> &'static str {
         if self.guaranteed { "" } else { "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images" }

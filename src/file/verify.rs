@@ -10,7 +10,7 @@ use crate::codec::bound;
 use crate::codec::decode::Block;
 use crate::file::CoefficientFile;
 use crate::source::scan::join_ranges;
-use crate::source::{CHANNELS, Coloured, FrameSource, FrameWindow, read_frames};
+use crate::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_format::{BlockEntry, PartKind};
@@ -215,7 +215,7 @@ fn check_block(
     let region = file.blocks.region(entry.id.block as usize);
     let original = original(file, source, codec, entry, &region)?;
     let first_frame = file.window_range(entry.id.window).start;
-    let channel = file.painter().and_then(|_| CHANNELS.get(usize::from(entry.id.channel)).copied());
+    let channel = file.colour_transform().and_then(|_| CHANNELS.get(usize::from(entry.id.channel)).copied());
     let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel), channel };
     let (mut found, (lo, hi)) = compare(codec, &original, &block, place);
     let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
@@ -235,8 +235,10 @@ fn original(
     region: &Region,
 ) -> Result<Vec<u8>> {
     let frames = 0..codec.frames();
-    let Some(painter) = file.painter() else { return read_frames(source, frames, region, codec.sample) };
-    let channel = Coloured { window: source, painter, channel: entry.id.channel.into() };
+    let Some(colour_transform) = file.colour_transform() else {
+        return read_frames(source, frames, region, codec.sample);
+    };
+    let channel = ColourWindow { window: source, colour_transform, channel: entry.id.channel.into() };
     read_frames(&channel, frames, region, codec.sample)
 }
 

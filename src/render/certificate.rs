@@ -12,14 +12,14 @@
 //! since the mean over the cut and that beyond it are both means of values in V. Where samples are missing, C counts the
 //! weights that are present; T may count all, since T / (C + T) grows with T.
 //!
-//! The r_i come from the directory by way of [`super::reading`] into the error planes (`Terms::add_errors`), whose sums
+//! The r_i come from the directory by way of [`super::reading`] into the error planes (`SparseTerms::add_errors`), whose sums
 //! [`super::finish`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
 //! their absolute values, a weight by what [`weight_rounding`] says, and the inverse transform by [`INVERSE`]. A mean is
 //! off by that of its emission, and by that of its weights times itself.
 
 use super::scene::FrameBounds;
 use super::weights::PixelWeight;
-use super::{Eye, Quantity};
+use super::{Quantity, ViewSetup};
 use crate::base::sample::magnitude;
 use crate::view::footprint::Method;
 
@@ -36,8 +36,8 @@ pub(super) struct Certificate {
 }
 
 impl Certificate {
-    pub(super) fn new(eye: &Eye, quantity: Quantity) -> Self {
-        Self { quantity, rounding: sum_rounding(eye) + INVERSE }
+    pub(super) fn new(setup: &ViewSetup, quantity: Quantity) -> Self {
+        Self { quantity, rounding: sum_rounding(setup) + INVERSE }
     }
 
     /// The error of a pixel that holds `value`: `errors` is sum c_i r_i, `absent` the weights that are missing.
@@ -73,21 +73,21 @@ pub(super) const WHOLE: Method = Method { name: "whole", radius: 8.0, stated_err
 /// exp(-R^2 / 2) at its cut: the share of its peak that a voxel further away has at most.
 const BEYOND_WHOLE: f64 = 1.27e-14;
 
-/// Turns the sums of weights of the whole kernel, as seen by `eye`, into at least what a cut leaves out, whose sums are
+/// Turns the sums of weights of the whole kernel, as seen by `setup`, into at least what a cut leaves out, whose sums are
 /// `cut`.
-pub(super) fn leave_beyond(eye: &Eye, cut: &[f64], whole: &mut [f64]) {
-    let rounding = sum_rounding(eye);
-    let further = eye.clip.voxels() as f64 * eye.footprint.at_depth(0.0) * BEYOND_WHOLE * (1.0 + rounding);
+pub(super) fn leave_beyond(setup: &ViewSetup, cut: &[f64], whole: &mut [f64]) {
+    let rounding = sum_rounding(setup);
+    let further = setup.clip.voxels() as f64 * setup.footprint.at_depth(0.0) * BEYOND_WHOLE * (1.0 + rounding);
     let left = |cut: f64, whole: f64| (whole - cut).max(0.0) + 2.0 * rounding * whole + further;
     whole.iter_mut().zip(cut).for_each(|(whole, cut)| *whole = left(*cut, *whole));
 }
 
 /// How far rounding moves a sum of weights, as a share of it.
-fn sum_rounding(eye: &Eye) -> f64 {
-    weight_rounding(eye) + (eye.clip.voxels() as f64 + 64.0) * f64::EPSILON
+fn sum_rounding(setup: &ViewSetup) -> f64 {
+    weight_rounding(setup) + (setup.clip.voxels() as f64 + 64.0) * f64::EPSILON
 }
 
 /// How far rounding moves a single weight, as a share of it: in the position, the depth and the exponentials.
-fn weight_rounding(eye: &Eye) -> f64 {
-    eye.footprint.rounding(eye.camera.rounding(&eye.grid), eye.camera.depth(&eye.grid))
+fn weight_rounding(setup: &ViewSetup) -> f64 {
+    setup.footprint.rounding(setup.camera.rounding(&setup.grid), setup.camera.depth(&setup.grid))
 }

@@ -1,7 +1,7 @@
 //! A block of a file that has been read, as what it adds to the planes of its group.
 
-use super::amounts::{Amounts, BlockPlanes, Room};
-use super::coefficients::{CoefficientGroup, What};
+use super::coefficients::{CoefficientBatch, SplatSource};
+use super::plane_values::{BlockPlanes, PlaneValues, Scratch};
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
@@ -10,7 +10,7 @@ use crate::codec::field::Field;
 
 /// A block of a file that has been read.
 pub(super) struct CodedBlock<'a> {
-    group: &'a CoefficientGroup<'a>,
+    group: &'a CoefficientBatch<'a>,
     block: Block,
     /// What its samples may be off by, for each error plane.
     errors: Vec<f64>,
@@ -31,9 +31,9 @@ enum Dense {
 
 impl<'a> CodedBlock<'a> {
     /// Of a block of a group whose samples may be off by so much.
-    pub(super) fn new(group: &'a CoefficientGroup<'a>, block: Block, errors: Vec<f64>) -> Self {
+    pub(super) fn new(group: &'a CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
         let codec = &group.codec;
-        if block.exact.is_some() || group.what == What::Samples {
+        if block.exact.is_some() || group.what == SplatSource::Samples {
             let dense = Dense::Samples(block.samples(codec));
             return Self { group, block, errors, dense, few: Vec::new() };
         }
@@ -46,9 +46,9 @@ impl<'a> CodedBlock<'a> {
         Self { group, block, errors, dense, few }
     }
 
-    fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, room: &'r mut Room) -> Amounts<'r> {
+    fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, room: &'r mut Scratch) -> PlaneValues<'r> {
         let Self { group, block, .. } = self;
-        let Some((frame, absent)) = group.layout.samples(plane) else { return Amounts::Nothing };
+        let Some((frame, absent)) = group.layout.samples(plane) else { return PlaneValues::Nothing };
         let bytes = samples.len() / group.codec.frames();
         room.bytes.clear();
         room.bytes.extend_from_slice(&samples[group.frames[frame] * bytes..][..bytes]);
@@ -62,15 +62,15 @@ impl<'a> CodedBlock<'a> {
     }
 
     /// The same error for all voxels but those that have no sample.
-    fn plane_of_errors<'r>(&self, error: f64, room: &'r mut Room) -> Amounts<'r> {
+    fn plane_of_errors<'r>(&self, error: f64, room: &'r mut Scratch) -> PlaneValues<'r> {
         if error == 0.0 {
-            return Amounts::Nothing;
+            return PlaneValues::Nothing;
         }
         let coded = !matches!(self.dense, Dense::Samples(_));
         let error = |voxel| if coded && misses_all(self.group, &self.block, voxel) { 0.0 } else { error };
         room.double.clear();
         room.double.extend((0..self.block.voxels).map(error));
-        Amounts::Double(&room.double)
+        PlaneValues::Double(&room.double)
     }
 }
 
@@ -79,16 +79,17 @@ impl BlockPlanes for CodedBlock<'_> {
         self.block.voxels
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         let Self { group, block, errors, dense, few } = self;
         let voxels = block.voxels;
         if let Some(error) = plane.checked_sub(group.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], room));
         }
-        let few = few.get(plane).filter(|few| !few.is_empty()).map_or(Amounts::Nothing, |few| Amounts::Few(few));
+        let few =
+            few.get(plane).filter(|few| !few.is_empty()).map_or(PlaneValues::Nothing, |few| PlaneValues::Few(few));
         Ok(match dense {
             Dense::Samples(samples) => self.plane_of_samples(samples, plane, room),
-            Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, Amounts::Double),
+            Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
             Dense::Coefficients(field) if plane < group.layout.coefficients => {
                 coefficients(group, block, field.as_ref(), group.kept[plane], room)
             }
@@ -105,12 +106,12 @@ impl BlockPlanes for CodedBlock<'_> {
 
 /// The coefficients of one k of a block.
 fn coefficients<'a>(
-    group: &CoefficientGroup<'_>,
+    group: &CoefficientBatch<'_>,
     block: &'a Block,
     field: Option<&'a Field<'_>>,
     k: usize,
-    room: &'a mut Room,
-) -> Amounts<'a> {
+    room: &'a mut Scratch,
+) -> PlaneValues<'a> {
     match field {
         Some(field) => field.plane(k, block.voxels, &mut room.double).into(),
         None => block.plane(&group.codec, k, (&mut room.single, &mut room.double)).into(),
@@ -119,7 +120,7 @@ fn coefficients<'a>(
 
 /// What coefficients give in each frame of a group, and what overrides that, which is taken out of `few`.
 fn values(
-    group: &CoefficientGroup<'_>,
+    group: &CoefficientBatch<'_>,
     block: &Block,
     field: Option<&Field<'_>>,
     few: &mut [Vec<(u32, f64)>],
@@ -128,7 +129,7 @@ fn values(
         return Vec::new();
     }
     let mut values = vec![0.0; group.frames.len() * block.voxels];
-    let room = &mut Room::default();
+    let room = &mut Scratch::default();
     for k in &group.kept {
         let amounts = coefficients(group, block, field, *k, room);
         for (frame, values) in group.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
@@ -142,7 +143,7 @@ fn values(
 }
 
 /// What overrides the coefficients of a block, for each plane of a group; empty if nothing does.
-fn overrides(group: &CoefficientGroup<'_>, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
+fn overrides(group: &CoefficientBatch<'_>, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
     let (layout, codec) = (&group.layout, &group.codec);
     if !block.overrides() {
         return Vec::new();
@@ -166,7 +167,7 @@ fn overrides(group: &CoefficientGroup<'_>, block: &Block, field: Option<&Field<'
 }
 
 /// Whether a voxel has no sample, judged by the window and not by the group, whose frames depend on the memory there is.
-fn misses_all(group: &CoefficientGroup<'_>, block: &Block, voxel: usize) -> bool {
+fn misses_all(group: &CoefficientBatch<'_>, block: &Block, voxel: usize) -> bool {
     (0..group.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
 }
 

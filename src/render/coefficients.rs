@@ -1,11 +1,11 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
-use super::amounts::BlockPlanes;
 use super::coded::CodedBlock;
 use super::expectation::Expectation;
-use super::reading::{Allowance, Cheapest, Kept, Place, Rule, left_out};
-use super::scene::{Contents, FrameBounds, Group, Inverse, LeftOut, Read, SampleErrors, Scene};
-use super::terms::{Layout, Order};
+use super::plane_values::BlockPlanes;
+use super::scene::{BatchOutcome, Contents, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene};
+use super::select::{BlockSelector, KeptParts, Place, RateAllocator, Rule, left_out};
+use super::sparse_terms::{Layout, Order};
 use super::{Limit, RenderConfig};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
@@ -19,7 +19,7 @@ use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind, Window};
 
 /// What of a file is splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum What {
+pub enum SplatSource {
     /// Coefficients.
     Coefficients,
     /// The decoded samples of every frame: the conventional method.
@@ -29,12 +29,12 @@ pub enum What {
 /// A coefficient file as a scene.
 pub struct CoefficientScene {
     file: Arc<CoefficientFile>,
-    what: What,
+    what: SplatSource,
 }
 
 impl CoefficientScene {
     /// Of an open file.
-    pub fn new(file: impl Into<Arc<CoefficientFile>>, what: What) -> Self {
+    pub fn new(file: impl Into<Arc<CoefficientFile>>, what: SplatSource) -> Self {
         Self { file: file.into(), what }
     }
 }
@@ -81,11 +81,11 @@ impl Scene for CoefficientScene {
         channel: usize,
         config: &RenderConfig,
         expectation: &'a Expectation<'_>,
-    ) -> Result<Box<dyn Group + 'a>> {
+    ) -> Result<Box<dyn FrameBatch + 'a>> {
         let window = self.file.window_of(frames[0]);
         let first = self.file.window_range(window).start;
         let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-        Ok(Box::new(CoefficientGroup::new(&self.file, self.what, (window, channel), frames, config, expectation)?))
+        Ok(Box::new(CoefficientBatch::new(&self.file, self.what, (window, channel), frames, config, expectation)?))
     }
 }
 
@@ -116,9 +116,9 @@ fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &
 const COEFFICIENTS_FOR_A_VALUE: usize = 4;
 
 /// Some frames of one window of a file.
-pub(super) struct CoefficientGroup<'a> {
+pub(super) struct CoefficientBatch<'a> {
     file: &'a CoefficientFile,
-    pub(super) what: What,
+    pub(super) what: SplatSource,
     window: u32,
     channel: usize,
     pub(super) codec: WindowCodec,
@@ -131,16 +131,16 @@ pub(super) struct CoefficientGroup<'a> {
     pub(super) by_values: bool,
     pub(super) layout: Layout,
     expectation: &'a Expectation<'a>,
-    allowance: Allowance,
+    allowance: BlockSelector,
     errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
 }
 
-impl<'a> CoefficientGroup<'a> {
+impl<'a> CoefficientBatch<'a> {
     fn new(
         file: &'a CoefficientFile,
-        what: What,
+        what: SplatSource,
         (window, channel): (u32, usize),
         frames: Vec<usize>,
         config: &RenderConfig,
@@ -153,7 +153,7 @@ impl<'a> CoefficientGroup<'a> {
         let coded = leaves.iter().any(|leaf| leaf.coded > 0);
         let exact = leaves.iter().any(|leaf| leaf.exact > 0);
         let record = &file.metadata().windows[window as usize];
-        let (samples, missing) = (what == What::Samples, file.has_missing(window));
+        let (samples, missing) = (what == SplatSource::Samples, file.has_missing(window));
         let by_values = !samples && !config.certify && few_asked(file, &codec, window, config);
         let layout = Layout {
             coefficients: if samples || by_values || !coded { 0 } else { kept.len() },
@@ -168,7 +168,7 @@ impl<'a> CoefficientGroup<'a> {
                 Order::Planes
             },
         };
-        let allowance = Allowance::new(&codec, expectation);
+        let allowance = BlockSelector::new(&codec, expectation);
         let (errors, leaf) = (SampleErrors::default(), Mutex::default());
         let mut group = Self {
             file,
@@ -203,7 +203,7 @@ impl<'a> CoefficientGroup<'a> {
             return Ok(Rule::Within(allowed));
         }
         let region = config.region.unwrap_or(self.file.grid.whole());
-        let mut cheapest = Cheapest::new(&self.allowance);
+        let mut cheapest = RateAllocator::new(&self.allowance);
         for entries in self.file.entries(self.window, self.channel, &region) {
             entries?.iter().for_each(|entry| cheapest.add(&self.place(entry, self.expectation)));
         }
@@ -235,7 +235,7 @@ impl<'a> CoefficientGroup<'a> {
     }
 
     /// What is read of a block.
-    fn keep(&self, entry: &BlockEntry) -> Kept {
+    fn keep(&self, entry: &BlockEntry) -> KeptParts {
         self.allowance.keep(&self.place(entry, self.expectation))
     }
 
@@ -255,7 +255,7 @@ impl<'a> CoefficientGroup<'a> {
     }
 
     /// Whether a block adds nothing to any plane.
-    fn adds_nothing(&self, kept: &Kept) -> bool {
+    fn adds_nothing(&self, kept: &KeptParts) -> bool {
         kept.entry.parts.is_empty()
             && !kept.entry.lost
             && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
@@ -275,12 +275,12 @@ impl<'a> CoefficientGroup<'a> {
     /// Reads a block, and what its samples may be off by.
     fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
         let leaf = self.leaf_of(block as u32)?;
-        let Kept { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
+        let KeptParts { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
         Ok((self.file.block(&self.codec, &entry, &self.wanted)?, errors))
     }
 }
 
-impl Group for CoefficientGroup<'_> {
+impl FrameBatch for CoefficientBatch<'_> {
     fn layout(&self) -> Layout {
         self.layout
     }
@@ -361,7 +361,7 @@ impl Group for CoefficientGroup<'_> {
         })
     }
 
-    fn finish(&self) -> Result<Read> {
-        self.file.check_unchanged().map(|()| Read::AsExpected)
+    fn finish(&self) -> Result<BatchOutcome> {
+        self.file.check_unchanged().map(|()| BatchOutcome::Complete)
     }
 }

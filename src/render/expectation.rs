@@ -13,7 +13,7 @@
 //! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
 //! voxels, and what is missing to be there.
 
-use super::weights::Look;
+use super::weights::WeightedView;
 use super::{Quantity, RenderConfig};
 use crate::base::grid::{Grid, Region};
 use std::f64::consts::PI;
@@ -21,7 +21,7 @@ use std::f64::consts::PI;
 /// A view that errors are seen in.
 #[derive(Debug, Clone, Copy)]
 pub struct Expectation<'a> {
-    look: &'a Look<'a>,
+    weighted: &'a WeightedView<'a>,
     quantity: Quantity,
     /// Pixels that are not background.
     pixels: f64,
@@ -55,16 +55,16 @@ impl Seen {
 }
 
 impl<'a> Expectation<'a> {
-    pub(super) fn new(look: &'a Look<'a>, config: &RenderConfig) -> Self {
+    pub(super) fn new(weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
         let (mut pixels, mut squares) = (0.0, 0.0);
-        for sum in look.weights.shown() {
+        for sum in weighted.weights.shown() {
             pixels += 1.0;
             squares += sum * sum;
         }
         let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
         let unit = if config.quantity == Quantity::Mean { 1.0 } else { squares / pixels };
-        let (area, footprint) = (look.eye.footprint.area(), footprint(config, &look.eye.grid));
-        Self { look, quantity: config.quantity, pixels, unit, area, footprint }
+        let (area, footprint) = (weighted.setup.footprint.area(), footprint(config, &weighted.setup.grid));
+        Self { weighted, quantity: config.quantity, pixels, unit, area, footprint }
     }
 
     /// The mean square over pixels that samples come to which all are off by `error`.
@@ -80,7 +80,7 @@ impl<'a> Expectation<'a> {
 
     /// What the errors of the block at `region` come to.
     pub(super) fn of_block(&self, region: &Region) -> Seen {
-        let clip = region.intersect(&self.look.eye.clip);
+        let clip = region.intersect(&self.weighted.setup.clip);
         let mut seen = Seen::default();
         let mut points = 0.0;
         for voxel in spread(&clip) {
@@ -95,10 +95,10 @@ impl<'a> Expectation<'a> {
 
     /// Summed over pixels.
     fn of_voxel(&self, voxel: [usize; 3]) -> Seen {
-        let Look { eye, weights } = self.look;
-        let [x, y, z] = eye.camera.project(eye.grid.position(voxel));
-        let Some(sum) = weights.near([x, y], eye.footprint.reach) else { return Seen::default() };
-        let weight = eye.footprint.at_depth(z);
+        let WeightedView { setup, weights } = self.weighted;
+        let [x, y, z] = setup.camera.project(setup.grid.position(voxel));
+        let Some(sum) = weights.near([x, y], setup.footprint.reach) else { return Seen::default() };
+        let weight = setup.footprint.at_depth(z);
         let unit = if self.quantity == Quantity::Mean { 1.0 } else { sum * sum };
         let together = self.area * weight / sum * unit;
         Seen { together, apart: together * (0.5 * weight / sum) }

@@ -1,16 +1,16 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
 use super::RenderConfig;
-use super::amounts::{Amounts, BlockPlanes, Room};
 use super::expectation::Expectation;
-use super::scene::{Contents, FrameBounds, Group, Inverse, Read, SampleErrors, Scene};
-use super::terms::{Layout, Order};
+use super::plane_values::{BlockPlanes, PlaneValues, Scratch};
+use super::scene::{BatchOutcome, Contents, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene};
+use super::sparse_terms::{Layout, Order};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
 use crate::source::scan::{Scan, scan_frame};
-use crate::source::{Archive, CHANNELS, Coloured, FrameSource, FrameWindow, Painter};
+use crate::source::{Archive, CHANNELS, ColourTransform, ColourWindow, FrameSource, FrameWindow};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Frames that are splatted together, so that the weights of voxels, or of pixels, are computed once for all of them.
@@ -25,7 +25,7 @@ pub struct FrameScene {
     archive: Archive,
     missing_value: Option<f64>,
     /// What makes them of those that are read, if they are not the same.
-    painter: Option<Painter>,
+    colour_transform: Option<ColourTransform>,
     /// Whether a sample turned out to be missing: from then on frames are looked at before they are splatted.
     missing_seen: AtomicBool,
 }
@@ -35,16 +35,16 @@ impl FrameScene {
     pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
         let archive = source.archive().clone();
         let missing_value = sample::missing_value(archive.sample, missing_value);
-        Self { source, archive, missing_value, painter: None, missing_seen: AtomicBool::new(false) }
+        Self { source, archive, missing_value, colour_transform: None, missing_seen: AtomicBool::new(false) }
     }
 
     /// As [`Self::new`], in colours: three channels, 0 to 1.
     pub fn coloured(source: Box<dyn FrameSource>, missing_value: Option<f64>, colours: TransferFunction) -> Self {
         let plain = Self::new(source, missing_value);
         let (sample, missing_value) = (plain.archive.sample, plain.missing_value);
-        let archive = Archive { sample: Painter::SAMPLE, ..plain.archive };
-        let painter = Some(Painter { colours, sample, missing_value });
-        Self { archive, painter, missing_value: None, ..plain }
+        let archive = Archive { sample: ColourTransform::SAMPLE, ..plain.archive };
+        let colour_transform = Some(ColourTransform { colours, sample, missing_value });
+        Self { archive, colour_transform, missing_value: None, ..plain }
     }
 }
 
@@ -58,7 +58,7 @@ impl Scene for FrameScene {
     }
 
     fn channels(&self) -> usize {
-        self.painter.as_ref().map_or(1, |_| CHANNELS.len())
+        self.colour_transform.as_ref().map_or(1, |_| CHANNELS.len())
     }
 
     fn frames(&self) -> Option<usize> {
@@ -75,7 +75,7 @@ impl Scene for FrameScene {
 
     fn block_bytes(&self) -> usize {
         // A plane of it, in the samples' type and as f64.
-        let read = self.painter.as_ref().map_or(0, |painter| painter.sample.size());
+        let read = self.colour_transform.as_ref().map_or(0, |colour_transform| colour_transform.sample.size());
         self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)
     }
 
@@ -85,21 +85,21 @@ impl Scene for FrameScene {
         channel: usize,
         config: &RenderConfig,
         _: &'a Expectation<'_>,
-    ) -> Result<Box<dyn Group + 'a>> {
+    ) -> Result<Box<dyn FrameBatch + 'a>> {
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
-        let window: Box<dyn FrameWindow + 'a> = match &self.painter {
-            Some(painter) => Box::new(Coloured { window, painter, channel }),
+        let window: Box<dyn FrameWindow + 'a> = match &self.colour_transform {
+            Some(colour_transform) => Box::new(ColourWindow { window, colour_transform, channel }),
             None => window,
         };
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let look = |frame: &usize| {
+        let weighted = |frame: &usize| {
             scan_frame(Scan::NOTHING, window.as_ref(), frame - first, &archive.grid, archive.sample, declared)
         };
         let look_first = can_miss && self.missing_seen.load(Relaxed);
         let looked_at = if look_first || config.certify { frames } else { &[] };
-        let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
+        let seen = looked_at.iter().map(weighted).collect::<Result<Vec<Scan>>>()?;
         let absent = seen.iter().any(|s| s.missing > 0);
         let layout = Layout {
             coefficients: 0,
@@ -115,7 +115,7 @@ impl Scene for FrameScene {
         let frames = frames.iter().map(|f| f - first).collect();
         let (blocks, seen) = (self.blocks(), &self.missing_seen);
         let unexpected = (can_miss && looked_at.is_empty()).then_some(seen);
-        Ok(Box::new(FrameGroup {
+        Ok(Box::new(SampleBatch {
             archive,
             blocks,
             missing_value: declared,
@@ -129,7 +129,7 @@ impl Scene for FrameScene {
 }
 
 /// Some frames of an archive.
-struct FrameGroup<'a> {
+struct SampleBatch<'a> {
     archive: &'a Archive,
     blocks: BlockGrid,
     missing_value: Option<f64>,
@@ -142,7 +142,7 @@ struct FrameGroup<'a> {
     errors: SampleErrors,
 }
 
-impl Group for FrameGroup<'_> {
+impl FrameBatch for SampleBatch<'_> {
     fn layout(&self) -> Layout {
         self.layout
     }
@@ -174,14 +174,14 @@ impl Group for FrameGroup<'_> {
         &self.errors
     }
 
-    fn finish(&self) -> Result<Read> {
+    fn finish(&self) -> Result<BatchOutcome> {
         self.window.check_unchanged()?;
         let unexpected = self.unexpected.is_some_and(|seen| seen.load(Relaxed));
-        Ok(if unexpected { Read::Otherwise } else { Read::AsExpected })
+        Ok(if unexpected { BatchOutcome::NeedsRelayout } else { BatchOutcome::Complete })
     }
 }
 
-impl FrameGroup<'_> {
+impl SampleBatch<'_> {
     fn note_missing<T: Copy + Into<f64>>(&self, values: &[T]) {
         if let Some(seen) = self.unexpected.filter(|_| sample::is_any_missing(values, self.missing_value)) {
             seen.store(true, Relaxed);
@@ -191,7 +191,7 @@ impl FrameGroup<'_> {
 
 /// A block of frames that are read when they are needed.
 struct FrameBlock<'a> {
-    group: &'a FrameGroup<'a>,
+    group: &'a SampleBatch<'a>,
     region: Region,
 }
 
@@ -200,9 +200,9 @@ impl BlockPlanes for FrameBlock<'_> {
         self.region.voxels()
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
-        let FrameGroup { archive, layout, window, frames, missing_value, .. } = self.group;
-        let Some((frame, absent)) = layout.samples(plane) else { return Ok(Amounts::Nothing) };
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+        let SampleBatch { archive, layout, window, frames, missing_value, .. } = self.group;
+        let Some((frame, absent)) = layout.samples(plane) else { return Ok(PlaneValues::Nothing) };
         room.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
         window.read_box(frames[frame], &self.region, &mut room.bytes)?;
         if layout.absent {
@@ -210,9 +210,9 @@ impl BlockPlanes for FrameBlock<'_> {
         }
         let samples = room.samples(archive.sample);
         match samples {
-            Amounts::Single(values) => self.group.note_missing(values),
-            Amounts::Double(values) => self.group.note_missing(values),
-            Amounts::Few(_) | Amounts::Nothing => {}
+            PlaneValues::Single(values) => self.group.note_missing(values),
+            PlaneValues::Double(values) => self.group.note_missing(values),
+            PlaneValues::Few(_) | PlaneValues::Nothing => {}
         }
         Ok(samples)
     }

@@ -15,32 +15,32 @@
 //! tile splats the terms of the batch itself (`splat`). All planes go the same way, weights and what is missing included, so
 //! that means stay means. Composites and largest values go slab by slab (`slabs`).
 
-mod amounts;
+mod plane_values;
 pub mod annotate;
-mod canvas;
+mod accumulator;
 mod certificate;
 mod coded;
 mod coefficients;
 mod config;
 mod expectation;
-mod eye;
-mod finish;
+mod view_setup;
+mod reconstruct;
 mod frames;
 mod lattice;
-mod place;
+mod tile_rect;
 mod plan;
 mod project;
-mod reading;
+mod select;
 mod report;
 mod scene;
 pub mod sink;
 mod slabs;
 mod splat;
-mod terms;
-mod uncut;
+mod sparse_terms;
+mod reference_weights;
 mod weights;
 
-pub use coefficients::{CoefficientScene, What};
+pub use coefficients::{CoefficientScene, SplatSource};
 pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig};
 pub use expectation::Expectation;
 pub use frames::FrameScene;
@@ -51,9 +51,9 @@ use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use crate::view::footprint::Method;
-use eye::Eye;
 use plan::Budget;
 use std::time::{Duration, Instant};
+use view_setup::ViewSetup;
 
 /// A finished picture: as many numbers as the scene has channels for each of `width * height` pixels, row by row.
 pub type Picture<'a> = &'a [f32];
@@ -82,9 +82,9 @@ pub fn render(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
-    let eyes = eyes(scene, config)?;
+    let setups = setups(scene, config)?;
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
-    report.views = reports(&eyes, config);
+    report.views = reports(&setups, config);
     let views = report.views.clone();
     let mut sink_time = Duration::ZERO;
     let mut sink = |rendered: Rendered<'_>| {
@@ -94,9 +94,9 @@ pub fn render(
         Ok(())
     };
     if config.mode.is_projection() {
-        project::project(scene, config, &eyes, progress, &mut report, &mut sink)?;
+        project::project(scene, config, &setups, progress, &mut report, &mut sink)?;
     } else {
-        slabs::render(scene, config, &eyes, progress, &mut report, &mut sink)?;
+        slabs::render(scene, config, &setups, progress, &mut report, &mut sink)?;
     }
     progress.finish();
     report.sum_up_expected_errors();
@@ -106,30 +106,32 @@ pub fn render(
 
 /// An error if [`render`] would refuse to begin.
 pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
-    eyes(scene, config).map(|_| ())
+    setups(scene, config).map(|_| ())
 }
 
 /// What is to be said of each view before it is splatted.
-fn reports(eyes: &[Eye], config: &RenderConfig) -> Vec<ViewReport> {
-    let slabs = |eye| (!config.mode.is_projection()).then(|| slabs::count(eye, config));
-    config.views.iter().zip(eyes).map(|(view, eye)| ViewReport::new(view, eye, slabs(eye))).collect()
+fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
+    let slabs = |setup| (!config.mode.is_projection()).then(|| slabs::count(setup, config));
+    config.views.iter().zip(setups).map(|(view, setup)| ViewReport::new(view, setup, slabs(setup))).collect()
 }
 
 /// All views, for each of which there is memory enough.
-fn eyes(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<Eye>> {
+fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
         return Err(Error::usage(
             "--mode: the samples are colours already, of which only projections are made; leave it out, or convert without --transfer-function",
         ));
     }
-    let eye = |view: &View| uncut::without_what_is_dim(Eye::new(scene, config, view)?, config);
-    let eyes = config.views.iter().map(eye).collect::<Result<Vec<_>>>()?;
+    let setup = |view: &View| reference_weights::without_what_is_dim(ViewSetup::new(scene, config, view)?, config);
+    let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
     match config.mode {
-        Mode::Projection => Budget::check(config, scene, &eyes)?,
-        _ => eyes.iter().try_for_each(|eye| Budget::check(config, scene, &slabs::cut(eye, config)?.eyes[..1]))?,
+        Mode::Projection => Budget::check(config, scene, &setups)?,
+        _ => {
+            setups.iter().try_for_each(|setup| Budget::check(config, scene, &slabs::cut(setup, config)?.setups[..1]))?
+        }
     }
-    Ok(eyes)
+    Ok(setups)
 }
 
 /// What splatting may add by default to pictures of a file of such a tolerance, or of frames: half of that, at most 1e-3.
@@ -147,7 +149,7 @@ fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
     match quantity {
         Quantity::Emission => error,
         // A pixel that is not background must keep some of its weights.
-        Quantity::Mean => error.min(0.9 * eye::BACKGROUND),
+        Quantity::Mean => error.min(0.9 * view_setup::BACKGROUND),
     }
 }
 

@@ -3,12 +3,12 @@
 //! Neither the number of views and frames that are rendered together, nor the rows in a band, nor the blocks in a batch
 //! changes a pixel.
 
-use super::eye::Eye;
-use super::place::TILE;
 use super::scene::Scene;
 use super::slabs;
+use super::sparse_terms::{Layout, SparseTerms};
 use super::splat::Splats;
-use super::terms::{Layout, Terms};
+use super::tile_rect::TILE;
+use super::view_setup::ViewSetup;
 use super::{Mode, RenderConfig};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
@@ -18,7 +18,7 @@ use std::ops::Range;
 /// What is allocated at once, for some views that are rendered together.
 #[derive(Debug)]
 pub(super) struct Budget<'a> {
-    eyes: &'a [Eye],
+    setups: &'a [ViewSetup],
     /// Bytes left for pictures, planes and blocks, besides weights.
     available: usize,
     size: [usize; 2],
@@ -36,13 +36,13 @@ const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
     /// An error unless there is memory enough for each of some views alone.
-    pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, eyes: &[Eye]) -> Result<()> {
+    pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> Result<()> {
         let planes = most_planes(scene, 1, config);
-        let least = |eye: &Eye| {
-            let eyes = std::slice::from_ref(eye);
-            fixed(config, eyes) + Budget::new(config, scene, eyes).bytes(1, planes, TILE)
+        let least = |setup: &ViewSetup| {
+            let setups = std::slice::from_ref(setup);
+            fixed(config, setups) + Budget::new(config, scene, setups).bytes(1, planes, TILE)
         };
-        let least = eyes.iter().map(least).max().unwrap_or(0);
+        let least = setups.iter().map(least).max().unwrap_or(0);
         if least <= config.memory {
             return Ok(());
         }
@@ -54,41 +54,41 @@ impl<'a> Budget<'a> {
     }
 
     /// For pictures of a scene from these views, or of these slabs of one.
-    fn new(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
+    fn new(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let channels = scene.channels();
         let of_a_view = match config.mode {
             Mode::Projection => channels * (1 + usize::from(config.certify)),
             _ => config.mode.pixel().numbers(),
         };
-        let views = if config.mode.is_projection() { eyes.len() } else { 1 };
+        let views = if config.mode.is_projection() { setups.len() } else { 1 };
         let together = if channels > 1 { of_a_view * size_of::<f32>() } else { 0 };
         let (size, pixel_bytes) = (config.size(), views * of_a_view * size_of::<f32>());
-        let available = config.memory.saturating_sub(fixed(config, eyes));
+        let available = config.memory.saturating_sub(fixed(config, setups));
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
-        Self { eyes, available, size, pixel_bytes, together, block, block_bytes }
+        Self { setups, available, size, pixel_bytes, together, block, block_bytes }
     }
 
     /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
     /// alone. Where what is read is chosen by the view, that is one.
-    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye]) -> Self {
-        let most = if config.chooses_by_view() { 1 } else { eyes.len() };
-        Self::of_first(config, scene, &eyes[..most], config.size()[1])
+    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
+        let most = if config.chooses_by_view() { 1 } else { setups.len() };
+        Self::of_first(config, scene, &setups[..most], config.size()[1])
     }
 
     /// For as many slabs of a view as go together: with more than a block is deep, less would be hidden.
-    pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [Eye]) -> Self {
+    pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [ViewSetup]) -> Self {
         let deep = slabs::of_block(slabs, &scene.blocks().region(0)).0.min(slabs.len());
         Self::of_first(config, scene, &slabs[..deep], config.size()[1].min(FEW_ROWS * TILE))
     }
 
     /// For as many of the first views as go together with so many rows of all pictures.
-    fn of_first(config: &RenderConfig, scene: &dyn Scene, eyes: &'a [Eye], rows: usize) -> Self {
-        let alone = Self::new(config, scene, &eyes[..1]);
+    fn of_first(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup], rows: usize) -> Self {
+        let alone = Self::new(config, scene, &setups[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = most_planes(scene, frames, config);
         let fits = |budget: &Self| budget.bytes(frames, planes, rows) <= budget.available;
-        let several = |count: usize| Some(Self::new(config, scene, &eyes[..count])).filter(fits);
-        let (mut best, mut least, mut most) = (alone, 1, eyes.len());
+        let several = |count: usize| Some(Self::new(config, scene, &setups[..count])).filter(fits);
+        let (mut best, mut least, mut most) = (alone, 1, setups.len());
         while least < most {
             let middle = least.midpoint(most + 1);
             match several(middle) {
@@ -100,8 +100,8 @@ impl<'a> Budget<'a> {
     }
 
     /// The views.
-    pub(super) fn eyes(&self) -> &'a [Eye] {
-        self.eyes
+    pub(super) fn setups(&self) -> &'a [ViewSetup] {
+        self.setups
     }
 
     /// Pixels of a picture.
@@ -116,9 +116,9 @@ impl<'a> Budget<'a> {
 
     /// A block, and if there are tiles to splat its terms and where they are in each view.
     fn block_bytes(&self, planes: usize) -> usize {
-        let footprints = self.eyes.iter().filter(|eye| eye.lattice.is_none()).count();
-        let terms = if footprints > 0 { Terms::most_bytes(planes) } else { 0 };
-        let shares = slabs::of_block(self.eyes, &self.block).1;
+        let footprints = self.setups.iter().filter(|setup| setup.lattice.is_none()).count();
+        let terms = if footprints > 0 { SparseTerms::most_bytes(planes) } else { 0 };
+        let shares = slabs::of_block(self.setups, &self.block).1;
         self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES + shares)
     }
 
@@ -129,15 +129,15 @@ impl<'a> Budget<'a> {
 
     /// Bands of so many rows with all planes, and what threads work with.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
-        let band = |eye: &Eye| match &eye.lattice {
+        let band = |setup: &ViewSetup| match &setup.lattice {
             Some(lattice) => lattice.band_cells(self.size[0], rows),
             None => self.size[0] * rows.next_multiple_of(TILE),
         };
-        let lattices = self.eyes.iter().filter_map(|eye| eye.lattice.as_ref());
-        let sliced = self.eyes.iter().any(|eye| eye.slab.is_some());
+        let lattices = self.setups.iter().filter_map(|setup| setup.lattice.as_ref());
+        let sliced = self.setups.iter().any(|setup| setup.slab.is_some());
         let gathered = if sliced { planes.max(slabs::TOGETHER) } else { planes };
         let scratch = lattices.map(|lattice| lattice.scratch(&self.block, gathered)).max().unwrap_or(0);
-        let numbers = planes * self.eyes.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
+        let numbers = planes * self.setups.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
         numbers * size_of::<f64>()
     }
 
@@ -160,7 +160,7 @@ impl<'a> Budget<'a> {
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
         // What a lattice takes in plane by plane had better be near.
-        let most = if self.eyes.iter().any(|eye| eye.lattice.is_some()) {
+        let most = if self.setups.iter().any(|setup| setup.lattice.is_some()) {
             rayon::current_num_threads()
         } else {
             memory::MOST_BLOCKS
@@ -173,11 +173,11 @@ impl<'a> Budget<'a> {
 const FEW_ROWS: usize = 4;
 
 /// Bytes that are held whatever is rendered at a time: weights among them.
-fn fixed(config: &RenderConfig, eyes: &[Eye]) -> usize {
+fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
-    let more = match (&config.mode, eyes.first()) {
-        (Mode::Projection, _) => eyes.len() * width * height * WEIGHT_BYTES,
-        (_, eye) => eye.map_or(0, |eye| slabs::bytes(eye, config)),
+    let more = match (&config.mode, setups.first()) {
+        (Mode::Projection, _) => setups.len() * width * height * WEIGHT_BYTES,
+        (_, setup) => setup.map_or(0, |setup| slabs::bytes(setup, config)),
     };
     memory::FIXED + config.reserved + more
 }

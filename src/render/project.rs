@@ -1,13 +1,13 @@
 //! Projections: the planes of a group of frames of every view, and from these its pictures.
 
-use super::amounts::BlockPlanes;
-use super::canvas::{self, Blocks, Canvas};
+use super::accumulator::{self, BandAccumulator, Blocks};
 use super::expectation::Expectation;
-use super::eye::Eye;
-use super::finish::Finish;
 use super::plan::{self, Budget};
-use super::scene::{Group, Read, Scene};
-use super::weights::Look;
+use super::plane_values::BlockPlanes;
+use super::reconstruct::PixelReconstructor;
+use super::scene::{BatchOutcome, FrameBatch, Scene};
+use super::view_setup::ViewSetup;
+use super::weights::WeightedView;
 use super::{RenderConfig, RenderReport, Rendered, lap};
 use crate::base::error::Result;
 use crate::base::progress::Progress;
@@ -18,21 +18,21 @@ use std::time::Instant;
 pub(super) fn project(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    eyes: &[Eye],
+    setups: &[ViewSetup],
     progress: &dyn Progress,
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    progress.start(Some((eyes.len() * config.frames.len()) as u64));
+    progress.start(Some((setups.len() * config.frames.len()) as u64));
     let mut sink = |rendered: Rendered<'_>| {
         progress.advance(1);
         sink(rendered)
     };
     let mut first = 0;
-    while first < eyes.len() {
-        let budget = Budget::of_most(config, scene, &eyes[first..]);
+    while first < setups.len() {
+        let budget = Budget::of_most(config, scene, &setups[first..]);
         render_views(scene, config, (&budget, first), report, &mut sink)?;
-        first += budget.eyes().len();
+        first += budget.setups().len();
     }
     Ok(())
 }
@@ -46,16 +46,18 @@ fn render_views(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
     let mut clock = Instant::now();
-    let looks = budget.eyes().iter().map(|eye| Look::new(eye, config, budget)).collect::<Result<Vec<_>>>()?;
-    let expectations: Vec<_> = looks.iter().map(|look| Expectation::new(look, config)).collect();
+    let weighted_views =
+        budget.setups().iter().map(|setup| WeightedView::new(setup, config, budget)).collect::<Result<Vec<_>>>()?;
+    let expectations: Vec<_> = weighted_views.iter().map(|weighted| Expectation::new(weighted, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
     let (mut rest, count) = (config.frames.as_slice(), scene.channels());
     while let Some(first) = rest.first() {
         let most = plan::in_group(scene, *first, rest);
         let (now, later) = rest.split_at(budget.frames(scene, config, most));
-        let channel = |channel| render_channel(scene, config, (now, channel), (&looks, &expectations), budget, report);
+        let channel =
+            |channel| render_channel(scene, config, (now, channel), (&weighted_views, &expectations), budget, report);
         let channels = (0..count).map(channel).collect::<Result<Vec<_>>>()?;
-        for (i, view) in (first_view..).take(looks.len()).enumerate() {
+        for (i, view) in (first_view..).take(weighted_views.len()).enumerate() {
             let expected = channels.iter().map(|views| views[i].1).sum::<f64>() / count as f64;
             // Frame by frame, so that it is the same however frames are grouped.
             now.iter().for_each(|_| report.views[view].expected_error += expected);
@@ -73,26 +75,26 @@ fn render_channel(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     (frames, channel): (&[usize], usize),
-    (looks, expectations): (&[Look<'_>], &[Expectation<'_>]),
+    (weighted_views, expectations): (&[WeightedView<'_>], &[Expectation<'_>]),
     budget: &Budget<'_>,
     report: &mut RenderReport,
 ) -> Result<Vec<(Pictures, f64)>> {
     loop {
         let before = report.clone();
         let group = scene.group(frames, channel, config, &expectations[0])?;
-        let pictures = render_group(group.as_ref(), looks, config, budget, report)?;
-        let expected = |expectation| group.expected(&looks[0].eye.clip, expectation);
+        let pictures = render_group(group.as_ref(), weighted_views, config, budget, report)?;
+        let expected = |expectation| group.expected(&weighted_views[0].setup.clip, expectation);
         let expected = expectations.iter().map(expected).collect::<Result<Vec<_>>>()?;
         match group.finish()? {
-            Read::AsExpected => return Ok(pictures.into_iter().zip(expected).collect()),
-            Read::Otherwise => *report = before,
+            BatchOutcome::Complete => return Ok(pictures.into_iter().zip(expected).collect()),
+            BatchOutcome::NeedsRelayout => *report = before,
         }
     }
 }
 
-impl Blocks for &dyn Group {
+impl Blocks for &dyn FrameBatch {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        Group::planes(*self, block)
+        FrameBatch::planes(*self, block)
     }
 }
 
@@ -140,23 +142,25 @@ impl Pictures {
 
 /// Renders all frames of a group from some views.
 fn render_group(
-    group: &dyn Group,
-    looks: &[Look<'_>],
+    group: &dyn FrameBatch,
+    weighted_views: &[WeightedView<'_>],
     config: &RenderConfig,
     budget: &Budget<'_>,
     report: &mut RenderReport,
 ) -> Result<Vec<Pictures>> {
     let layout = group.layout();
-    let blocks = blocks_to_read(group, looks, report)?;
-    let finish: Vec<Finish<'_>> = looks.iter().map(|look| Finish::new(group, look, config)).collect();
-    let empty = |finish: &Finish<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
+    let blocks = blocks_to_read(group, weighted_views, report)?;
+    let finish: Vec<PixelReconstructor<'_>> =
+        weighted_views.iter().map(|weighted| PixelReconstructor::new(group, weighted, config)).collect();
+    let empty = |finish: &PixelReconstructor<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
     let mut pictures: Vec<Vec<f32>> = finish.iter().map(empty).collect();
     for rows in budget.bands(&layout) {
-        let mut canvases: Vec<_> = looks.iter().map(|look| Canvas::new(look.eye, rows.clone(), &layout)).collect();
-        canvas::splat(&mut canvases, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
+        let mut accumulators: Vec<_> =
+            weighted_views.iter().map(|weighted| BandAccumulator::new(weighted.setup, rows.clone(), &layout)).collect();
+        accumulator::splat(&mut accumulators, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
         let mut clock = Instant::now();
-        for ((canvas, finish), pictures) in canvases.into_iter().zip(&finish).zip(&mut pictures) {
-            canvas.finish(pictures, |tile, pixels| finish.tile(tile, pixels));
+        for ((accumulator, finish), pictures) in accumulators.into_iter().zip(&finish).zip(&mut pictures) {
+            accumulator.finish(pictures, |tile, pixels| finish.tile(tile, pixels));
         }
         lap(&mut clock, &mut report.inverse_seconds);
     }
@@ -169,17 +173,21 @@ fn render_group(
 }
 
 /// The blocks of a group that a pixel sees, and a word in the report on the others.
-fn blocks_to_read(group: &dyn Group, looks: &[Look<'_>], report: &mut RenderReport) -> Result<Vec<usize>> {
-    let eye = looks[0].eye;
-    let all_rows = 0..eye.camera.size[1];
-    let contents = group.blocks(&eye.clip)?;
+fn blocks_to_read(
+    group: &dyn FrameBatch,
+    weighted_views: &[WeightedView<'_>],
+    report: &mut RenderReport,
+) -> Result<Vec<usize>> {
+    let setup = weighted_views[0].setup;
+    let all_rows = 0..setup.camera.size[1];
+    let contents = group.blocks(&setup.clip)?;
     report.add(&contents);
     let mut blocks = contents.blocks;
     let held = blocks.len();
-    blocks.retain(|b| looks.iter().any(|look| look.eye.reaches(*b, &all_rows)));
+    blocks.retain(|b| weighted_views.iter().any(|weighted| weighted.setup.reaches(*b, &all_rows)));
     let reached = blocks.len();
-    blocks.retain(|b| looks.iter().any(|look| look.eye.sees(*b, &all_rows)));
-    report.blocks += eye.blocks.len() as u64;
+    blocks.retain(|b| weighted_views.iter().any(|weighted| weighted.setup.sees(*b, &all_rows)));
+    report.blocks += setup.blocks.len() as u64;
     report.blocks_outside += (held - reached) as u64;
     report.blocks_dimmed += (reached - blocks.len()) as u64;
     Ok(blocks)

@@ -1,7 +1,7 @@
 //! What a rendering did.
 
-use super::eye::Eye;
 use super::scene::{Contents, LeftOut};
+use super::view_setup::ViewSetup;
 use crate::view::camera::View;
 use serde::Serialize;
 
@@ -99,10 +99,10 @@ impl RenderReport {
 
 impl ViewReport {
     /// Of a view that is cut into slabs, or is not; before anything is splatted.
-    pub(super) fn new(view: &View, eye: &Eye, slabs: Option<usize>) -> Self {
+    pub(super) fn new(view: &View, setup: &ViewSetup, slabs: Option<usize>) -> Self {
         let &View { azimuth, elevation, roll, .. } = view;
-        let (scale, center) = (eye.camera.scale, eye.camera.beside(0.0));
-        let (method, stated_splat_error) = (eye.method.name, eye.stated_error);
+        let (scale, center) = (setup.camera.scale, setup.camera.beside(0.0));
+        let (method, stated_splat_error) = (setup.method.name, setup.stated_error);
         let expected_error = if slabs.is_some() { f64::NAN } else { 0.0 };
         Self { azimuth, elevation, roll, scale, center, method, slabs, stated_splat_error, expected_error }
     }

@@ -4,9 +4,9 @@
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
 use super::RenderConfig;
-use super::amounts::BlockPlanes;
 use super::expectation::Expectation;
-use super::terms::Layout;
+use super::plane_values::BlockPlanes;
+use super::sparse_terms::Layout;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::wavelet::Lane;
@@ -44,11 +44,11 @@ pub trait Scene {
         channel: usize,
         config: &RenderConfig,
         expectation: &'a Expectation<'_>,
-    ) -> Result<Box<dyn Group + 'a>>;
+    ) -> Result<Box<dyn FrameBatch + 'a>>;
 }
 
 /// Some frames that are rendered together.
-pub trait Group: Sync {
+pub trait FrameBatch: Sync {
     /// How the planes are used.
     fn layout(&self) -> Layout;
 
@@ -72,7 +72,7 @@ pub trait Group: Sync {
     fn errors(&self) -> &SampleErrors;
 
     /// What was found on the way; an error if what was read changed meanwhile.
-    fn finish(&self) -> Result<Read>;
+    fn finish(&self) -> Result<BatchOutcome>;
 }
 
 /// The frames at some pixels from all planes. Overwrites these.
@@ -80,11 +80,11 @@ pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
 /// What reading a group found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Read {
+pub enum BatchOutcome {
     /// Nothing else than its layout has room for.
-    AsExpected,
+    Complete,
     /// More than that: it must be opened and rendered again, and will then have room.
-    Otherwise,
+    NeedsRelayout,
 }
 
 /// The blocks of a group.

@@ -3,9 +3,9 @@
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.
 
-use super::eye::Eye;
-use super::place::{Place, intersect, overlap};
-use super::terms::Terms;
+use super::sparse_terms::SparseTerms;
+use super::tile_rect::{TileRect, intersect, overlap};
+use super::view_setup::ViewSetup;
 use crate::view::footprint::Footprint;
 use crate::wavelet::Lane;
 use std::ops::Range;
@@ -22,7 +22,7 @@ pub enum Order {
 /// A rectangle of pixels with its planes.
 #[derive(Debug)]
 pub(super) struct Tile {
-    pub(super) place: Place,
+    pub(super) place: TileRect,
     /// Number of planes.
     count: usize,
     order: Order,
@@ -31,7 +31,7 @@ pub(super) struct Tile {
 
 impl Tile {
     /// With all planes at zero.
-    pub(super) fn new(place: Place, count: usize, order: Order) -> Self {
+    pub(super) fn new(place: TileRect, count: usize, order: Order) -> Self {
         Self { sums: vec![0.0; count * place.pixels()], place, count, order }
     }
 
@@ -49,7 +49,7 @@ impl Tile {
     }
 
     /// Adds a block's voxels, of which these are the terms.
-    pub(super) fn splat(&mut self, voxels: &Splats, terms: &Terms, footprint: &Footprint) {
+    pub(super) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;
         }
@@ -83,7 +83,7 @@ impl Tile {
 
     /// Adds `amount` times the outer product of a row and a column of weights to a plane.
     fn add(&mut self, plane: usize, amount: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let Place { x: xs, y: ys } = &self.place;
+        let TileRect { x: xs, y: ys } = &self.place;
         let (width, pixels) = (xs.len(), self.place.pixels());
         let start = plane * pixels + (y - ys.start) * width + (x - xs.start);
         add_to_plane(&mut self.sums[start..], width, amount, row, column);
@@ -91,7 +91,7 @@ impl Tile {
 
     /// Adds an amount for every plane, as [`Self::add`] does for one.
     fn add_all(&mut self, amounts: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let Place { x: xs, y: ys } = &self.place;
+        let TileRect { x: xs, y: ys } = &self.place;
         let width = xs.len();
         let start = ((y - ys.start) * width + (x - xs.start)) * self.count;
         add_to_pixels(&mut self.sums[start..], width, amounts, row, column);
@@ -147,15 +147,15 @@ impl Splats {
     pub(super) const BYTES: usize = size_of::<Splat>();
 
     /// Projects the voxels of a block that are splatted and have terms.
-    pub(super) fn new(terms: &Terms, block: usize, eye: &Eye) -> Self {
-        let Eye { camera, footprint, grid, clip, .. } = eye;
-        let region = eye.blocks.region(block);
+    pub(super) fn new(terms: &SparseTerms, block: usize, setup: &ViewSetup) -> Self {
+        let ViewSetup { camera, footprint, grid, clip, .. } = setup;
+        let region = setup.blocks.region(block);
         let mut voxels = Vec::new();
         for v in region.intersect(clip).iter() {
             let index = region.index(v);
             if !terms.of_voxel(index).0.is_empty() {
                 let [x, y, z] = camera.project(grid.position(v));
-                let share = eye.slab.map_or(1.0, |slab| slab.share(z));
+                let share = setup.slab.map_or(1.0, |slab| slab.share(z));
                 if share > 0.0 {
                     voxels.push(Splat { index, x, y, weight: share * footprint.at_depth(z) });
                 }

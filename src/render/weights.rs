@@ -1,13 +1,13 @@
 //! The sums of weights that the weighted mean divides by (eq 12), and what is background.
 
-use super::amounts::{BlockPlanes, OnesOf};
-use super::canvas::{self, Blocks, Canvas, Finished, Pixels};
+use super::accumulator::{self, BandAccumulator, Blocks, Pixels, ResolvedTile};
 use super::certificate;
-use super::eye::{BACKGROUND, Eye};
 use super::plan::Budget;
+use super::plane_values::{BlockPlanes, UnitValues};
+use super::reference_weights::ReferenceWeights;
+use super::sparse_terms::Layout;
 use super::splat::Order;
-use super::terms::Layout;
-use super::uncut::Uncut;
+use super::view_setup::{BACKGROUND, ViewSetup};
 use super::{Quantity, RenderConfig, RenderReport};
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
@@ -25,7 +25,7 @@ pub(super) struct Weights {
     /// With the footprints that values are splatted with, so that the quotient is a mean.
     sums: Vec<f64>,
     /// With uncut footprints, so that the background is the same for every splat method. Empty: the same sums.
-    uncut: Vec<f64>,
+    reference_weights: Vec<f64>,
     /// At least what lies beyond the cut. Empty: not asked for.
     beyond: Vec<f64>,
     threshold: f64,
@@ -33,19 +33,19 @@ pub(super) struct Weights {
 
 /// A view, and its sums of weights.
 #[derive(Debug)]
-pub(super) struct Look<'a> {
-    pub(super) eye: &'a Eye,
+pub(super) struct WeightedView<'a> {
+    pub(super) setup: &'a ViewSetup,
     pub(super) weights: Weights,
 }
 
-impl<'a> Look<'a> {
-    pub(super) fn new(eye: &'a Eye, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
-        Ok(Self { weights: Weights::new(eye, config, budget)?, eye })
+impl<'a> WeightedView<'a> {
+    pub(super) fn new(setup: &'a ViewSetup, config: &RenderConfig, budget: &Budget<'_>) -> Result<Self> {
+        Ok(Self { weights: Weights::new(setup, config, budget)?, setup })
     }
 
     /// Where nothing is weighed.
-    pub(super) fn of_no_weights(eye: &'a Eye) -> Self {
-        Self { eye, weights: Weights::default() }
+    pub(super) fn of_no_weights(setup: &'a ViewSetup) -> Self {
+        Self { setup, weights: Weights::default() }
     }
 }
 
@@ -54,7 +54,7 @@ impl<'a> Look<'a> {
 pub(super) struct PixelWeight {
     /// C, as values are splatted.
     pub(super) sum: f64,
-    uncut: f64,
+    reference_weights: f64,
     /// T, beyond the cut.
     pub(super) beyond: f64,
     threshold: f64,
@@ -65,23 +65,23 @@ impl PixelWeight {
     /// rounding is what is left.
     pub(super) fn present(&self, absent: f64) -> f64 {
         let present = self.sum - absent;
-        let enough = self.uncut - absent >= self.threshold && present > LEAST_PRESENT * self.sum;
+        let enough = self.reference_weights - absent >= self.threshold && present > LEAST_PRESENT * self.sum;
         if enough { present } else { f64::NAN }
     }
 }
 
 impl Weights {
     /// Splats a 1 for every voxel.
-    pub(super) fn new(eye: &Eye, config: &RenderConfig, budget: &Budget) -> Result<Self> {
-        let by = |method: Method| Footprint::new(config.kernel, &eye.grid, eye.camera.scale, method);
-        let sums = sums(eye, budget)?;
+    pub(super) fn new(setup: &ViewSetup, config: &RenderConfig, budget: &Budget) -> Result<Self> {
+        let by = |method: Method| Footprint::new(config.kernel, &setup.grid, setup.camera.scale, method);
+        let sums = sums(setup, budget)?;
         let largest = sums.iter().copied().fold(0.0, f64::max);
-        let mut weights = Self { size: eye.camera.size, threshold: BACKGROUND * largest, sums, ..Self::default() };
-        if config.quantity == Quantity::Mean && eye.method != Method::EXACT {
-            weights.judge(&Uncut::new(eye, &by(Method::EXACT)?), eye.stated_error);
+        let mut weights = Self { size: setup.camera.size, threshold: BACKGROUND * largest, sums, ..Self::default() };
+        if config.quantity == Quantity::Mean && setup.method != Method::EXACT {
+            weights.judge(&ReferenceWeights::new(setup, &by(Method::EXACT)?), setup.stated_error);
         }
         if config.certify {
-            let whole = Eye { footprint: by(certificate::WHOLE)?, ..eye.clone() };
+            let whole = ViewSetup { footprint: by(certificate::WHOLE)?, ..setup.clone() };
             weights.beyond = self::sums(&whole, budget)?;
             certificate::leave_beyond(&whole, &weights.sums, &mut weights.beyond);
         }
@@ -91,19 +91,19 @@ impl Weights {
     /// Sums that are off by less than this share of the largest anywhere become uncut ones where the difference may matter: for
     /// the largest here, and for those near what is then the threshold. Where others are as large but for such a share, the
     /// largest may be one of these, and the threshold off by a hundredth of that.
-    fn judge(&mut self, uncut: &Uncut<'_>, off: f64) {
+    fn judge(&mut self, reference_weights: &ReferenceWeights<'_>, off: f64) {
         let pixel = |at: usize| [at % self.size[0], at / self.size[0]];
         let brightest =
             (0..self.sums.len()).fold(0, |best, at| if self.sums[at] > self.sums[best] { at } else { best });
-        let largest = uncut.at(pixel(brightest));
-        let (threshold, near) = (BACKGROUND * largest, off * uncut.most());
+        let largest = reference_weights.at(pixel(brightest));
+        let (threshold, near) = (BACKGROUND * largest, off * reference_weights.most());
         let mut sums = self.sums.clone();
         sums.par_iter_mut().enumerate().for_each(|(at, sum)| {
             if (*sum - threshold).abs() <= near {
-                *sum = uncut.at(pixel(at));
+                *sum = reference_weights.at(pixel(at));
             }
         });
-        (self.threshold, self.uncut) = (threshold, sums);
+        (self.threshold, self.reference_weights) = (threshold, sums);
     }
 
     /// The sums of the pixels that are not background.
@@ -124,12 +124,17 @@ impl Weights {
     pub(super) fn at(&self, [x, y]: [usize; 2]) -> PixelWeight {
         let at = y * self.size[0] + x;
         let sum = self.sums[at];
-        let uncut = self.uncut.get(at).copied().unwrap_or(sum);
-        PixelWeight { sum, uncut, beyond: self.beyond.get(at).copied().unwrap_or(0.0), threshold: self.threshold }
+        let reference_weights = self.reference_weights.get(at).copied().unwrap_or(sum);
+        PixelWeight {
+            sum,
+            reference_weights,
+            beyond: self.beyond.get(at).copied().unwrap_or(0.0),
+            threshold: self.threshold,
+        }
     }
 }
 
-fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
+fn sums(setup: &ViewSetup, budget: &Budget) -> Result<Vec<f64>> {
     let layout = Layout {
         coefficients: 1,
         frames: 1,
@@ -139,13 +144,13 @@ fn sums(eye: &Eye, budget: &Budget) -> Result<Vec<f64>> {
         lengths: false,
         order: Order::Planes,
     };
-    let mut out = vec![0.0; eye.pixels()];
+    let mut out = vec![0.0; setup.pixels()];
     for rows in budget.bands(&layout) {
-        let blocks: Vec<usize> = eye.blocks.touching(&eye.clip).collect();
-        let mut canvas = Canvas::new(eye, rows.clone(), &layout);
+        let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
+        let mut accumulator = BandAccumulator::new(setup, rows.clone(), &layout);
         let (batch, report) = (budget.batch(&layout, rows.len()), &mut RenderReport::default());
-        canvas::splat(std::slice::from_mut(&mut canvas), &blocks, batch, &Ones(&eye.blocks), report)?;
-        canvas.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
+        accumulator::splat(std::slice::from_mut(&mut accumulator), &blocks, batch, &Ones(&setup.blocks), report)?;
+        accumulator.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
     }
     Ok(out)
 }
@@ -155,11 +160,11 @@ struct Ones<'a>(&'a BlockGrid);
 
 impl Blocks for Ones<'_> {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        Ok(Box::new(OnesOf(self.0.region(block).voxels())))
+        Ok(Box::new(UnitValues(self.0.region(block).voxels())))
     }
 }
 
-fn put_first_plane(tile: &mut Finished<'_>, pixels: &mut Pixels<'_, f64>) {
+fn put_first_plane(tile: &mut ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
     let place = tile.place;
     if tile.used().is_empty() {
         return;

@@ -1,9 +1,9 @@
 //! A window of frames as bytes at known places: the one way in which every format copies boxes out.
 
 use super::FrameWindow;
-use super::described::Stored;
-use super::held::Held;
+use super::file_header::Stored;
 use super::layout::Shape;
+use super::spill_buffer::SpillBuffer;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::mapped::{FileBytes, State};
@@ -28,35 +28,35 @@ pub(super) enum Bytes {
     /// In a file as they are.
     File(FileBytes),
     /// Taken from a file, which was in a state, or from a stream. The file is not kept open: a window may be of many.
-    Held { data: Arc<Held>, file: Option<(PathBuf, State)> },
+    SpillBuffer { data: Arc<SpillBuffer>, file: Option<(PathBuf, State)> },
 }
 
 impl Bytes {
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
         match self {
             Self::File(file) => file.read_at(offset, out),
-            Self::Held { data, .. } => data.read_at(offset, out),
+            Self::SpillBuffer { data, .. } => data.read_at(offset, out),
         }
     }
 
     fn small_reads_are_cheap(&self) -> bool {
         match self {
             Self::File(file) => file.is_mapped(),
-            Self::Held { data, .. } => matches!(**data, Held::Memory(_)),
+            Self::SpillBuffer { data, .. } => matches!(**data, SpillBuffer::Memory(_)),
         }
     }
 
     fn path(&self) -> &Path {
         match self {
             Self::File(file) => file.path(),
-            Self::Held { file, .. } => file.as_ref().map_or(Path::new(STANDARD), |(path, _)| path),
+            Self::SpillBuffer { file, .. } => file.as_ref().map_or(Path::new(STANDARD), |(path, _)| path),
         }
     }
 
     fn check_unchanged(&self) -> Result<()> {
         match self {
             Self::File(file) => file.check_unchanged(),
-            Self::Held { file, .. } => file.as_ref().map_or(Ok(()), |(path, state)| state.check_path(path)),
+            Self::SpillBuffer { file, .. } => file.as_ref().map_or(Ok(()), |(path, state)| state.check_path(path)),
         }
     }
 }
@@ -115,7 +115,7 @@ impl Frames {
     /// Bytes of memory that hold what was decoded.
     pub(super) fn memory(&self) -> usize {
         let held = |(bytes, _): &(Bytes, Stored)| match bytes {
-            Bytes::Held { data, .. } => data.memory(),
+            Bytes::SpillBuffer { data, .. } => data.memory(),
             Bytes::File(_) => 0,
         };
         self.bytes.iter().map(held).sum()
@@ -294,9 +294,9 @@ mod tests {
     /// The same bytes in a temporary file and in memory.
     fn both(bytes: &[u8]) -> [Bytes; 2] {
         [0, bytes.len()].map(|memory| {
-            let mut data = Held::new(bytes.len(), memory, Path::new(STANDARD)).expect("room");
+            let mut data = SpillBuffer::new(bytes.len(), memory, Path::new(STANDARD)).expect("room");
             data.write_at(0, bytes).expect("writing");
-            Bytes::Held { data: Arc::new(data), file: None }
+            Bytes::SpillBuffer { data: Arc::new(data), file: None }
         })
     }
 

@@ -1,6 +1,6 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
-use super::described::Files;
+use super::file_header::Files;
 use super::formats::{self, Format, SUPPORTED, file_series, pvd};
 use super::{OpenOptions, numbering};
 use crate::base::error::{Error, Result};

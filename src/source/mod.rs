@@ -4,11 +4,11 @@
 //! order of axes (`layout`). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
-mod coloured;
-mod described;
+mod colour_transform;
+mod file_header;
 mod formats;
 mod frames;
-mod held;
+mod spill_buffer;
 mod inputs;
 mod layout;
 mod numbering;
@@ -20,10 +20,10 @@ mod stream;
 #[cfg(test)]
 mod testing;
 
-pub(crate) use coloured::Coloured;
-pub use coloured::{CHANNELS, Painter};
-pub use described::Units;
-pub use formats::{ArrayHeader, array_header, endings};
+pub(crate) use colour_transform::ColourWindow;
+pub use colour_transform::{CHANNELS, ColourTransform};
+pub use file_header::Units;
+pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
 pub use select::{Selection, select};
 

@@ -1,9 +1,9 @@
 //! Files as one archive: whatever the format, a file comes down to frames at known places, or to frames that are decoded.
 
-use super::described::{At, Described, Files, Part};
+use super::file_header::{DataLocation, FileHeader, Files, Part};
 use super::frames::{Bytes, Frame, Frames};
-use super::held::{Held, Spool};
 use super::layout::Shape;
+use super::spill_buffer::{SpillBuffer, Spool};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -31,7 +31,7 @@ struct Decoded {
     part: usize,
     /// The first of its frames, counted from the part's.
     first: usize,
-    data: Arc<Held>,
+    data: Arc<SpillBuffer>,
 }
 
 impl Series {
@@ -58,7 +58,7 @@ impl Series {
         series.finish(files, timed_otherwise, options)
     }
 
-    fn of(first: &mut Described, options: &OpenOptions) -> Self {
+    fn of(first: &mut FileHeader, options: &OpenOptions) -> Self {
         let archive = Archive {
             variable: first.variable.clone(),
             units: first.units.clone(),
@@ -74,7 +74,7 @@ impl Series {
     }
 
     /// Takes the frames of a file, with their times and the notes on them.
-    fn take(&mut self, file: &mut Described) {
+    fn take(&mut self, file: &mut FileHeader) {
         self.archive.times.extend(&file.times);
         for note in mem::take(&mut file.notes) {
             note_once(&mut self.archive.notes, note);
@@ -83,7 +83,7 @@ impl Series {
             let frames = self.archive.frames.unwrap_or(0);
             self.starts.push(frames);
             self.archive.frames = self.archive.frames.and_then(|_| frames.checked_add(part.frames));
-            if matches!(part.at, At::Decoded(_)) {
+            if matches!(part.at, DataLocation::Decoded(_)) {
                 self.archive.memory = self.memory;
             }
             self.parts.push(part);
@@ -133,13 +133,13 @@ impl Series {
         let Part { path, state, at, .. } = &self.parts[part];
         let (path, state) = (path.clone(), *state);
         let together = match at {
-            At::Byte(start) => {
+            DataLocation::Byte(start) => {
                 let file = FileBytes::open(&path, self.access)?;
                 state.check(&path, &file.state())?;
                 self.push(part, (0, *start), wanted, Bytes::File(file), window);
                 return Ok(());
             }
-            At::Decoded(decoder) => decoder.together(),
+            DataLocation::Decoded(decoder) => decoder.together(),
         };
         state.check_path(&path)?;
         for wanted in wanted.chunk_by(|a, b| a / together == b / together) {
@@ -147,7 +147,7 @@ impl Series {
             let room = self.memory.saturating_sub(window.memory());
             let data = self.decoded(part, (first, together), room, spool)?;
             let file = Some((path.clone(), state));
-            self.push(part, (first, 0), wanted, Bytes::Held { data, file }, window);
+            self.push(part, (first, 0), wanted, Bytes::SpillBuffer { data, file }, window);
         }
         Ok(())
     }
@@ -171,14 +171,14 @@ impl Series {
         (first, together): (usize, usize),
         room: usize,
         spool: &mut Spool,
-    ) -> Result<Arc<Held>> {
+    ) -> Result<Arc<SpillBuffer>> {
         if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
             return Ok(last.data.clone());
         }
         self.last = None;
         let Part { path, frames, stored, at, .. } = &mut self.parts[part];
-        let At::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
-        let mut data = Held::within(stored.bytes, room, spool, path)?;
+        let DataLocation::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
+        let mut data = SpillBuffer::within(stored.bytes, room, spool, path)?;
         decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
         let data = Arc::new(data);
         if together > 1 {
@@ -190,7 +190,7 @@ impl Series {
     /// Lets go of what parts that no frame is taken of next went on with.
     fn rest(&mut self, parts: Range<usize>) {
         for part in &mut self.parts[parts] {
-            if let At::Decoded(decoder) = &mut part.at {
+            if let DataLocation::Decoded(decoder) = &mut part.at {
                 decoder.rest();
             }
         }
@@ -239,7 +239,7 @@ impl FrameSource for Series {
 }
 
 /// What a file says, with the user's spacing and origin in place of its own.
-fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let mut file = formats::describe(path, options)?;
     let mut grid = file.grid();
     override_grid(&mut grid, options);

@@ -1,11 +1,11 @@
 //! Frames from a pipe: forward only, one window held at a time, in memory or in a temporary file.
 
-use super::described::Stored;
+use super::file_header::Stored;
 use super::formats::{self, Format, npy, raw};
 use super::frames::{Bytes, Frame, Frames};
-use super::held::{Held, read_some};
 use super::layout::Shape;
 use super::series::{check_grid, override_grid};
+use super::spill_buffer::{SpillBuffer, read_some};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -56,7 +56,7 @@ impl<R: Read> Stream<R> {
     }
 
     /// Moves up to `frames` frames, and says how many there were; nobody holds those that are skipped.
-    fn copy(&mut self, frames: usize, mut held: Option<&mut Held>) -> Result<usize> {
+    fn copy(&mut self, frames: usize, mut held: Option<&mut SpillBuffer>) -> Result<usize> {
         let left = self.archive.frames.map_or(frames, |all| frames.min(all - self.next));
         for done in 0..left {
             let place = (done * self.shape.frame_bytes()) as u64;
@@ -69,7 +69,7 @@ impl<R: Read> Stream<R> {
     }
 
     /// Moves one frame to its place; false if the stream ends before it.
-    fn copy_frame(&mut self, mut held: Option<&mut Held>, place: u64) -> Result<bool> {
+    fn copy_frame(&mut self, mut held: Option<&mut SpillBuffer>, place: u64) -> Result<bool> {
         let (frame, bytes) = (self.next, self.shape.frame_bytes());
         let mut got = 0;
         while got < bytes {
@@ -143,10 +143,10 @@ impl<R: Read + Send> FrameSource for Stream<R> {
         self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
         let bytes = count.saturating_mul(self.shape.frame_bytes());
-        let mut data = Held::new(bytes, self.memory, Path::new(STANDARD))?;
+        let mut data = SpillBuffer::new(bytes, self.memory, Path::new(STANDARD))?;
         let held = self.copy(count, Some(&mut data))?;
         let frames = (0..held).map(|i| self.frame(i, first)).collect();
-        let bytes = vec![(Bytes::Held { data: Arc::new(data), file: None }, self.stored.clone())];
+        let bytes = vec![(Bytes::SpillBuffer { data: Arc::new(data), file: None }, self.stored.clone())];
         Ok(Box::new(Frames { shape: self.shape, bytes, frames }))
     }
 }

@@ -13,7 +13,7 @@ use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, What, render};
+use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, SplatSource, render};
 use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
@@ -153,7 +153,7 @@ fn pixels_that_nothing_reaches_are_background_or_nothing() {
         let view = View { scale: Some(1.0), center, ..view(30.0, 20.0, [120, 24]) };
         for quantity in [Quantity::Mean, Quantity::Emission] {
             let config = RenderConfig { certify: true, ..looking(view, 0.0, quantity, &SKEWED, 3) };
-            let scene = &mut CoefficientScene::new(file.open(), What::Coefficients);
+            let scene = &mut CoefficientScene::new(file.open(), SplatSource::Coefficients);
             let (found, errors, report) = crate::common::rendered(scene, &config);
             let truth = truth(&SKEWED, &config, report.views[0].scale, &vec![1.0; 945], None);
             for (at, (found, error)) in found.iter().zip(&errors).enumerate().filter(|(at, _)| truth.weight[*at] == 0.0)
@@ -201,7 +201,7 @@ fn pictures_of_the_largest_samples_are_numbers() {
     for tolerance in [0.0, 0.01] {
         let file = stored(&mut memory.clone(), &settings(Basis::Haar, 4, tolerance));
         let config = looking(view(30.0, 20.0, [24, 20]), 0.0, Quantity::Mean, &SKEWED, 3);
-        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &config);
+        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &config);
         let truth = truth(&SKEWED, &config, report.views[0].scale, &values, None);
         let range = f64::from(f32::MAX) - f64::from(f32::MIN);
         for (found, expected) in found.iter().zip(&truth.mean) {
@@ -211,7 +211,7 @@ fn pictures_of_the_largest_samples_are_numbers() {
         }
         // What a single cannot hold is infinite, never background.
         let emission = RenderConfig { quantity: Quantity::Emission, memory: MEMORY, ..config };
-        let (found, _) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &emission);
+        let (found, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &emission);
         assert!(found.iter().all(|v| !v.is_nan()) && found.iter().any(|v| v.is_infinite()));
     }
 }

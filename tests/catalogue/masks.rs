@@ -10,7 +10,7 @@ use crate::common::{Stored, extracted, looking, pictures, settings, stored, wind
 use crate::images::bits;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 use wavesplat::wavelet::Basis;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
@@ -88,7 +88,7 @@ fn masked(missing: Missing) -> (Memory, Vec<f64>, Vec<bool>) {
 }
 
 fn of_coefficients(file: &Stored, look: &RenderConfig) -> Vec<f32> {
-    pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), look).0
+    pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), look).0
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn masks_that_touch_every_border_are_kept_and_not_shown() {
             let same = |i: usize| back[8 * i..8 * i + 8] == memory.frames[8 * i..8 * i + 8];
             assert!((0..holes.len()).all(|i| !holes[i] || same(i)), "border {n}");
             let look = looking(view(30.0, 25.0, [30, 24]), 0.1, Quantity::Mean, &SKEWED, FRAMES);
-            let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+            let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &look);
             let truth = truth(&SKEWED, &look, report.views[0].scale, &values, Some(&holes));
             let range = values.iter().fold((0.0_f64, 0.0_f64), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
             for (at, (found, expected)) in found.iter().zip(&truth.mean).enumerate() {

@@ -13,7 +13,7 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::render::{CoefficientScene, Quantity, What};
+use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
 use wavesplat::wavelet::Basis;
 
 #[test]
@@ -118,7 +118,7 @@ fn windows_of_one_frame_are_kept_and_shown() {
         let stored = stored(&mut memory.clone(), &settings(Basis::Haar, 1, 0.0));
         assert_eq!(extracted(&stored.open()), *memory.frames);
         let look = looking(view(30.0, 20.0, [30, 24]), 0.1, Quantity::Mean, &grid, frames);
-        let (found, _) = pictures(&mut CoefficientScene::new(stored.open(), What::Coefficients), &look);
+        let (found, _) = pictures(&mut CoefficientScene::new(stored.open(), SplatSource::Coefficients), &look);
         let (expected, _) = pictures(&mut direct(&memory, None), &look);
         assert!(found.iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits()));
     }

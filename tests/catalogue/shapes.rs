@@ -6,7 +6,7 @@ use crate::common::views::{archive, field, rounding, truth, view};
 use crate::common::{extracted, looking, pictures, settings, stored};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::render::{CoefficientScene, Quantity, What};
+use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
 use wavesplat::wavelet::Basis;
 
 #[test]
@@ -18,7 +18,7 @@ fn an_axis_of_length_1_is_like_any_other() {
         let file = stored(&mut memory.clone(), &settings(Basis::Haar, 4, 0.0));
         assert_eq!(extracted(&file.open()), *memory.frames);
         let look = looking(view(40.0, 35.0, [20, 20]), 0.1, Quantity::Mean, &grid, 6);
-        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), What::Coefficients), &look);
+        let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &look);
         let truth = truth(&grid, &look, report.views[0].scale, &values, None);
         let (lo, hi) = file.report.range;
         for (at, (found, expected)) in found.iter().zip(&truth.mean).enumerate() {

@@ -15,7 +15,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, RenderReport, What};
+use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, RenderReport, SplatSource};
 use wavesplat::view::footprint::Method;
 
 /// Everything that a picture follows from.
@@ -27,7 +27,7 @@ struct Scene {
     samples: Vec<u8>,
     convert: ConvertConfig,
     look: RenderConfig,
-    what: What,
+    what: SplatSource,
 }
 
 /// What brute force says of a scene.

@@ -10,7 +10,7 @@ use crate::common::{BASES, looking, settings};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
-use wavesplat::render::{Quantity, RenderConfig, What};
+use wavesplat::render::{Quantity, RenderConfig, SplatSource};
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
@@ -52,7 +52,7 @@ pub(super) fn scene(limits: &Limits, seed: u64) -> Scene {
     let (samples, missing_value) = samples(&grid, ty, frames, &mut random);
     let convert = ConvertConfig { missing_value, ..conversion(&mut random) };
     let look = look(&grid, frames, limits, &mut random);
-    let what = if random.one_in(6) { What::Samples } else { What::Coefficients };
+    let what = if random.one_in(6) { SplatSource::Samples } else { SplatSource::Coefficients };
     Scene { grid, ty, samples, convert, look, what }
 }
 

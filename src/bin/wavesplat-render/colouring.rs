@@ -23,15 +23,15 @@ pub(crate) struct Colouring {
 
 /// The values of the first and the last colour, of what is in colours.
 #[derive(Serialize)]
-pub(crate) struct Coloured {
+pub(crate) struct ColouredPictures {
     pub(crate) range: Option<(f64, f64)>,
     pub(crate) error_range: Option<(f64, f64)>,
 }
 
 impl Colouring {
-    pub(crate) fn coloured(&self) -> Coloured {
+    pub(crate) fn coloured(&self) -> ColouredPictures {
         let (pictures, errors) = self.in_colours;
-        Coloured {
+        ColouredPictures {
             range: pictures.then(|| self.of_pictures.range()),
             error_range: errors.then(|| self.of_errors.range()),
         }

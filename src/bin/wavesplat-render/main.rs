@@ -5,14 +5,14 @@ mod along;
 mod colouring;
 mod colours;
 mod generate;
-mod made;
+mod provenance;
 mod ranges;
 mod sinks;
 mod targets;
 
 use along::{AlongArgs, ModeName};
 use clap::{Parser, ValueEnum};
-use colouring::Coloured;
+use colouring::ColouredPictures;
 use colours::ColourArgs;
 use generate::Program;
 use serde::Serialize;
@@ -32,9 +32,10 @@ use wavesplat::codec::bound::range_bound;
 use wavesplat::colour::TransferFunction;
 use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::render::annotate::{Annotation, room};
-use wavesplat::render::sink::{Depth, Made, PictureFormat, Sink};
+use wavesplat::render::sink::{Depth, PictureFormat, Provenance, Sink};
 use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, What, default_splat_error, render,
+    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, default_splat_error,
+    render,
 };
 use wavesplat::source::Archive;
 use wavesplat::view::camera::{Camera, View};
@@ -212,8 +213,8 @@ impl Cli {
         let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
-        let made = self.made(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
-        let mut sinks = self.sinks(&config, targets, &colouring, (&made, annotation))?;
+        let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
+        let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let unit = if config.mode.is_projection() { "pictures" } else { "rows of slabs" };
         let progress = self.common.progress("render", unit);
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
@@ -225,7 +226,7 @@ impl Cli {
             self.common.detail(format_args!("{read} bytes were read of the file, which has {bytes}"));
         }
         let coloured = colouring.coloured();
-        let reported = Reported { report: &report, picture: &made, coloured, file_bytes_read, file_bytes };
+        let reported = Reported { report: &report, picture: &provenance, coloured, file_bytes_read, file_bytes };
         self.report(&reported)?;
         file.map_or(Ok(()), |file| file.refuse_skipped())
     }
@@ -318,7 +319,7 @@ impl Cli {
             self.along.check(false, self.colour.is_asked())?;
             let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
-            let what = if coefficients { What::Coefficients } else { What::Samples };
+            let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
             let unit = setting(file.metadata(), "time-units").map(String::from);
             let annotation = Annotation { times: file.metadata().times.clone(), unit };
             let colours = self.along.of_file(self.colour.range, &file)?;
@@ -471,9 +472,9 @@ struct Reported<'a> {
     #[serde(flatten)]
     report: &'a RenderReport,
     #[serde(flatten)]
-    coloured: Coloured,
+    coloured: ColouredPictures,
     /// What travels with every picture; of each view `views` says it.
-    picture: &'a Made,
+    picture: &'a Provenance,
     /// Bytes of the coefficient file that were read, directory and all, and those that it has.
     file_bytes_read: Option<u64>,
     file_bytes: Option<u64>,

@@ -2,12 +2,12 @@
 
 use crate::Cli;
 use crate::colouring::Colouring;
-use crate::made::made_of_errors;
+use crate::provenance::made_of_errors;
 use crate::targets::Targets;
 use std::sync::Arc;
 use wavesplat::base::error::Result;
 use wavesplat::render::annotate::Annotation;
-use wavesplat::render::sink::{Made, Sink, SinkConfig};
+use wavesplat::render::sink::{Provenance, Sink, SinkConfig};
 use wavesplat::render::{Pixel, RenderConfig, Rendered};
 
 /// Where the pictures of each view go, and those of their errors: all views may go to one.
@@ -39,14 +39,14 @@ impl Cli {
         config: &RenderConfig,
         (pictures, errors): (&Targets, Option<&Targets>),
         colouring: &Colouring,
-        (made, annotation): (&Made, Annotation),
+        (provenance, annotation): (&Provenance, Annotation),
     ) -> Result<Sinks> {
         let Colouring { pixel, of_pictures, of_errors, .. } = colouring;
         let of_pictures = SinkConfig {
             format: pictures.format,
             size: self.size.0,
             shown: Vec::new(),
-            made: Arc::new(made.clone()),
+            provenance: Arc::new(provenance.clone()),
             fps: self.fps,
             pixel: *pixel,
             colours: of_pictures.clone(),
@@ -60,7 +60,7 @@ impl Cli {
         };
         let of_errors = SinkConfig {
             format: errors.format,
-            made: Arc::new(made_of_errors(made, colouring)),
+            provenance: Arc::new(made_of_errors(provenance, colouring)),
             pixel: if *pixel == Pixel::Light { Pixel::Value } else { *pixel },
             colours: of_errors.clone(),
             coloured_array: false,

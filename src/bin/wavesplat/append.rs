@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
-use wavesplat::convert::{Begun, ConvertConfig, of_file};
+use wavesplat::convert::{ConvertConfig, PartialFile, of_file};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::resume::{Earlier, begins_with, ends_with, open_successor};
 use wavesplat::source::FrameSource;
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         return Ok(());
     }
     let (out, unfinished) = open_successor(&file, Earlier::by(args.force, args.resume))?;
-    let begun = Begun { unfinished, before: file.metadata().windows.len() };
+    let begun = PartialFile { unfinished, before: file.metadata().windows.len() };
     finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 

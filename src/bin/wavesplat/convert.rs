@@ -8,9 +8,11 @@ use wavesplat::cli::{CommonArgs, InputArgs, Pair, SelectArgs, share, spare_input
 use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{Begun, Coding, ConvertConfig, ConvertReport, MissingPolicy, Space, beginning, go_on};
+use wavesplat::convert::{
+    ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor, open_partial, resume,
+};
 use wavesplat::file::resume::{self, Earlier};
-use wavesplat::source::{Archive, FrameSource, endings};
+use wavesplat::source::{Archive, FrameSource, extensions};
 use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
@@ -99,8 +101,8 @@ const CODING: &str = "How it is coded (the defaults are good)";
 
 /// The end of the help: what inputs may be, and what else should be known.
 fn after_help() -> String {
-    let endings: Vec<String> = endings().map(|ending| format!(".{ending}")).collect();
-    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{TO_KNOW}", endings.join(" "))
+    let extensions: Vec<String> = extensions().map(|ending| format!(".{ending}")).collect();
+    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{TO_KNOW}", extensions.join(" "))
 }
 
 const TO_KNOW: &str = "\
@@ -171,7 +173,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
         return args.see_that_it_is_complete(&config, source.archive());
     }
     let (out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
-    let begun = begun.map(|unfinished| Begun { unfinished, before: 0 });
+    let begun = begun.map(|unfinished| PartialFile { unfinished, before: 0 });
     finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
 }
 
@@ -179,13 +181,13 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
 pub(crate) fn finish(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
-    begun: Option<Begun>,
+    begun: Option<PartialFile>,
     name: &Path,
     mut out: Output,
     common: &CommonArgs,
     still: &dyn Fn() -> Result<()>,
 ) -> Result<()> {
-    let report = go_on(source, config, begun, name, &mut out, &common.progress("convert", "blocks"));
+    let report = resume(source, config, begun, name, &mut out, &common.progress("convert", "blocks"));
     let report = report.inspect_err(|error| {
         if let Some(part) =
             out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_) | Error::Changed { .. }))
@@ -202,7 +204,7 @@ impl ConvertArgs {
     /// Nothing is left to do where an earlier run came to its end.
     fn see_that_it_is_complete(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
         let name = self.output.display();
-        if !resume::is_complete(&self.output, &beginning(config, archive)?, archive.frames)? {
+        if !resume::is_complete(&self.output, &open_partial(config, archive)?, archive.frames)? {
             let what = "is complete, but with other settings or frames; --force replaces it, append adds frames";
             return Err(Error::usage(format!("{name}: {what}")));
         }
@@ -280,7 +282,7 @@ impl ConvertArgs {
         Err(Error::usage(refused))
     }
 
-    fn coding(&self) -> Result<Coding> {
+    fn coding(&self) -> Result<SchemeConstraint> {
         let basis = match self.basis {
             BasisName::Haar => Some(Basis::Haar),
             BasisName::Multi => Some(Basis::Multi),
@@ -289,16 +291,16 @@ impl ConvertArgs {
             BasisName::Auto => None,
         };
         let space = match self.space {
-            None => return Ok(basis.map_or(Coding::AUTO, Coding::from)),
+            None => return Ok(basis.map_or(SchemeConstraint::AUTO, SchemeConstraint::from)),
             Some(SpaceName::None) if matches!(self.basis, BasisName::Pyramid | BasisName::Auto) => {
                 return Err(Error::usage("--space none: takes --basis haar, multi or learned"));
             }
-            Some(SpaceName::None) => Space::Alone,
-            Some(SpaceName::Linear) => Space::Pyramid(Stencil::Linear),
-            Some(SpaceName::Cubic) => Space::Pyramid(Stencil::Cubic),
-            Some(SpaceName::Auto) => Space::Any,
+            Some(SpaceName::None) => SpatialPredictor::Alone,
+            Some(SpaceName::Linear) => SpatialPredictor::Pyramid(Stencil::Linear),
+            Some(SpaceName::Cubic) => SpatialPredictor::Pyramid(Stencil::Cubic),
+            Some(SpaceName::Auto) => SpatialPredictor::Any,
         };
-        Ok(Coding { basis, space })
+        Ok(SchemeConstraint { basis, space })
     }
 
     /// What `verify --against` must know to read the same samples again.

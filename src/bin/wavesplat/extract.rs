@@ -110,7 +110,7 @@ impl ExtractArgs {
     /// The channel that is meant; of a file of colours one must be named.
     fn channel(&self, file: &CoefficientFile) -> Result<usize> {
         let name = self.file.display();
-        match (file.painter(), self.channel) {
+        match (file.colour_transform(), self.channel) {
             (Some(_), Some(channel)) => Ok(channel),
             (None, None) => Ok(0),
             (Some(_), None) => {

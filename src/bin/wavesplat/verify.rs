@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print, remembered};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::PromiseReport;
+use wavesplat::file::report::BoundReport;
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
 
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         args.common.report(&report, false)?;
     } else if !args.common.quiet {
         let m = file.metadata();
-        print(&summary(&report, &PromiseReport::new(m.bound, m.tolerance, m.range())))?;
+        print(&summary(&report, &BoundReport::new(m.bound, m.tolerance, m.range())))?;
     }
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
@@ -91,7 +91,7 @@ impl VerifyArgs {
     }
 }
 
-fn summary(r: &VerifyReport, promise: &PromiseReport) -> String {
+fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     let estimate = promise.caution();
     let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {} places", r.damaged) };
     let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);

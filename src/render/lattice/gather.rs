@@ -3,7 +3,7 @@
 use super::cells::Cells;
 use super::kernel::Weights;
 use super::picture::Lattice;
-use crate::render::place::Place;
+use crate::render::tile_rect::TileRect;
 use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(in crate::render) struct Gather<'a> {
     lattice: &'a Lattice,
-    place: &'a Place,
+    place: &'a TileRect,
     first: [isize; 2],
     /// Cells along u and v.
     size: [usize; 2],
@@ -33,7 +33,7 @@ const TOGETHER: usize = 16;
 
 impl<'a> Gather<'a> {
     /// Of layers with the same rectangle of cells and so many planes each; these are counted through all layers.
-    pub(super) fn new(lattice: &'a Lattice, (layers, count): (&[&Cells], usize), place: &'a Place) -> Self {
+    pub(super) fn new(lattice: &'a Lattice, (layers, count): (&[&Cells], usize), place: &'a TileRect) -> Self {
         let (first, size) = lattice.seen_by(&place.x, &place.y);
         let seen = Seen::of(layers[0], first, size);
         let numbered = |n: usize| move |(plane, sums)| (n * count + plane, sums);

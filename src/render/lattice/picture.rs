@@ -7,8 +7,8 @@ use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Gather, Placed, Spreading};
 use crate::base::grid::{Grid, Region};
-use crate::render::place::{Place, TILE, pixels_around};
 use crate::render::slabs::Slab;
+use crate::render::tile_rect::{TILE, TileRect, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
 use std::ops::Range;
@@ -168,7 +168,7 @@ impl Lattice {
     }
 
     /// The cells of a tile of a band, as far as its pixels see them, in layers of so many planes each.
-    pub(in crate::render) fn gather<'a>(&'a self, layers: (&[&Cells], usize), place: &'a Place) -> Gather<'a> {
+    pub(in crate::render) fn gather<'a>(&'a self, layers: (&[&Cells], usize), place: &'a TileRect) -> Gather<'a> {
         Gather::new(self, layers, place)
     }
 

@@ -9,9 +9,9 @@ use super::shares::Shares;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
-use crate::render::amounts::Amounts;
-use crate::render::place::intersect;
+use crate::render::plane_values::PlaneValues;
 use crate::render::slabs::Slab;
+use crate::render::tile_rect::intersect;
 use std::ops::Range;
 
 /// Where the voxels of a block are in cells: the same for all planes.
@@ -98,12 +98,14 @@ impl Placed {
     }
 
     /// Adds amounts to a plane.
-    pub(in crate::render) fn add(&self, amounts: Amounts<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
+    pub(in crate::render) fn add(&self, amounts: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
         match amounts {
-            Amounts::Nothing => {}
-            Amounts::Single(amounts) => self.add_all(amounts, plane, work),
-            Amounts::Double(amounts) => self.add_all(amounts, plane, work),
-            Amounts::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane)),
+            PlaneValues::Nothing => {}
+            PlaneValues::Single(amounts) => self.add_all(amounts, plane, work),
+            PlaneValues::Double(amounts) => self.add_all(amounts, plane, work),
+            PlaneValues::Few(amounts) => {
+                amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane))
+            }
         }
     }
 

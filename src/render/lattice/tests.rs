@@ -4,7 +4,7 @@ use super::cells::Rectangle;
 use super::spline::spread;
 use super::*;
 use crate::base::grid::{Grid, Region};
-use crate::render::amounts::Amounts;
+use crate::render::plane_values::PlaneValues;
 use crate::view::camera::{Camera, View};
 use std::collections::BTreeMap;
 
@@ -95,7 +95,8 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let placed = Placed::new(&spreading, &block, (&clip, None), &rectangle);
         let single: Vec<f32> = amounts.iter().map(|v| *v as f32).collect();
         let few: Vec<(u32, f64)> = (0..).zip(amounts.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
-        let ways = [Amounts::Double(&amounts), Amounts::Single(&single), Amounts::Few(&few), Amounts::Nothing];
+        let ways =
+            [PlaneValues::Double(&amounts), PlaneValues::Single(&single), PlaneValues::Few(&few), PlaneValues::Nothing];
         let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
         let into = planes.planes_mut().into_iter().zip(ways);
         into.for_each(|(mut plane, amounts)| placed.add(amounts, &mut plane, &mut work));
@@ -104,7 +105,7 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
         let placed = Placed::new(&spreading, &block, (&clip, None), &whole);
-        placed.add(Amounts::Double(&amounts), &mut all.planes_mut()[0], &mut work);
+        placed.add(PlaneValues::Double(&amounts), &mut all.planes_mut()[0], &mut work);
         let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.touched().take(2) {
             for (cell, sum) in cells_of(&rectangle, plane) {

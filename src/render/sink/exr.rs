@@ -36,7 +36,7 @@ mod with_crate {
     ) -> io::Result<()> {
         let lines: Vec<String> = texts.iter().map(|(name, text)| format!("{name}: {text}")).collect();
         let attributes = LayerAttributes {
-            software_name: Text::new_or_none(&config.made.software),
+            software_name: Text::new_or_none(&config.provenance.software),
             comments: Text::new_or_none(lines.join("\n")),
             ..LayerAttributes::default()
         };

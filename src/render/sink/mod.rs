@@ -2,12 +2,12 @@
 //! where the format has a place for words.
 
 mod exr;
-mod made;
+mod provenance;
 mod png;
 mod sheet;
 mod stream;
 
-pub use made::{Made, Shows};
+pub use provenance::{Provenance, Shows};
 
 use super::annotate::Annotation;
 use super::{Picture, Pixel, Rendered};
@@ -115,7 +115,7 @@ pub struct SinkConfig {
     /// Which view and which frame each picture is of.
     pub shown: Vec<(usize, usize)>,
     /// What made the pictures.
-    pub made: Arc<Made>,
+    pub provenance: Arc<Provenance>,
     /// Frames a second, where the format says it.
     pub fps: u32,
     /// What the numbers of a pixel are.
@@ -135,7 +135,7 @@ pub struct SinkConfig {
 impl SinkConfig {
     /// What of a rendering is to be written.
     fn shown_of<'a>(&self, rendered: &Rendered<'a>) -> Option<Picture<'a>> {
-        match self.made.shows {
+        match self.provenance.shows {
             Shows::Picture => Some(rendered.picture),
             Shows::CertifiedError => rendered.error,
         }

@@ -3,17 +3,17 @@
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
 use crate::render::RenderReport;
-use crate::render::amounts::{Amounts, BlockPlanes, OnesOf, Room};
-use crate::render::canvas::Blocks;
-use crate::render::eye::Eye;
-use crate::render::scene::{Group, Inverse};
-use crate::render::terms::Layout;
+use crate::render::accumulator::Blocks;
+use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch, UnitValues};
+use crate::render::scene::{FrameBatch, Inverse};
+use crate::render::sparse_terms::Layout;
+use crate::render::view_setup::ViewSetup;
 use crate::wavelet::Lane;
 use std::collections::HashSet;
 
 /// The blocks of a group, with the weights of all their voxels in a plane of its own.
 pub(super) struct WithLengths<'a> {
-    group: &'a dyn Group,
+    group: &'a dyn FrameBatch,
     pub(super) layout: Layout,
     blocks: BlockGrid,
     /// Those that have terms.
@@ -21,12 +21,12 @@ pub(super) struct WithLengths<'a> {
 }
 
 impl<'a> WithLengths<'a> {
-    pub(super) fn new(group: &'a dyn Group, eye: &Eye, report: &mut RenderReport) -> Result<Self> {
-        let contents = group.blocks(&eye.clip)?;
-        report.blocks += eye.blocks.len() as u64;
+    pub(super) fn new(group: &'a dyn FrameBatch, setup: &ViewSetup, report: &mut RenderReport) -> Result<Self> {
+        let contents = group.blocks(&setup.clip)?;
+        report.blocks += setup.blocks.len() as u64;
         report.add(&contents);
         let layout = Layout { lengths: true, ..group.layout() };
-        Ok(Self { group, layout, blocks: eye.blocks, with_terms: contents.blocks.into_iter().collect() })
+        Ok(Self { group, layout, blocks: setup.blocks, with_terms: contents.blocks.into_iter().collect() })
     }
 
     /// Some layers of a tile, of which these planes may have sums.
@@ -80,7 +80,7 @@ fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
 impl Blocks for WithLengths<'_> {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         let planes = self.with_terms.contains(&block).then(|| self.group.planes(block)).transpose()?;
-        let ones = OnesOf(self.blocks.region(block).voxels());
+        let ones = UnitValues(self.blocks.region(block).voxels());
         Ok(Box::new(BlockWithLengths { planes, ones, last: self.layout.planes() - 1 }))
     }
 }
@@ -88,7 +88,7 @@ impl Blocks for WithLengths<'_> {
 /// A block, and a 1 for each of its voxels in the last plane.
 struct BlockWithLengths<'a> {
     planes: Option<Box<dyn BlockPlanes + 'a>>,
-    ones: OnesOf,
+    ones: UnitValues,
     last: usize,
 }
 
@@ -97,11 +97,11 @@ impl BlockPlanes for BlockWithLengths<'_> {
         self.ones.voxels()
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         match &self.planes {
             _ if plane == self.last => self.ones.plane(plane, room),
             Some(planes) => planes.plane(plane, room),
-            None => Ok(Amounts::Nothing),
+            None => Ok(PlaneValues::Nothing),
         }
     }
 

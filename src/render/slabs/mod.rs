@@ -33,12 +33,12 @@ mod visible;
 pub(super) use cut::{bytes, count, cut, of_block};
 pub(super) use slab::Slab;
 
-use super::canvas::{self, Canvas, Finished, Pixels};
+use super::accumulator::{self, BandAccumulator, Pixels, ResolvedTile};
 use super::expectation::Expectation;
-use super::eye::Eye;
 use super::plan::{self, Budget};
-use super::scene::{Group, Read, Scene};
-use super::weights::Look;
+use super::scene::{BatchOutcome, FrameBatch, Scene};
+use super::view_setup::ViewSetup;
+use super::weights::WeightedView;
 use super::{Mode, RenderConfig, RenderReport, Rendered, lap};
 use crate::base::error::Result;
 use crate::base::progress::Progress;
@@ -58,15 +58,15 @@ pub(super) const TOGETHER: usize = 64;
 pub(super) fn render(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    eyes: &[Eye],
+    setups: &[ViewSetup],
     progress: &dyn Progress,
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    let all: usize = eyes.iter().map(|eye| count(eye, config)).sum();
+    let all: usize = setups.iter().map(|setup| count(setup, config)).sum();
     progress.start(Some((all * config.frames.len() * config.size()[1]) as u64));
-    for (view, eye) in eyes.iter().enumerate() {
-        let slabs = cut(eye, config)?;
+    for (view, setup) in setups.iter().enumerate() {
+        let slabs = cut(setup, config)?;
         let mut sink = |frame, picture: &[f32]| sink(Rendered { views: &[], view, frame, picture, error: None });
         render_view(scene, config, &slabs, progress, report, &mut sink)?;
     }
@@ -82,7 +82,7 @@ fn render_view(
     report: &mut RenderReport,
     sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
 ) -> Result<()> {
-    let Slabs { eyes: slabs, thickness } = slabs;
+    let Slabs { setups: slabs, thickness } = slabs;
     let least = |share: f64| share * thickness;
     match &config.mode {
         Mode::Composite { transfer, unit, .. } => {
@@ -99,7 +99,7 @@ fn render_view(
 
 /// A view, and how its slabs become a picture.
 struct View<'a, B> {
-    slabs: &'a [Eye],
+    slabs: &'a [ViewSetup],
     /// World units that a slab is thick at least where it counts.
     least: f64,
     blend: B,
@@ -115,8 +115,8 @@ impl<B: Blend> View<'_, B> {
         sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
     ) -> Result<()> {
         let budget = Budget::of_slabs(self.config, scene, self.slabs);
-        let look = Look::of_no_weights(&self.slabs[0]);
-        let expectation = Expectation::new(&look, self.config);
+        let weighted = WeightedView::of_no_weights(&self.slabs[0]);
+        let expectation = Expectation::new(&weighted, self.config);
         let mut rest = self.config.frames.as_slice();
         while let Some(first) = rest.first() {
             let most = plan::in_group(scene, *first, rest);
@@ -126,8 +126,8 @@ impl<B: Blend> View<'_, B> {
                 let group = scene.group(now, 0, self.config, &expectation)?;
                 let pictures = self.render_group(group.as_ref(), &budget, report)?;
                 match group.finish()? {
-                    Read::AsExpected => break pictures,
-                    Read::Otherwise => *report = before,
+                    BatchOutcome::Complete => break pictures,
+                    BatchOutcome::NeedsRelayout => *report = before,
                 }
             };
             let numbers = pictures.len() / now.len();
@@ -138,10 +138,10 @@ impl<B: Blend> View<'_, B> {
     }
 
     /// The pictures of all frames of a group, one after another.
-    fn render_group(&self, group: &dyn Group, budget: &Budget<'_>, report: &mut RenderReport) -> Result<Vec<f32>> {
-        let eye = &self.slabs[0];
+    fn render_group(&self, group: &dyn FrameBatch, budget: &Budget<'_>, report: &mut RenderReport) -> Result<Vec<f32>> {
+        let setup = &self.slabs[0];
         let visible = Visible::new(group, self.slabs, &self.blend)?;
-        let source = WithLengths::new(group, eye, report)?;
+        let source = WithLengths::new(group, setup, report)?;
         let mut pixels = vec![B::EMPTY; source.layout.frames * budget.pixels()];
         for rows in budget.bands(&source.layout) {
             self.render_band(&source, (&visible, budget), &rows, &mut pixels, report)?;
@@ -165,16 +165,16 @@ impl<B: Blend> View<'_, B> {
         let mut next = 0;
         while next < self.slabs.len() {
             let open = (next..self.slabs.len()).filter(|slab| visible.any(*slab, rows));
-            let run: Vec<usize> = open.take(budget.eyes().len()).collect();
-            let end = if run.len() < budget.eyes().len() { self.slabs.len() } else { run[run.len() - 1] + 1 };
-            let of_slab = |slab: &usize| Canvas::new(&self.slabs[*slab], rows.clone(), &source.layout);
-            let mut canvases: Vec<_> = run.iter().map(of_slab).collect();
+            let run: Vec<usize> = open.take(budget.setups().len()).collect();
+            let end = if run.len() < budget.setups().len() { self.slabs.len() } else { run[run.len() - 1] + 1 };
+            let of_slab = |slab: &usize| BandAccumulator::new(&self.slabs[*slab], rows.clone(), &source.layout);
+            let mut accumulators: Vec<_> = run.iter().map(of_slab).collect();
             let (blocks, batch) = (visible.blocks(&run, rows), budget.batch(&source.layout, rows.len()));
-            canvas::splat(&mut canvases, &blocks, batch, source, report)?;
+            accumulator::splat(&mut accumulators, &blocks, batch, source, report)?;
             let mut clock = Instant::now();
             let wanted = |n: usize, place: &_| visible.is_open(run[n], place);
             let together = (TOGETHER / source.layout.planes()).max(1);
-            Canvas::finish_layers(&canvases, together, pixels, wanted, |tile, pixels| {
+            BandAccumulator::finish_layers(&accumulators, together, pixels, wanted, |tile, pixels| {
                 self.blend_tile(source, visible, tile, pixels);
             });
             lap(&mut clock, &mut report.inverse_seconds);
@@ -189,7 +189,7 @@ impl<B: Blend> View<'_, B> {
         &self,
         source: &WithLengths<'_>,
         visible: &Visible,
-        mut tile: Finished<'_>,
+        mut tile: ResolvedTile<'_>,
         pixels: &mut Pixels<'_, B::Pixel>,
     ) {
         let (frames, count) = (source.layout.frames, source.layout.planes());

@@ -3,9 +3,9 @@
 use super::blend::Blend;
 use crate::base::error::Result;
 use crate::base::grid::Region;
-use crate::render::eye::Eye;
-use crate::render::place::Place;
-use crate::render::scene::Group;
+use crate::render::scene::FrameBatch;
+use crate::render::tile_rect::TileRect;
+use crate::render::view_setup::ViewSetup;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -39,15 +39,15 @@ impl Visible {
 
     /// Of a group from a view that is cut into slabs: a mean lies between the least and the largest value of all blocks
     /// that reach its tile, so where no such value can be seen nothing of the tile can.
-    pub(super) fn new<B: Blend>(group: &dyn Group, slabs: &[Eye], blend: &B) -> Result<Self> {
-        let eye = &slabs[0];
-        let side = eye.tile();
-        let [columns, rows] = eye.camera.size.map(|pixels| pixels.div_ceil(side));
+    pub(super) fn new<B: Blend>(group: &dyn FrameBatch, slabs: &[ViewSetup], blend: &B) -> Result<Self> {
+        let setup = &slabs[0];
+        let side = setup.tile();
+        let [columns, rows] = setup.camera.size.map(|pixels| pixels.div_ceil(side));
         let tiles = columns * rows;
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); tiles * slabs.len()];
         let mut blocks = Vec::new();
-        for (block, (lo, hi)) in group.ranges(&eye.clip)? {
-            let region = eye.blocks.region(block);
+        for (block, (lo, hi)) in group.ranges(&setup.clip)? {
+            let region = setup.blocks.region(block);
             for part in parts(&region) {
                 for at in Reached::new(block, &part, slabs, side).places(columns, tiles) {
                     ranges[at] = (ranges[at].0.min(lo), ranges[at].1.max(hi));
@@ -61,7 +61,7 @@ impl Visible {
     }
 
     /// Whether the tile of a slab that begins at a place can still show anything.
-    pub(super) fn is_open(&self, slab: usize, place: &Place) -> bool {
+    pub(super) fn is_open(&self, slab: usize, place: &TileRect) -> bool {
         self.can_show(slab, self.tile(place))
     }
 
@@ -70,11 +70,11 @@ impl Visible {
     }
 
     /// Notes that a tile is opaque in all frames.
-    pub(super) fn close(&self, place: &Place) {
+    pub(super) fn close(&self, place: &TileRect) {
         self.closed[self.tile(place)].store(true, Relaxed);
     }
 
-    fn tile(&self, place: &Place) -> usize {
+    fn tile(&self, place: &TileRect) -> usize {
         place.y.start / self.side * self.columns + place.x.start / self.side
     }
 
@@ -107,11 +107,11 @@ impl Visible {
 
 impl Reached {
     /// What the voxels of a region do.
-    fn new(block: usize, region: &Region, slabs: &[Eye], side: usize) -> Self {
-        let (eye, region) = (&slabs[0], region.intersect(&slabs[0].clip));
-        let tiles = eye.pixels_reached(&region).map(|pixels| pixels.start / side..pixels.end.div_ceil(side));
+    fn new(block: usize, region: &Region, slabs: &[ViewSetup], side: usize) -> Self {
+        let (setup, region) = (&slabs[0], region.intersect(&slabs[0].clip));
+        let tiles = setup.pixels_reached(&region).map(|pixels| pixels.start / side..pixels.end.div_ceil(side));
         let slabs =
-            if region.is_empty() { 0..0 } else { reached(slabs, eye.camera.depths_of(&eye.grid.crop(&region))) };
+            if region.is_empty() { 0..0 } else { reached(slabs, setup.camera.depths_of(&setup.grid.crop(&region))) };
         Self { block, slabs, tiles }
     }
 
@@ -126,10 +126,10 @@ impl Reached {
 }
 
 /// The slabs that kernels of voxels between two depths reach into.
-fn reached(slabs: &[Eye], [nearest, farthest]: [f64; 2]) -> Range<usize> {
-    let ends = |eye: &Eye| eye.slab.map_or([f64::NEG_INFINITY, f64::INFINITY], |slab| slab.reached_from());
-    let first = slabs.partition_point(|eye| ends(eye)[1] < nearest);
-    first..slabs.partition_point(|eye| ends(eye)[0] <= farthest).max(first)
+fn reached(slabs: &[ViewSetup], [nearest, farthest]: [f64; 2]) -> Range<usize> {
+    let ends = |setup: &ViewSetup| setup.slab.map_or([f64::NEG_INFINITY, f64::INFINITY], |slab| slab.reached_from());
+    let first = slabs.partition_point(|setup| ends(setup)[1] < nearest);
+    first..slabs.partition_point(|setup| ends(setup)[0] <= farthest).max(first)
 }
 
 /// A region in parts: seen at an angle, none reaches far in pixels and in slabs at once.

@@ -4,9 +4,9 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{At, Decode, Part, Stored};
-use crate::source::held::{Held, read_some};
+use crate::source::file_header::{DataLocation, Decode, Part, Stored};
 use crate::source::layout::{Counts, Layout};
+use crate::source::spill_buffer::{SpillBuffer, read_some};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use std::fmt;
 use std::io::{self, BufReader, Read};
@@ -70,7 +70,7 @@ impl Stream {
         let skip = skip + before as u64;
         let place = Place { compression, start, skip, together, frames, frame_bytes: bytes / frames };
         let decoder = Deflated { after: (all - before - bytes) as u64, ..Deflated::new(place) };
-        Ok(Part { path: path.into(), state, frames, stored, at: At::Decoded(Box::new(decoder)) })
+        Ok(Part { path: path.into(), state, frames, stored, at: DataLocation::Decoded(Box::new(decoder)) })
     }
 }
 
@@ -133,7 +133,7 @@ impl Decode for Deflated {
         self.place.together
     }
 
-    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()> {
         let mut reader = self.reader_at(path, frames.start)?;
         let Place { frame_bytes, frames: all, .. } = self.place;
         let bytes = frames.len() * frame_bytes;
@@ -172,7 +172,7 @@ pub(super) fn hold(
     reader: &mut dyn Read,
     path: &Path,
     (at, bytes): (u64, usize),
-    out: &mut Held,
+    out: &mut SpillBuffer,
     failed: impl Fn(usize, io::Error) -> Error,
 ) -> Result<usize> {
     let (mut got, mut chunk) = (0, vec![0; CHUNK.min(bytes)]);

@@ -26,12 +26,12 @@ pub use npy::{ArrayHeader, array_header};
 use super::OpenOptions;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::source::described::{Described, head};
+use crate::source::file_header::{FileHeader, head};
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
-const ENDINGS: [(&str, Format); 26] = [
+const EXTENSIONS: [(&str, Format); 26] = [
     ("npy", Format::Npy),
     ("nrrd", Format::Nrrd),
     ("nhdr", Format::Nrrd),
@@ -61,8 +61,8 @@ const ENDINGS: [(&str, Format); 26] = [
 ];
 
 /// Extensions of inputs that say themselves what they are.
-pub fn endings() -> impl Iterator<Item = &'static str> {
-    ENDINGS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
+pub fn extensions() -> impl Iterator<Item = &'static str> {
+    EXTENSIONS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
 }
 
 /// What is supported, for messages.
@@ -73,7 +73,7 @@ pub(in crate::source) struct Supported;
 
 impl Display for Supported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        endings().try_for_each(|ending| write!(f, ".{ending}, "))?;
+        extensions().try_for_each(|ending| write!(f, ".{ending}, "))?;
         write!(f, "and headerless data of any name")
     }
 }
@@ -108,7 +108,7 @@ impl Format {
     /// By extension; none for headerless data and for what is not supported.
     pub(in crate::source) fn by_name(path: &Path) -> Option<Self> {
         let found = extension(path);
-        ENDINGS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
+        EXTENSIONS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
     }
 
     /// Whether a file of it holds frames, and says itself what they are.
@@ -162,7 +162,7 @@ pub(in crate::source) fn extension(path: &Path) -> String {
 }
 
 /// Reads the header of a file of frames and checks its size.
-pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let format = match Format::by_name(path) {
         _ if path.is_dir() && zarr_metadata(path).is_some() => Some(Format::Zarr),
         None if options.dims.is_none() => Format::by_content(path)?,
@@ -172,10 +172,10 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         refuse_options(path, format, options)?;
     }
     let described = of_format(format, path, options)?;
-    Ok(Described { format: format.map_or("headerless data", Format::name), ..described })
+    Ok(FileHeader { format: format.map_or("headerless data", Format::name), ..described })
 }
 
-fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<Described> {
+fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     match format {
         Some(Format::Npy) => npy::describe(path),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
@@ -241,11 +241,11 @@ mod tests {
 
     #[test]
     fn every_ending_is_known_once() {
-        for (ending, format) in ENDINGS {
+        for (ending, format) in EXTENSIONS {
             assert_eq!(Format::by_name(Path::new(&format!("a.b.{}", ending.to_uppercase()))), Some(format));
         }
         let supported = SUPPORTED.to_string();
         assert!(supported.starts_with(".npy, .nrrd, ") && supported.contains(".hdf5, "), "{supported}");
-        assert!(!supported.contains("wspl") && endings().all(|ending| supported.contains(ending)));
+        assert!(!supported.contains("wspl") && extensions().all(|ending| supported.contains(ending)));
     }
 }

@@ -4,7 +4,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{At, Described, Part, Stored, check_size};
+use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, check_size};
 use crate::source::layout::Layout;
 use crate::source::layout::Shape;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
@@ -54,7 +54,7 @@ pub fn array_header(path: &Path) -> Result<ArrayHeader> {
 }
 
 /// Reads the header of one file and checks its size.
-pub(in crate::source) fn describe(path: &Path) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let refused = |e| Error::input(path, e);
@@ -66,8 +66,8 @@ pub(in crate::source) fn describe(path: &Path) -> Result<Described> {
         layout.0.reverse();
     }
     let stored = Stored::new(&layout, shape.sample(), big_endian).map_err(refused)?;
-    let part = Part { path: path.into(), state, frames, stored, at: At::Byte(start) };
-    Ok(Described::plain(shape, vec![part]))
+    let part = Part { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) };
+    Ok(FileHeader::plain(shape, vec![part]))
 }
 
 /// Reads up to the first sample, and not a byte further.

@@ -3,8 +3,8 @@
 use super::deflated::{Compression, FileReader, expect_end, hold};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::source::described::Decode;
-use crate::source::held::Held;
+use crate::source::file_header::Decode;
+use crate::source::spill_buffer::SpillBuffer;
 use std::fmt::Debug;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -70,13 +70,13 @@ impl Decode for Pieces {
         self.together
     }
 
-    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()> {
         self.frames[frames.start / self.together].iter().try_for_each(|piece| self.copy(piece, out))
     }
 }
 
 impl Pieces {
-    fn copy(&self, piece: &Piece, out: &mut Held) -> Result<()> {
+    fn copy(&self, piece: &Piece, out: &mut SpillBuffer) -> Result<()> {
         let path = &piece.path;
         let file = FileBytes::open(path, Access::Read)?;
         piece.state.check(path, &file.state())?;

@@ -3,7 +3,7 @@
 use super::xml::{attribute, required};
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::described::Files;
+use crate::source::file_header::Files;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;

@@ -3,7 +3,7 @@
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::OpenOptions;
-use crate::source::described::{Described, Part, check_size};
+use crate::source::file_header::{FileHeader, Part, check_size};
 use crate::source::layout::Shape;
 use std::path::Path;
 
@@ -32,7 +32,7 @@ pub(in crate::source) fn shape(options: &OpenOptions) -> Result<(Shape, Option<u
 }
 
 /// Checks one file against the options.
-pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let (shape, frames) = shape(options)?;
     let state = FileBytes::open(path, Access::Read)?.state();
     let count = frames.unwrap_or(1);
@@ -40,7 +40,7 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         .map_err(|what| Error::input(path, format!("{what}{}", advice(state.len, &shape, options))))?;
     let part = Part::plain((path, state), (&shape, count), options.big_endian, options.offset)
         .map_err(|e| Error::usage(format!("--dims: {e}")))?;
-    Ok(Described::plain(shape, vec![part]))
+    Ok(FileHeader::plain(shape, vec![part]))
 }
 
 /// What to try when the size is wrong.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::base::sample::SampleType;
-use crate::source::described::{Decode, Stored, Units, Unlike};
+use crate::source::file_header::{Decode, Mismatch, Stored, Units};
 use crate::source::open;
 use crate::source::testing::{DIMS, Folder, message, payload, refused};
 use std::sync::Mutex;
@@ -40,7 +40,7 @@ fn windows_cross_files_of_several_frames() {
 struct Counted(Arc<Mutex<Vec<usize>>>);
 
 impl Decode for Counted {
-    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+    fn decode(&mut self, _path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()> {
         self.0.lock().expect("no panic").push(frames.start);
         out.write_at(0, &payload(SampleType::U8, frames, false)).expect("room");
         Ok(())
@@ -55,7 +55,7 @@ fn frames_that_are_stepped_over_are_not_decoded_and_spooled_ones_share_a_file() 
     let mut series = Series::open(&Files { paths: vec![file], ..Files::default() }, &options).expect("opening");
     let decoded = Arc::new(Mutex::new(Vec::new()));
     let part = &mut series.parts[0];
-    part.at = At::Decoded(Box::new(Counted(decoded.clone())));
+    part.at = DataLocation::Decoded(Box::new(Counted(decoded.clone())));
     part.stored = Stored::plain(&series.shape, 1, false).expect("small");
     let window = series.window_of(2, 5, 7).expect("window");
     assert_eq!(*decoded.lock().expect("no panic"), [2, 9, 16, 23, 30]);
@@ -121,23 +121,23 @@ fn what_a_file_says_otherwise_than_the_first_is_refused_or_noted() {
 #[test]
 fn files_follow_one_another_in_the_same_units() {
     let shape = Shape::new(DIMS, SampleType::U8).expect("small");
-    let plain = || Described { times: vec![1.0], ..Described::plain(shape, Vec::new()) };
+    let plain = || FileHeader { times: vec![1.0], ..FileHeader::plain(shape, Vec::new()) };
     let units = |samples: &str, times: &str| Units {
         samples: Some(samples.into()),
         times: Some(times.into()),
         ..Units::default()
     };
-    let first = Described { units: units("K", "hours since 2020-01-01"), missing: Some(-1.0), ..plain() };
-    let later = |units| Described { units, missing: Some(-1.0), ..plain() };
-    let refusal = |file: &Described| file.follows(&first, "a").expect_err("another");
+    let first = FileHeader { units: units("K", "hours since 2020-01-01"), missing: Some(-1.0), ..plain() };
+    let later = |units| FileHeader { units, missing: Some(-1.0), ..plain() };
+    let refusal = |file: &FileHeader| file.follows(&first, "a").expect_err("another");
     let same = later(units("K", "hours since 2020-01-01")).follows(&first, "a");
-    assert_eq!(same, Ok(Unlike { grid: false, times: false }));
+    assert_eq!(same, Ok(Mismatch { grid: false, times: false }));
     let tomorrow = later(units("K", "hours since 2020-01-02"));
-    assert_eq!(tomorrow.follows(&first, "a"), Ok(Unlike { grid: false, times: true }));
-    let untimed = Described { times: Vec::new(), ..tomorrow };
-    assert_eq!(untimed.follows(&first, "a"), Ok(Unlike { grid: false, times: false }));
+    assert_eq!(tomorrow.follows(&first, "a"), Ok(Mismatch { grid: false, times: true }));
+    let untimed = FileHeader { times: Vec::new(), ..tomorrow };
+    assert_eq!(untimed.follows(&first, "a"), Ok(Mismatch { grid: false, times: false }));
     assert_eq!(refusal(&later(units("C", ""))), "has samples in the unit C, but a has K");
-    assert_eq!(refusal(&Described { missing: None, ..untimed }), "has the missing value none, but a has -1");
+    assert_eq!(refusal(&FileHeader { missing: None, ..untimed }), "has the missing value none, but a has -1");
 }
 
 #[test]

@@ -91,7 +91,7 @@ pub fn unfinished(data: &[u8]) {
     file.truncate(end);
     assert_eq!(Unfinished::read(&file).map(|again| again.bytes()).ok(), Some(end as u64), "the same without the rest");
     let metadata = found.metadata().clone();
-    let written = Writer::go_on(file, found).finish();
+    let written = Writer::resume(file, found).finish();
     assert_eq!(written.is_ok(), frames > 0);
     if let Ok((file, summary)) = written {
         assert_eq!(summary.bytes, file.len() as u64);

@@ -9,7 +9,7 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::{SampleType, is_missing, load, store};
 use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy, Space, convert};
+use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
@@ -61,10 +61,15 @@ impl Case {
 
 fn config(input: &mut Input<'_>) -> ConvertConfig {
     let bases = [None, Some(Basis::Haar), Some(Basis::Multi), Some(Basis::Learned), Some(Basis::Samples)];
-    let cubic = Space::Pyramid(Stencil::Cubic);
-    let coding = Coding {
+    let cubic = SpatialPredictor::Pyramid(Stencil::Cubic);
+    let coding = SchemeConstraint {
         basis: input.pick(&bases),
-        space: input.pick(&[Space::Any, Space::Alone, Space::Pyramid(Stencil::Linear), cubic]),
+        space: input.pick(&[
+            SpatialPredictor::Any,
+            SpatialPredictor::Alone,
+            SpatialPredictor::Pyramid(Stencil::Linear),
+            cubic,
+        ]),
     };
     let window = input.pick(&[1, 2, 4, 8, 16, 3, 5, 9, 17, 6]);
     let tolerance = input.pick(&[0.0, 1e-9, 1e-4, 0.01, 0.1, 1.0]);

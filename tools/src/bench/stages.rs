@@ -15,7 +15,7 @@ use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, What};
+use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
 
@@ -99,7 +99,7 @@ impl Method {
         Ok(match step.way {
             Way::Coefficients => {
                 let file = CoefficientFile::open(&step.input, Access::Map)?;
-                Self::Library(Box::new(CoefficientScene::new(file, What::Coefficients)))
+                Self::Library(Box::new(CoefficientScene::new(file, SplatSource::Coefficients)))
             }
             Way::Shared => Self::Library(Box::new(FrameScene::new(frames()?, None))),
             Way::Textbook(radius) => Self::Textbook(frames()?, radius),

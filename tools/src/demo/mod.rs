@@ -21,7 +21,7 @@ use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
-use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, What};
+use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
@@ -188,7 +188,7 @@ impl Demo {
         let report = converted(self.source()?.as_mut(), &config, &path)?;
         let open = || CoefficientFile::open(&path, Access::Map);
         let compared = verify(&open()?, Some(self.source()?.as_mut()), MEMORY, &Silent)?.against.unwrap_or_default();
-        let (pictures, render) = self.pictures(&mut CoefficientScene::new(open()?, What::Coefficients))?;
+        let (pictures, render) = self.pictures(&mut CoefficientScene::new(open()?, SplatSource::Coefficients))?;
         Ok(Run { name, pictures, render, converted: Some((report, compared)) })
     }
 

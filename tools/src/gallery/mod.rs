@@ -20,9 +20,9 @@ use wavesplat::base::output::Output;
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
+use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint};
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, What};
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 
@@ -89,7 +89,7 @@ impl Gallery {
         say(&format!("converting {archive}"));
         let file = self.converted(&input, name, None)?;
         say(&format!("rendering {archive} in all modes"));
-        let mut scene = CoefficientScene::new(file.clone(), What::Coefficients);
+        let mut scene = CoefficientScene::new(file.clone(), SplatSource::Coefficients);
         let base = self.base(&scene)?;
         let look = self.look(&mut scene, &base, &file)?;
         let mut images = Vec::new();
@@ -99,7 +99,7 @@ impl Gallery {
         say(&format!("converting {archive} again, in colours, and rendering these"));
         let tile = look.before_all()?;
         let file = self.converted(&input, &format!("{name}-colours"), Some(&tile.map))?;
-        images.push(self.shown(&mut CoefficientScene::new(file, What::Coefficients), &base, &tile)?);
+        images.push(self.shown(&mut CoefficientScene::new(file, SplatSource::Coefficients), &base, &tile)?);
         let columns = images.len();
         let sheet = contact_sheet(&images, columns, GAP, PAPER);
         Ok(titled(&sheet, &["", &self.title(name, &scene, &base, look.range)], INK, PAPER))
@@ -140,7 +140,8 @@ impl Gallery {
     ) -> Result<Arc<CoefficientFile>> {
         let mut source: Box<dyn FrameSource> = input.open(std::slice::from_ref(path), &quietly())?;
         let (missing, colours) = (MissingPolicy::Mask, colours.cloned());
-        let config = ConvertConfig { missing, colours, ..ConvertConfig::new(Coding::AUTO, WINDOW, TOLERANCE, MEMORY) };
+        let config =
+            ConvertConfig { missing, colours, ..ConvertConfig::new(SchemeConstraint::AUTO, WINDOW, TOLERANCE, MEMORY) };
         let path = self.folder.join(format!("{name}.wspl"));
         converted(source.as_mut(), &config, &path)?;
         CoefficientFile::open(&path, Access::Map).map(Arc::new)

@@ -8,7 +8,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::print;
 use wavesplat::convert::estimate::{Estimate, estimate};
-use wavesplat::convert::{Coding, ConvertConfig, MissingPolicy};
+use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint};
 use wavesplat::source::Archive;
 
 /// The window of a conversion that says nothing of it.
@@ -58,7 +58,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
 
 /// How `convert` goes about it by default.
 fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
-    let plain = ConvertConfig::new(Coding::AUTO, WINDOW, tolerance, memory);
+    let plain = ConvertConfig::new(SchemeConstraint::AUTO, WINDOW, tolerance, memory);
     ConvertConfig { missing: MissingPolicy::Mask, missing_value: archive.missing_value(None), ..plain }
 }
 

@@ -8,7 +8,7 @@ use wavesplat::cli::{CommonArgs, print};
 use wavesplat::codec::bound::Bound;
 use wavesplat::convert::options;
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::{PromiseReport, WindowReport};
+use wavesplat::file::report::{BoundReport, WindowReport};
 use wavesplat::source::CHANNELS;
 
 /// The keys of `--json`.
@@ -26,7 +26,7 @@ struct Info {
     times: Vec<f64>,
     variable: Option<String>,
     #[serde(flatten)]
-    promise: PromiseReport,
+    promise: BoundReport,
     range: (f64, f64),
     value_range: (f64, f64),
     missing_value: Option<f64>,
@@ -66,11 +66,11 @@ impl Info {
             origin: m.origin,
             sample: m.sample.name(),
             channels: file.channels(),
-            colours: file.painter().map(|painter| painter.colours.words()),
+            colours: file.colour_transform().map(|painter| painter.colours.words()),
             frames: m.frames,
             times: m.times.clone(),
             variable: m.variable.clone(),
-            promise: PromiseReport::new(m.bound, m.tolerance, m.range()),
+            promise: BoundReport::new(m.bound, m.tolerance, m.range()),
             range: m.range(),
             value_range: file.value_range(),
             missing_value: m.missing_value,

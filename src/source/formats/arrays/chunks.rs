@@ -4,9 +4,9 @@ use super::{ArrayFile, Opener, Variable};
 use crate::base::error::{Error, Result};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{Decode, Stored};
-use crate::source::held::Held;
+use crate::source::file_header::{Decode, Stored};
 use crate::source::layout::{Counts, Layout};
+use crate::source::spill_buffer::SpillBuffer;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -110,7 +110,7 @@ impl Chunks {
     }
 
     /// Puts a box among the frames that are read together.
-    fn put(&self, ranges: &[Range<usize>], bytes: &[u8], out: &mut Held) -> std::io::Result<()> {
+    fn put(&self, ranges: &[Range<usize>], bytes: &[u8], out: &mut SpillBuffer) -> std::io::Result<()> {
         let axes = (0..ranges.len()).filter(|axis| !matches!(self.counts[*axis], Counts::Only(_)));
         let axis = |axis: usize| match self.counts[axis] {
             Counts::Frames => (self.together, 0..ranges[axis].len()),
@@ -126,7 +126,7 @@ fn put_box(
     size: usize,
     bytes: &[u8],
     at: usize,
-    out: &mut Held,
+    out: &mut SpillBuffer,
 ) -> std::io::Result<()> {
     let inner: usize = axes.iter().skip(1).map(|(len, _)| len).product::<usize>() * size;
     let Some((_, range)) = axes.first() else { return out.write_at(at as u64, bytes) };
@@ -142,7 +142,7 @@ impl Decode for Chunks {
         self.together
     }
 
-    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()> {
+    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()> {
         let stored = self.order.get(frames.start).map_or(frames.clone(), |at| *at..*at + 1);
         self.opener.with_file(|file| {
             for ranges in self.boxes(&stored) {
@@ -216,7 +216,7 @@ mod tests {
             let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
             assert_eq!((chunks.together(), stored.bytes), (3, 3 * 120 * 2));
             for first in (0..7).step_by(3) {
-                let mut held = Held::new(stored.bytes, 1 << 20, Path::new("a")).expect("room");
+                let mut held = SpillBuffer::new(stored.bytes, 1 << 20, Path::new("a")).expect("room");
                 chunks.decode(Path::new("a"), first..7.min(first + 3), &mut held).expect("reading");
                 let mut bytes = vec![0; 120 * 2 * 3.min(7 - first)];
                 held.read_at(0, &mut bytes).expect("what was put there");

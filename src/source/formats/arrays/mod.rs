@@ -19,7 +19,7 @@ use super::component;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
-use crate::source::described::{At, Described, Part, Stored, Units};
+use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::{OpenOptions, Parsed, numbering};
 use choose::Choice;
@@ -165,7 +165,7 @@ impl Opener {
 }
 
 /// Reads what an HDF5 file holds.
-pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, hdf5::open, options);
     let file = opener.open()?;
     // What the NetCDF library wrote says so, whatever its name is.
@@ -176,21 +176,21 @@ pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<Descri
 }
 
 /// Reads what a NetCDF file holds.
-pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, netcdf::open, options);
     describe(&opener, opener.open()?.as_ref(), path, options)
 }
 
 /// Reads what a Zarr store, a folder, holds.
 #[cfg(feature = "zarr")]
-pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<Described> {
+pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
     let opener = Opener::new(path, zarr::open, options);
     describe(&opener, opener.open()?.as_ref(), &metadata, options)
 }
 
 /// Reads what is in a file that was opened; it changes when the file `watched` does.
-fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &OpenOptions) -> Result<Described> {
+fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let (path, state) = (opener.path.as_path(), FileBytes::open(watched, Access::Read)?.state());
     let refused = |e| Error::input(path, e);
     let mut all = file.variables().map_err(refused)?;
@@ -232,7 +232,7 @@ fn check_steps(path: &Path, choice: &Choice<'_>, options: &OpenOptions) -> Resul
 }
 
 /// One archive of the arrays of all steps.
-fn joined(mut found: Vec<Found>, parts: Vec<Part>) -> Parsed<Described> {
+fn joined(mut found: Vec<Found>, parts: Vec<Part>) -> Parsed<FileHeader> {
     let first = found.swap_remove(0);
     if let Some(other) = found.iter().find(|other| other.layout.dims() != first.layout.dims()) {
         let (a, b) = (&first.variable, &other.variable);
@@ -325,14 +325,14 @@ impl Found {
     fn part(&self, (path, state): (&Path, State), chunks: Chunks) -> Parsed<Part> {
         let stored = Stored { packing: self.values.packing.clone(), ..chunks.stored(&self.layout)? };
         let frames = if self.order.is_empty() { self.layout.len(Counts::Frames) } else { self.order.len() };
-        Ok(Part { path: path.into(), state, frames, stored, at: At::Decoded(Box::new(chunks)) })
+        Ok(Part { path: path.into(), state, frames, stored, at: DataLocation::Decoded(Box::new(chunks)) })
     }
 
-    fn described(self, parts: Vec<Part>) -> Parsed<Described> {
+    fn described(self, parts: Vec<Part>) -> Parsed<FileHeader> {
         let shape = Shape::new(self.layout.dims(), self.values.sample)?;
         let Places { spacing, origin, times, space_unit, time_unit, calendar, notes, .. } = self.places;
         let units = Units { samples: self.values.unit, times: time_unit, space: space_unit, calendar };
         let (variable, missing) = (Some(self.name), self.values.missing);
-        Ok(Described { spacing, origin, times, variable, units, missing, notes, ..Described::plain(shape, parts) })
+        Ok(FileHeader { spacing, origin, times, variable, units, missing, notes, ..FileHeader::plain(shape, parts) })
     }
 }

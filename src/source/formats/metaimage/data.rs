@@ -5,7 +5,7 @@ use super::header::Header;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::described::{At, Part, check_size};
+use crate::source::file_header::{DataLocation, Part, check_size};
 use crate::source::formats::deflated::{Compression, Deflated, Place, check_room};
 use crate::source::formats::pattern;
 use crate::source::formats::pieces::{Piece, Pieces, Stream};
@@ -62,9 +62,9 @@ impl Data<'_> {
                 frames,
                 frame_bytes: one.bytes,
             };
-            (one, At::Decoded(Box::new(Deflated::new(place))))
+            (one, DataLocation::Decoded(Box::new(Deflated::new(place))))
         } else {
-            (self.samples.stored(frames).map_err(refused)?, At::Byte(start))
+            (self.samples.stored(frames).map_err(refused)?, DataLocation::Byte(start))
         };
         Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
     }
@@ -108,7 +108,7 @@ impl Data<'_> {
             frames[i / z].push(piece);
         }
         let (count, voxel) = (frames.len(), stored.bytes / (x * y * z));
-        let at = At::Decoded(Box::new(Pieces { dims: [x, y, z], voxel, together: 1, frames }));
+        let at = DataLocation::Decoded(Box::new(Pieces { dims: [x, y, z], voxel, together: 1, frames }));
         Ok(Part { path: self.file.path().into(), state: self.file.state(), frames: count, stored, at })
     }
 }

@@ -10,7 +10,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{Described, Stored, growing_head};
+use crate::source::file_header::{FileHeader, Stored, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use header::Header;
@@ -21,7 +21,7 @@ const ORIGIN: [&str; 3] = ["offset", "position", "origin"];
 const TRANSFORM: [&str; 3] = ["transformmatrix", "rotation", "orientation"];
 
 /// Reads the header and checks the size of every data file.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, Header::parse)?;
@@ -31,7 +31,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
     let Samples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
     let notes = note.into_iter().chain(unheeded).collect();
-    Ok(Described { spacing, origin, times, variable, notes, ..Described::plain(shape, parts) })
+    Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(shape, parts) })
 }
 
 /// What the samples are, wherever they are.

@@ -11,7 +11,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{At, Described, Part, Stored, Units, check_size, head};
+use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units, check_size, head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::packing::Packing;
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 const GZIP: &[u8] = b"\x1f\x8b";
 
 /// Reads the header and checks the size of what is not compressed.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let path = &header_of(path).unwrap_or_else(|| path.into());
     let refused = |e| Error::input(path, e);
     let (bytes, compressed) = header_bytes(path)?;
@@ -124,13 +124,13 @@ impl Array {
             let stored = Stored::new(&self.layout, self.stored, big_endian).map_err(refused)?;
             let whole = Shape::new(self.shape.dims(), self.stored).map_err(refused)?;
             check_size(file.len(), start, &whole, frames * self.components).map_err(refused)?;
-            Part { path: data.into(), state: file.state(), frames, stored, at: At::Byte(start) }
+            Part { path: data.into(), state: file.state(), frames, stored, at: DataLocation::Byte(start) }
         };
         part.stored.packing.clone_from(&self.packing);
         Ok(part)
     }
 
-    fn described(self, header: &Header, part: Part) -> Described {
+    fn described(self, header: &Header, part: Part) -> FileHeader {
         let Known { spacing, origin, variable, notes } = self.known;
         let times = times(header, part.frames);
         let units = Units {
@@ -138,7 +138,7 @@ impl Array {
             times: time_unit(header.units).filter(|_| !times.is_empty()).map(String::from),
             ..Units::default()
         };
-        Described { spacing, origin, times, variable, units, notes, ..Described::plain(self.shape, vec![part]) }
+        FileHeader { spacing, origin, times, variable, units, notes, ..FileHeader::plain(self.shape, vec![part]) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::header::{Header, vectors};
 use crate::source::Parsed;
-use crate::source::described::Units;
+use crate::source::file_header::Units;
 use crate::source::formats::directions::Directions;
 use crate::source::formats::words::{list, numbers};
 

@@ -6,7 +6,7 @@ use super::header::Header;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::described::{At, Part, Stored, check_size};
+use crate::source::file_header::{DataLocation, Part, Stored, check_size};
 use crate::source::formats::deflated::{Compression, Stream, check_room};
 use crate::source::formats::pieces::{self, Piece, Pieces};
 use crate::source::layout::{Counts, Layout};
@@ -84,7 +84,7 @@ impl Array {
         check_size(data.len(), start, &self.shape, bytes / self.shape.frame_bytes()).map_err(refused)?;
         let stored = Stored::new(layout, sample, self.big_endian).map_err(refused)?;
         let frames = layout.len(Counts::Frames);
-        Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: At::Byte(start) })
+        Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: DataLocation::Byte(start) })
     }
 
     /// A file of less than a frame, or of some samples of every frame; where its samples come, [`Self::of_pieces`] says.
@@ -116,8 +116,12 @@ impl Array {
         let (each, mut pieces) = (pieces.len() / (frames / together), pieces.into_iter());
         let placed = |(i, piece)| Piece { start: [i * bytes, 0, 0], ..piece };
         let groups = (0..frames / together).map(|_| pieces.by_ref().take(each).enumerate().map(placed).collect());
-        let at =
-            At::Decoded(Box::new(Pieces { dims: [each * bytes, 1, 1], voxel: 1, together, frames: groups.collect() }));
+        let at = DataLocation::Decoded(Box::new(Pieces {
+            dims: [each * bytes, 1, 1],
+            voxel: 1,
+            together,
+            frames: groups.collect(),
+        }));
         Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
     }
 }

@@ -14,7 +14,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::described::{Described, growing_head};
+use crate::source::file_header::{FileHeader, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use axes::Axes;
@@ -22,7 +22,7 @@ use header::Header;
 use std::path::Path;
 
 /// Reads the header and checks the size of every data file that is not compressed.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, Header::parse)?;
@@ -33,7 +33,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let Array { shape, placed, variable, .. } = array;
     let Placed { spacing, origin, note, .. } = placed;
     let notes = note.into_iter().collect();
-    Ok(Described { spacing, origin, times, units, variable, notes, ..Described::plain(shape, parts) })
+    Ok(FileHeader { spacing, origin, times, units, variable, notes, ..FileHeader::plain(shape, parts) })
 }
 
 /// The samples that are meant.

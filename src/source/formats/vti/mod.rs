@@ -12,7 +12,7 @@ use super::component::{self, Chosen};
 use super::directions::{Directions, Placed};
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::described::{Described, Stored};
+use crate::source::file_header::{FileHeader, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use extent::Extent;
@@ -21,7 +21,7 @@ use image::{Image, sample_type};
 use std::path::Path;
 
 /// Reads the XML of one file, and of those that it lists, and checks that the array is all there.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let image = Image::open(path)?;
     let header = &image.header;
     let wanted = Wanted::of(header, variable).map_err(|e| Error::input(path, e))?;
@@ -30,7 +30,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let variable = Some(component::label(&array.name, array.components, wanted.chosen.component));
     let Placed { spacing, origin, note, .. } = wanted.placed;
     let (times, notes) = (time.into_iter().collect(), note.into_iter().collect());
-    Ok(Described { spacing, origin, times, variable, notes, ..Described::plain(wanted.shape, vec![part]) })
+    Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(wanted.shape, vec![part]) })
 }
 
 /// The array that is meant.

@@ -6,7 +6,7 @@ use super::extent::{Extent, check_pieces};
 use super::header::{Array, Piece};
 use super::image::Image;
 use crate::base::error::{Error, Result};
-use crate::source::described::{At, Part};
+use crate::source::file_header::{DataLocation, Part};
 use crate::source::formats::pieces::{self, Pieces};
 use crate::source::layout::Shape;
 use std::path::Path;
@@ -25,10 +25,13 @@ pub(super) fn part(image: &Image, wanted: &Wanted<'_>) -> Result<(Part, Option<f
         && let Some(start) = only.encoded.plain()
     {
         let pieces::Piece { path, state, .. } = &only.piece;
-        return Ok((Part { path: path.clone(), state: *state, frames: 1, stored, at: At::Byte(start) }, found.time));
+        return Ok((
+            Part { path: path.clone(), state: *state, frames: 1, stored, at: DataLocation::Byte(start) },
+            found.time,
+        ));
     }
     let frames = vec![found.pieces.into_iter().map(|located| located.piece).collect()];
-    let at = At::Decoded(Box::new(Pieces { dims: wanted.lengths, voxel: wanted.voxel, together: 1, frames }));
+    let at = DataLocation::Decoded(Box::new(Pieces { dims: wanted.lengths, voxel: wanted.voxel, together: 1, frames }));
     Ok((Part { path: path.into(), state: image.file.state(), frames: 1, stored, at }, found.time))
 }
 

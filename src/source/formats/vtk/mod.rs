@@ -11,14 +11,14 @@ use super::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::described::{At, Described, Part, Stored};
+use crate::source::file_header::{DataLocation, FileHeader, Part, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use header::{Array, Header, sample_type};
 use std::path::Path;
 
 /// Goes through the text of one file and finds the array.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described> {
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = Header::read(&file)?;
@@ -26,9 +26,9 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
     let chosen = component::choose(&arrays, header.scalars.first().copied(), variable).map_err(refused)?;
     let array = &header.arrays[chosen.array];
     let (shape, stored) = stored(&header, array, chosen).map_err(refused)?;
-    let at = if header.ascii { text(&file, array, shape) } else { At::Byte(array.start) };
+    let at = if header.ascii { text(&file, array, shape) } else { DataLocation::Byte(array.start) };
     let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at };
-    let mut described = Described::plain(shape, vec![part]);
+    let mut described = FileHeader::plain(shape, vec![part]);
     described.spacing = header.spacing;
     described.origin = array.of.origin(header.points, header.origin, header.spacing);
     described.times = header.time.into_iter().collect();
@@ -37,12 +37,12 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<Described>
 }
 
 /// An array as text: all of it is one piece.
-fn text(file: &FileBytes, array: &Array, shape: Shape) -> At {
+fn text(file: &FileBytes, array: &Array, shape: Shape) -> DataLocation {
     let (dims, sample) = (shape.dims(), shape.sample());
     let samples = Words { start: array.start, count: array.components * array.tuples, sample };
     let (path, state) = (file.path().into(), file.state());
     let piece = Piece { path, state, start: [0; 3], dims, samples: Box::new(samples) };
-    At::Decoded(Box::new(Pieces {
+    DataLocation::Decoded(Box::new(Pieces {
         dims,
         voxel: array.components * sample.size(),
         together: 1,

@@ -1,7 +1,7 @@
 //! The ways of converting that are measured: all that this benchmark knows of them is a name and a configuration.
 
 use wavesplat::base::error::{Error, Result};
-use wavesplat::convert::{Coding, ConvertConfig};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint};
 use wavesplat::wavelet::Basis;
 
 /// A way of converting.
@@ -20,7 +20,10 @@ pub const BASELINE: &str = "haar";
 pub const SCHEMES: [Scheme; 2] = [
     Scheme { name: BASELINE, config: |tolerance, memory| ConvertConfig::new(Basis::Haar, 32, tolerance, memory) },
     // What `wavesplat convert` does unless told otherwise.
-    Scheme { name: "default", config: |tolerance, memory| ConvertConfig::new(Coding::AUTO, 32, tolerance, memory) },
+    Scheme {
+        name: "default",
+        config: |tolerance, memory| ConvertConfig::new(SchemeConstraint::AUTO, 32, tolerance, memory),
+    },
 ];
 
 /// The configuration of a scheme whose tolerance refers to `range`.

@@ -8,7 +8,7 @@ use std::io::BufWriter;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
-use wavesplat::convert::{Coding, ConvertConfig, convert};
+use wavesplat::convert::{ConvertConfig, SchemeConstraint, convert};
 use wavesplat::source::{self, OpenOptions};
 use wavesplat::wavelet::Basis;
 
@@ -43,9 +43,9 @@ impl Scheme {
         }
     }
 
-    fn coding(self) -> Coding {
+    fn coding(self) -> SchemeConstraint {
         match self {
-            Self::Auto => Coding::AUTO,
+            Self::Auto => SchemeConstraint::AUTO,
             Self::Haar => Basis::Haar.into(),
             Self::Multi => Basis::Multi.into(),
         }

@@ -14,7 +14,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, Scene, What, render};
+use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, Scene, SplatSource, render};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::Camera;
 use wavesplat::view::footprint::Kernel;
@@ -133,8 +133,8 @@ impl Opened {
             Ok(Self::Library(Box::new(CoefficientScene::new(file, what))))
         };
         match view.method {
-            Method::Codes => file(What::Coefficients),
-            Method::Values => file(What::Samples),
+            Method::Codes => file(SplatSource::Coefficients),
+            Method::Values => file(SplatSource::Samples),
             Method::Direct => Ok(Self::Library(Box::new(FrameScene::new(frames()?, None)))),
             Method::Textbook | Method::TextbookSetUp => Ok(Self::Textbook(frames()?)),
         }

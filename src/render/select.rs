@@ -9,11 +9,11 @@ use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
 /// What is read of a block.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(super) struct KeptParts {
     /// Its entry, without the parts that are left out.
     pub(super) entry: BlockEntry,
     /// The error of its samples: first what holds in every frame, then for each level part what counts
-    /// [`Allowance::gains`] times in a frame.
+    /// [`BlockSelector::gains`] times in a frame.
     pub(super) errors: Vec<f64>,
     /// No sample is further off.
     pub(super) certified: f64,
@@ -24,7 +24,7 @@ pub(super) struct Kept {
 
 /// Decides what of a window's blocks is read.
 #[derive(Debug)]
-pub(super) struct Allowance {
+pub(super) struct BlockSelector {
     /// `gains[part][frame]`: [`WindowCodec::part_gains`].
     pub(super) gains: Vec<Vec<f64>>,
     /// The largest of each part's gains.
@@ -47,12 +47,12 @@ pub(super) enum Rule {
     /// All parts, from the finest on, with which no sample of their block is further off.
     Within(f64),
     /// Steps of at most this price.
-    Cheap(Price),
+    Cheap(Cost),
 }
 
 /// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the same
 /// for all blocks, no other choice of steps reads fewer bytes for the same expected error.
-type Price = i32;
+type Cost = i32;
 
 /// Some level parts, from the finest on, of which none is left out without all before it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -63,7 +63,7 @@ struct Step {
     bytes: u64,
     /// The mean square of what they change.
     change: f64,
-    price: Price,
+    price: Cost,
 }
 
 /// A block as its entry and the view have it.
@@ -76,7 +76,7 @@ pub(super) struct Place<'a> {
 
 /// What some level parts of a block come to where they are left out.
 #[derive(Debug, Clone, Copy, Default)]
-struct Without {
+struct Alternative {
     largest: f64,
     energy: f64,
     /// Of the samples, in the mean square over pixels.
@@ -85,16 +85,16 @@ struct Without {
 
 /// Finds what is cheapest to leave out of a window.
 #[derive(Debug)]
-pub(super) struct Cheapest<'a> {
-    allowance: &'a Allowance,
+pub(super) struct RateAllocator<'a> {
+    allowance: &'a BlockSelector,
     /// The mean square of the file's own errors.
     own: f64,
     /// What the steps of each price come to.
-    changes: BTreeMap<Price, f64>,
+    changes: BTreeMap<Cost, f64>,
 }
 
-impl<'a> Cheapest<'a> {
-    pub(super) fn new(allowance: &'a Allowance) -> Self {
+impl<'a> RateAllocator<'a> {
+    pub(super) fn new(allowance: &'a BlockSelector) -> Self {
         Self { allowance, own: 0.0, changes: BTreeMap::new() }
     }
 
@@ -120,7 +120,7 @@ impl<'a> Cheapest<'a> {
     }
 }
 
-impl Allowance {
+impl BlockSelector {
     /// Leaves nothing out yet.
     pub(super) fn new(codec: &WindowCodec, expectation: &Expectation<'_>) -> Self {
         let gains = codec.part_gains();
@@ -138,9 +138,9 @@ impl Allowance {
 
     /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that the
     /// rule leaves out.
-    pub(super) fn keep(&self, place: &Place<'_>) -> Kept {
+    pub(super) fn keep(&self, place: &Place<'_>) -> KeptParts {
         let (entry, stats) = (place.entry, place.entry.stats);
-        let mut kept = Kept {
+        let mut kept = KeptParts {
             entry: entry.clone(),
             errors: vec![0.0; 1 + self.gains.len()],
             certified: stats.reached,
@@ -155,7 +155,7 @@ impl Allowance {
             Rule::Cheap(price) => {
                 let parts = self.steps(place).iter().take_while(|s| s.price <= price).last().map_or(0, |s| s.parts);
                 let levels = levels(entry);
-                levels[..parts].iter().fold(Without::default(), |without, part| {
+                levels[..parts].iter().fold(Alternative::default(), |without, part| {
                     let more = self.with(without, part, place);
                     self.leave_out(part, more, place, &mut kept);
                     more
@@ -166,18 +166,18 @@ impl Allowance {
         kept
     }
 
-    fn leave_all_out(&self, place: &Place<'_>, kept: &mut Kept) {
+    fn leave_all_out(&self, place: &Place<'_>, kept: &mut KeptParts) {
         let as_zero = as_zero(place.entry);
         (kept.errors[0], kept.certified) = (as_zero, as_zero);
-        let all = levels(place.entry).iter().fold(Without::default(), |w, part| self.with(w, part, place));
+        let all = levels(place.entry).iter().fold(Alternative::default(), |w, part| self.with(w, part, place));
         let exact = place.entry.part(PartKind::Exact).is_some();
         kept.expected =
             if exact { finite(as_zero * as_zero * place.seen.of(f64::INFINITY)) } else { kept.expected + all.change };
         kept.entry.parts.retain(|p| p.kind == PartKind::Missing);
     }
 
-    fn leave_out_within(&self, allowed: f64, place: &Place<'_>, kept: &mut Kept) {
-        let mut without = Without::default();
+    fn leave_out_within(&self, allowed: f64, place: &Place<'_>, kept: &mut KeptParts) {
+        let mut without = Alternative::default();
         for part in levels(place.entry) {
             let more = self.with(without, &part, place);
             if (place.entry.stats.reached + more.largest).next_up() <= allowed {
@@ -190,7 +190,7 @@ impl Allowance {
     }
 
     /// Leaves out a part, with which all that is left out comes to `without`.
-    fn leave_out(&self, part: &LevelPart, without: Without, place: &Place<'_>, kept: &mut Kept) {
+    fn leave_out(&self, part: &LevelPart, without: Alternative, place: &Place<'_>, kept: &mut KeptParts) {
         kept.certified = (place.entry.stats.reached + without.largest).next_up();
         kept.expected = self.own(place) + without.change;
         if self.cumulative {
@@ -201,7 +201,7 @@ impl Allowance {
     }
 
     /// What parts come to with one more.
-    fn with(&self, without: Without, part: &LevelPart, place: &Place<'_>) -> Without {
+    fn with(&self, without: Alternative, part: &LevelPart, place: &Place<'_>) -> Alternative {
         let (level, stats) = (part.level, part.entry.stats);
         let energy = stats.energy * self.energy_gain[level];
         let largest = stats.largest * self.largest_gain[level];
@@ -211,7 +211,7 @@ impl Allowance {
             (without.largest + largest, without.energy + energy, energy)
         };
         let change = finite(without.change + self.in_pixels(more, self.alike[level], place));
-        Without { largest: largest.next_up(), energy, change }
+        Alternative { largest: largest.next_up(), energy, change }
     }
 
     /// What the file's own errors come to in the mean square over pixels.
@@ -226,7 +226,7 @@ impl Allowance {
     /// The ways to leave out parts of a block, of which each costs more for a byte than the one before; none of a block
     /// that is not seen.
     fn steps(&self, place: &Place<'_>) -> Vec<Step> {
-        let (mut steps, mut at, mut without) = (vec![Step::default()], Step::default(), Without::default());
+        let (mut steps, mut at, mut without) = (vec![Step::default()], Step::default(), Alternative::default());
         for part in levels(place.entry) {
             without = self.with(without, &part, place);
             at = Step {
@@ -257,10 +257,10 @@ impl Allowance {
 }
 
 /// What it costs to go from one step to the next.
-fn price(from: &Step, to: &Step) -> Price {
+fn price(from: &Step, to: &Step) -> Cost {
     let bytes = to.bytes.saturating_sub(from.bytes).max(1) as f64;
     let each = ((to.change - from.change).max(0.0) / bytes).clamp(f64::MIN_POSITIVE, f64::MAX);
-    (16.0 * libm::log2(each)).floor() as Price
+    (16.0 * libm::log2(each)).floor() as Cost
 }
 
 /// No sample of a block is further from zero.

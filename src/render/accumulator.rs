@@ -1,13 +1,13 @@
 //! A band of a picture while blocks are splatted into it, by footprints or by way of a lattice, and its tiles once they are.
 
 use super::RenderReport;
-use super::amounts::{BlockPlanes, Room};
-use super::eye::Eye;
 use super::lap;
 use super::lattice::{CellPlane, Cells, Gather, Lattice, Placed, Rectangle, Work};
-use super::place::{Place, TILE};
+use super::plane_values::{BlockPlanes, Scratch};
+use super::sparse_terms::{Layout, SparseTerms};
 use super::splat::{Splats, Tile};
-use super::terms::{Layout, Terms};
+use super::tile_rect::{TILE, TileRect};
+use super::view_setup::ViewSetup;
 use crate::base::error::Result;
 use crate::wavelet::Lane;
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ pub(super) trait Blocks: Sync {
 }
 
 /// A band of a picture.
-pub(super) struct Canvas<'a> {
+pub(super) struct BandAccumulator<'a> {
     band: Band<'a>,
     planes: usize,
     sums: Sums<'a>,
@@ -31,14 +31,14 @@ pub(super) struct Canvas<'a> {
 /// Some rows of the picture of a view.
 #[derive(Clone)]
 struct Band<'a> {
-    eye: &'a Eye,
+    setup: &'a ViewSetup,
     rows: Range<usize>,
 }
 
 impl Band<'_> {
     /// Whether a block is to be splatted here.
     fn sees(&self, block: usize) -> bool {
-        self.eye.sees(block, &self.rows)
+        self.setup.sees(block, &self.rows)
     }
 }
 
@@ -47,20 +47,24 @@ enum Sums<'a> {
     Cells(&'a Lattice, Cells),
 }
 
-impl<'a> Canvas<'a> {
+impl<'a> BandAccumulator<'a> {
     /// Some rows of a picture with all planes at zero.
-    pub(super) fn new(eye: &'a Eye, rows: Range<usize>, layout: &Layout) -> Self {
-        let (width, planes) = (eye.camera.size[0], layout.planes());
+    pub(super) fn new(setup: &'a ViewSetup, rows: Range<usize>, layout: &Layout) -> Self {
+        let (width, planes) = (setup.camera.size[0], layout.planes());
         let tile = |place| Tile::new(place, planes, layout.order);
-        let sums = match &eye.lattice {
+        let sums = match &setup.lattice {
             Some(lattice) => Sums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
-            None => Sums::Tiles(Place::cover(width, rows.clone(), TILE).into_iter().map(tile).collect()),
+            None => Sums::Tiles(TileRect::cover(width, rows.clone(), TILE).into_iter().map(tile).collect()),
         };
-        Self { band: Band { eye, rows }, planes, sums }
+        Self { band: Band { setup, rows }, planes, sums }
     }
 
     /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
-    pub(super) fn finish<T: Send>(&self, pictures: &mut [T], finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync) {
+    pub(super) fn finish<T: Send>(
+        &self,
+        pictures: &mut [T],
+        finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
+    ) {
         Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
     }
 
@@ -70,13 +74,13 @@ impl<'a> Canvas<'a> {
         layers: &[Self],
         together: usize,
         pictures: &mut [T],
-        wanted: impl Fn(usize, &Place) -> bool + Sync,
-        finish: impl Fn(Finished<'_>, &mut Pixels<'_, T>) + Sync,
+        wanted: impl Fn(usize, &TileRect) -> bool + Sync,
+        finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
     ) {
         let Some(Self { band, .. }) = layers.first() else { return };
-        let (width, side) = (band.eye.camera.size[0], band.eye.tile());
+        let (width, side) = (band.setup.camera.size[0], band.setup.tile());
         let columns = width.div_ceil(side);
-        let places = Place::cover(width, band.rows.clone(), side);
+        let places = TileRect::cover(width, band.rows.clone(), side);
         let bands = layers[0].by_rows_of_tiles(pictures, side);
         places.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (places, planes))| {
             let mut pixels = Pixels { planes, width, top: places[0].y.start };
@@ -85,7 +89,7 @@ impl<'a> Canvas<'a> {
                     let some = first..layers.len().min(first + together);
                     let some: Vec<&Self> = some.filter(|n| wanted(*n, place)).map(|n| &layers[n]).collect();
                     if !some.is_empty() {
-                        finish(Finished::new(&some, place, n * columns + i), &mut pixels);
+                        finish(ResolvedTile::new(&some, place, n * columns + i), &mut pixels);
                     }
                 }
             }
@@ -94,7 +98,7 @@ impl<'a> Canvas<'a> {
 
     /// For every row of tiles its rows of every picture.
     fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
-        let [width, height] = self.band.eye.camera.size;
+        let [width, height] = self.band.setup.camera.size;
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         bands.resize_with(self.band.rows.len().div_ceil(side), Vec::new);
         for picture in pictures.chunks_exact_mut(width * height) {
@@ -106,22 +110,22 @@ impl<'a> Canvas<'a> {
 }
 
 /// A tile that has all its blocks, in one layer or more.
-pub(super) struct Finished<'a> {
-    pub(super) place: &'a Place,
+pub(super) struct ResolvedTile<'a> {
+    pub(super) place: &'a TileRect,
     pub(super) layers: usize,
     /// Of a layer.
     planes: usize,
-    sums: OfTile<'a>,
+    sums: TileSums<'a>,
 }
 
-enum OfTile<'a> {
+enum TileSums<'a> {
     Tiles(Vec<&'a Tile>),
     Gather(Gather<'a>),
 }
 
-impl<'a> Finished<'a> {
+impl<'a> ResolvedTile<'a> {
     /// The tile with such a number in some layers that look alike.
-    fn new(layers: &[&'a Canvas<'a>], place: &'a Place, number: usize) -> Self {
+    fn new(layers: &[&'a BandAccumulator<'a>], place: &'a TileRect, number: usize) -> Self {
         let (mut tiles, mut cells) = (Vec::new(), Vec::new());
         for layer in layers {
             match &layer.sums {
@@ -133,9 +137,9 @@ impl<'a> Finished<'a> {
         let sums = match cells.first() {
             Some((lattice, _)) => {
                 let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
-                OfTile::Gather(lattice.gather((&cells, planes), place))
+                TileSums::Gather(lattice.gather((&cells, planes), place))
             }
-            None => OfTile::Tiles(tiles),
+            None => TileSums::Tiles(tiles),
         };
         Self { place, layers: layers.len(), planes, sums }
     }
@@ -143,19 +147,19 @@ impl<'a> Finished<'a> {
     /// The planes that may have sums, counted through all layers.
     pub(super) fn used(&self) -> Vec<usize> {
         match &self.sums {
-            OfTile::Tiles(_) => (0..self.layers * self.planes).collect(),
-            OfTile::Gather(gather) => gather.used().to_vec(),
+            TileSums::Tiles(_) => (0..self.layers * self.planes).collect(),
+            TileSums::Gather(gather) => gather.used().to_vec(),
         }
     }
 
     /// The planes of all layers at `count` pixels from `first` on, into the first lanes of `planes`.
     pub(super) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
-            OfTile::Tiles(tiles) => {
+            TileSums::Tiles(tiles) => {
                 let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // of none there is nothing to load
                 tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
             }
-            OfTile::Gather(gather) => gather.load(first, count, planes),
+            TileSums::Gather(gather) => gather.load(first, count, planes),
         }
     }
 
@@ -163,8 +167,8 @@ impl<'a> Finished<'a> {
     pub(super) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut planes = [Lane::default()];
         match &mut self.sums {
-            OfTile::Tiles(tiles) => tiles[0].load(first, count, &mut planes),
-            OfTile::Gather(gather) => planes[0] = gather.load_one(first, count),
+            TileSums::Tiles(tiles) => tiles[0].load(first, count, &mut planes),
+            TileSums::Gather(gather) => planes[0] = gather.load_one(first, count),
         }
         planes[0]
     }
@@ -194,15 +198,15 @@ impl<T: Copy> Pixels<'_, T> {
 /// Splats blocks in order, `batch` at a time, each into all canvases that see it. It is decoded once for those that take
 /// footprints, and once for those that have a lattice.
 pub(super) fn splat(
-    canvases: &mut [Canvas<'_>],
+    accumulators: &mut [BandAccumulator<'_>],
     blocks: &[usize],
     batch: usize,
     source: &dyn Blocks,
     report: &mut RenderReport,
 ) -> Result<()> {
     let (mut tiles, mut cells) = (Vec::new(), Vec::new());
-    let count = canvases.first().map_or(0, |canvas| canvas.planes);
-    for Canvas { band, sums, .. } in canvases {
+    let count = accumulators.first().map_or(0, |accumulator| accumulator.planes);
+    for BandAccumulator { band, sums, .. } in accumulators {
         match sums {
             Sums::Tiles(of_band) => tiles.push((band.clone(), of_band)),
             Sums::Cells(lattice, of_band) => cells.push((band.clone(), (*lattice, of_band))),
@@ -224,14 +228,14 @@ fn splat_into_tiles(
 ) -> Result<()> {
     let project = |block: usize| {
         let planes = source.planes(block)?;
-        let terms = Terms::of(planes.as_ref(), count)?;
-        let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.eye));
+        let terms = SparseTerms::of(planes.as_ref(), count)?;
+        let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.setup));
         let (seen, held) = (bands.iter().map(splats).collect(), planes.held());
         Ok(BlockInBands { block: terms, seen, held })
     };
     in_batches(bands, blocks, report, project, |blocks| {
         for (n, tiles) in tiles.iter_mut().enumerate() {
-            let footprint = &bands[n].eye.footprint;
+            let footprint = &bands[n].setup.footprint;
             tiles.par_iter_mut().for_each(|tile| {
                 for BlockInBands { block: terms, seen, .. } in blocks {
                     seen[n].iter().for_each(|splats| tile.splat(splats, terms, footprint));
@@ -257,9 +261,9 @@ fn splat_into_cells(
     let place = |block: usize| {
         let planes = source.planes(block)?;
         let placed = |n: usize| {
-            let (eye, seen) = (bands[n].eye, bands[n].sees(block));
-            let slab = eye.slab.as_ref();
-            seen.then(|| lattices[n].placed(&eye.blocks.region(block), (&eye.clip, slab), &there[n]))
+            let (setup, seen) = (bands[n].setup, bands[n].sees(block));
+            let slab = setup.slab.as_ref();
+            seen.then(|| lattices[n].placed(&setup.blocks.region(block), (&setup.clip, slab), &there[n]))
         };
         let (seen, held) = ((0..bands.len()).map(placed).collect(), planes.held());
         Ok(BlockInBands { block: planes, seen, held })
@@ -278,7 +282,7 @@ struct BlockInBands<B, S> {
 fn add_planes(
     cells: &mut [&mut Cells],
     blocks: &[BlockInBands<Box<dyn BlockPlanes + '_>, Placed>],
-    spare: &Mutex<Vec<(Room, Work)>>,
+    spare: &Mutex<Vec<(Scratch, Work)>>,
 ) -> Result<()> {
     let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
     by_planes(cells).into_par_iter().enumerate().try_for_each(|(plane, mut bands)| {
@@ -316,10 +320,10 @@ fn in_batches<B: Send, S: Send>(
     let mut clock = Instant::now();
     let seen: Vec<usize> = blocks.iter().copied().filter(|b| bands.iter().any(|band| band.sees(*b))).collect();
     for blocks in seen.chunks(batch) {
-        let made = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
+        let provenance = blocks.par_iter().map(|block| make(*block)).collect::<Result<Vec<_>>>()?;
         lap(&mut clock, &mut report.decode_seconds);
-        add(&made)?;
-        for BlockInBands { held: [coefficients, bytes_read], .. } in &made {
+        add(&provenance)?;
+        for BlockInBands { held: [coefficients, bytes_read], .. } in &provenance {
             report.coefficients += coefficients;
             report.bytes_read += bytes_read;
         }

@@ -1,9 +1,9 @@
 //! Where a scene is seen from, and how it is splatted: everything that is the same for all frames of a view.
 
 use super::lattice::Lattice;
-use super::place::{TILE, overlap, pixels_reached};
 use super::scene::Scene;
 use super::slabs::Slab;
+use super::tile_rect::{TILE, overlap, pixels_reached};
 use super::{Quantity, RenderConfig, most_splat_error, splat_method};
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
@@ -20,7 +20,7 @@ pub(super) const BACKGROUND: f64 = 0.01;
 
 /// Everything that is the same for all frames of a view.
 #[derive(Debug, Clone)]
-pub(super) struct Eye {
+pub(super) struct ViewSetup {
     pub(super) camera: Camera,
     pub(super) footprint: Footprint,
     pub(super) tau: f64,
@@ -40,7 +40,7 @@ pub(super) struct Eye {
     pub(super) slab: Option<Slab>,
 }
 
-impl Eye {
+impl ViewSetup {
     pub(super) fn new(scene: &dyn Scene, config: &RenderConfig, view: &View) -> Result<Self> {
         let (grid, blocks) = (*scene.grid(), scene.blocks());
         let clip = config.region.unwrap_or(grid.whole());

@@ -1,43 +1,43 @@
 //! The sum of all weights at one place of the picture, by uncut footprints: what background is judged by, whatever splats.
 
-use super::eye::Eye;
 use super::lattice::Shear;
+use super::view_setup::ViewSetup;
 use super::{RenderConfig, most_splat_error};
 use crate::base::error::Result;
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
 /// Leaves out voxels so deep that what they add is within what the method leaves of the splat error.
-pub(super) fn without_what_is_dim(mut eye: Eye, config: &RenderConfig) -> Result<Eye> {
-    let share = most_splat_error(config.quantity, config.splat_error) - eye.stated_error;
-    if config.certify || eye.tau == 0.0 || share <= 0.0 {
-        return Ok(eye);
+pub(super) fn without_what_is_dim(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
+    let share = most_splat_error(config.quantity, config.splat_error) - setup.stated_error;
+    if config.certify || setup.tau == 0.0 || share <= 0.0 {
+        return Ok(setup);
     }
-    let exact = Footprint::new(config.kernel, &eye.grid, eye.camera.scale, Method::EXACT)?;
-    let deepest = Uncut::new(&eye, &exact).deepest(share);
-    if deepest < eye.camera.depth(&eye.grid) {
-        (eye.deepest, eye.stated_error) = (deepest, eye.stated_error + share);
+    let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
+    let deepest = ReferenceWeights::new(&setup, &exact).deepest(share);
+    if deepest < setup.camera.depth(&setup.grid) {
+        (setup.deepest, setup.stated_error) = (deepest, setup.stated_error + share);
     }
-    Ok(eye)
+    Ok(setup)
 }
 
 /// The sums of weights of a view at single pixels.
-pub(super) struct Uncut<'a> {
-    eye: &'a Eye,
+pub(super) struct ReferenceWeights<'a> {
+    setup: &'a ViewSetup,
     footprint: &'a Footprint,
     shear: Shear,
 }
 
-impl<'a> Uncut<'a> {
+impl<'a> ReferenceWeights<'a> {
     /// By a footprint that stands in for an uncut one.
-    pub(super) fn new(eye: &'a Eye, footprint: &'a Footprint) -> Self {
-        Self { eye, footprint, shear: Shear::new(&eye.camera, &eye.grid, 1) }
+    pub(super) fn new(setup: &'a ViewSetup, footprint: &'a Footprint) -> Self {
+        Self { setup, footprint, shear: Shear::new(&setup.camera, &setup.grid, 1) }
     }
 
     /// The sum at a pixel's centre: slice by slice, row by row, over the voxels that are near enough.
     pub(super) fn at(&self, [x, y]: [usize; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
-        let clip = &self.eye.clip;
+        let clip = &self.setup.clip;
         let place = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
         let [_, v] = self.shear.cells(place);
         let half = self.half(1);
@@ -60,7 +60,7 @@ impl<'a> Uncut<'a> {
     /// of a slice may be nearer than the place where it meets that.
     pub(super) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
-        let (tau, dims) = (self.eye.tau, self.eye.clip.dims());
+        let (tau, dims) = (self.setup.tau, self.setup.clip.dims());
         let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
         let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
         let (deeper, nearer) = (self.deeper(), self.nearer());
@@ -76,7 +76,7 @@ impl<'a> Uncut<'a> {
     /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))
     /// ```
     pub(super) fn deepest(&self, share: f64) -> f64 {
-        let (tau, deeper, nearer) = (self.eye.tau, self.deeper(), self.nearer());
+        let (tau, deeper, nearer) = (self.setup.tau, self.deeper(), self.nearer());
         let slices = 2.0 * nearer / deeper + 1.0 - 1.0 / libm::expm1(-tau * deeper);
         self.nearest() + libm::log(self.slice() * slices / share) / tau
     }
@@ -93,7 +93,7 @@ impl<'a> Uncut<'a> {
     }
 
     fn nearest(&self) -> f64 {
-        self.eye.camera.nearest_of(&self.eye.grid.crop(&self.eye.clip))
+        self.setup.camera.nearest_of(&self.setup.grid.crop(&self.setup.clip))
     }
 
     /// The sum of weights of a slice without end at the place of one of its voxels, in units of that one's.

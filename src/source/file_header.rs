@@ -1,9 +1,9 @@
 //! What input files say of themselves, in the same words for every format.
 
 use super::Parsed;
-use super::held::Held;
 use super::layout::{Layout, Shape, Strides};
 use super::packing::Packing;
+use super::spill_buffer::SpillBuffer;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{FileBytes, State};
@@ -54,7 +54,7 @@ pub(super) struct Part {
     /// How they are stored, once they are decoded.
     pub(super) stored: Stored,
     /// Where they are.
-    pub(super) at: At,
+    pub(super) at: DataLocation,
 }
 
 impl Part {
@@ -66,7 +66,7 @@ impl Part {
         start: u64,
     ) -> Parsed<Self> {
         let stored = Stored::plain(shape, frames, big_endian)?;
-        Ok(Self { path: path.into(), state, frames, stored, at: At::Byte(start) })
+        Ok(Self { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
     }
 }
 
@@ -100,7 +100,7 @@ impl Stored {
 
 /// Where the bytes of a part are.
 #[derive(Debug)]
-pub(super) enum At {
+pub(super) enum DataLocation {
     /// In the file as they are, from this byte.
     Byte(u64),
     /// In the file, but packed.
@@ -119,7 +119,7 @@ pub(super) trait Decode: Debug + Send {
     ///
     /// # Errors
     /// What is wrong with the file.
-    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut Held) -> Result<()>;
+    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()>;
 
     /// Lets go of what decoding the next frames could go on with: an archive may have more files than can be open.
     fn rest(&mut self) {}
@@ -151,7 +151,7 @@ impl Units {
 
 /// What the header of one input file says.
 #[derive(Debug)]
-pub(super) struct Described {
+pub(super) struct FileHeader {
     /// What the file is, by name.
     pub(super) format: &'static str,
     /// Voxels and sample type of every frame.
@@ -174,7 +174,7 @@ pub(super) struct Described {
     pub(super) parts: Vec<Part>,
 }
 
-impl Described {
+impl FileHeader {
     /// Frames of which no more is known than where they are.
     pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
@@ -191,7 +191,7 @@ impl Described {
     ///
     /// # Errors
     /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
-    pub(super) fn follows(&self, first: &Self, name: &str) -> Parsed<Unlike> {
+    pub(super) fn follows(&self, first: &Self, name: &str) -> Parsed<Mismatch> {
         let said = |text: &Option<String>| text.clone().unwrap_or_else(|| "none".into());
         let value = |missing: Option<f64>| missing.map_or_else(|| "none".into(), |value| value.to_string());
         let same = |what: &str, own: String, theirs: String| {
@@ -204,7 +204,7 @@ impl Described {
         same("places in the unit ", said(&self.units.space), said(&first.units.space))?;
         same("the missing value ", value(self.missing), value(first.missing))?;
         let is_timed = !self.times.is_empty() && !first.times.is_empty();
-        Ok(Unlike { grid: !self.is_placed_as(first), times: is_timed && self.units.times != first.units.times })
+        Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && self.units.times != first.units.times })
     }
 
     /// Whether voxels are where those of another file are, but for a small part of their distance.
@@ -220,7 +220,7 @@ impl Described {
 
 /// In what a file differs from the first one, though its frames can follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Unlike {
+pub(super) struct Mismatch {
     /// Its spacing or origin.
     pub(super) grid: bool,
     /// What its times are measured in, or since when.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// A fixed number of bytes, zero at first.
 #[derive(Debug)]
-pub(super) enum Held {
+pub(super) enum SpillBuffer {
     Memory(Vec<u8>),
     /// In a temporary file, from a byte on.
     Spool {
@@ -29,7 +29,7 @@ pub(super) struct Spool {
 
 impl Spool {
     /// Room for `bytes` more.
-    fn room(&mut self, bytes: usize) -> io::Result<Held> {
+    fn room(&mut self, bytes: usize) -> io::Result<SpillBuffer> {
         let file = match &self.file {
             Some(file) => file.clone(),
             None => self.file.insert(Arc::new(tempfile::tempfile()?)).clone(),
@@ -37,11 +37,11 @@ impl Spool {
         let (start, len) = (self.len, bytes as u64);
         self.len = start.checked_add(len).ok_or(ErrorKind::FileTooLarge)?;
         file.set_len(self.len)?;
-        Ok(Held::Spool { file, start, len })
+        Ok(SpillBuffer::Spool { file, start, len })
     }
 }
 
-impl Held {
+impl SpillBuffer {
     /// Room for `bytes`, in memory if it may take so many. `name` stands for what they are of in messages.
     pub(super) fn new(bytes: usize, memory: usize, name: &Path) -> Result<Self> {
         Self::within(bytes, memory, &mut Spool::default(), name)
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn what_shares_a_file_stays_apart() {
         let (mut spool, name) = (Spool::default(), Path::new("a"));
-        let mut held = [3, 5].map(|bytes| Held::within(bytes, 0, &mut spool, name).expect("room"));
+        let mut held = [3, 5].map(|bytes| SpillBuffer::within(bytes, 0, &mut spool, name).expect("room"));
         held[1].write_at(0, b"vwxyz").expect("writing");
         held[0].write_at(1, b"bc").expect("writing");
         let (mut first, mut second) = ([1; 3], [1; 2]);
@@ -113,7 +113,8 @@ mod tests {
         held[1].read_at(3, &mut second).expect("reading");
         assert_eq!((&first, &second), (b"\0bc", b"yz"));
         assert!(held[0].read_at(1, &mut first).is_err() && held[0].write_at(2, b"de").is_err(), "of the other");
-        let files = held.map(|held| if let Held::Spool { file, .. } = held { file } else { panic!("in memory") });
+        let files =
+            held.map(|held| if let SpillBuffer::Spool { file, .. } = held { file } else { panic!("in memory") });
         assert!(Arc::ptr_eq(&files[0], &files[1]));
     }
 }

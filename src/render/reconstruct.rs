@@ -1,28 +1,28 @@
 //! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
 
-use super::canvas::{Finished, Pixels};
+use super::accumulator::{Pixels, ResolvedTile};
 use super::certificate::Certificate;
-use super::scene::{Group, Inverse};
-use super::terms::Layout;
-use super::weights::Look;
+use super::scene::{FrameBatch, Inverse};
+use super::sparse_terms::Layout;
+use super::weights::WeightedView;
 use super::weights::{PixelWeight, Weights};
 use super::{Quantity, RenderConfig};
 use crate::wavelet::{LANES, Lane};
 
 /// What turns the planes of a group into pixels.
-pub(super) struct Finish<'a> {
-    group: &'a dyn Group,
+pub(super) struct PixelReconstructor<'a> {
+    group: &'a dyn FrameBatch,
     layout: Layout,
     quantity: Quantity,
     weights: &'a Weights,
     certificate: Option<Certificate>,
 }
 
-impl<'a> Finish<'a> {
+impl<'a> PixelReconstructor<'a> {
     /// For pictures of a view.
-    pub(super) fn new(group: &'a dyn Group, look: &'a Look<'a>, config: &RenderConfig) -> Self {
-        let certificate = config.certify.then(|| Certificate::new(look.eye, config.quantity));
-        Self { group, layout: group.layout(), quantity: config.quantity, weights: &look.weights, certificate }
+    pub(super) fn new(group: &'a dyn FrameBatch, weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
+        let certificate = config.certify.then(|| Certificate::new(weighted.setup, config.quantity));
+        Self { group, layout: group.layout(), quantity: config.quantity, weights: &weighted.weights, certificate }
     }
 
     /// Planes that a finished tile has: the frames, then their errors if they are certified.
@@ -31,7 +31,7 @@ impl<'a> Finish<'a> {
     }
 
     /// Turns the planes of a tile into its pixels. Those of background are left as they are.
-    pub(super) fn tile(&self, mut tile: Finished<'_>, pixels: &mut Pixels<'_, f32>) {
+    pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f32>) {
         let mut inverse = self.group.inverse(&tile.used());
         let mut planes = vec![Lane::default(); self.layout.planes()];
         let mut frames = vec![Lane::default(); self.layout.frames];

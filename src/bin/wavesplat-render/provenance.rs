@@ -5,20 +5,20 @@ use crate::colouring::Colouring;
 use crate::{Cli, ErrorName, MethodName, QuantityName};
 use wavesplat::colour::{Norm, Scale};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::PromiseReport;
-use wavesplat::render::sink::{Made, Shows};
+use wavesplat::file::report::BoundReport;
+use wavesplat::render::sink::{Provenance, Shows};
 use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene};
 
 impl Cli {
     /// What pictures are made with.
-    pub(crate) fn made(
+    pub(crate) fn provenance(
         &self,
         scene: &dyn Scene,
         config: &RenderConfig,
         (file, times): (Option<&CoefficientFile>, &[f64]),
         colouring: &Colouring,
-    ) -> Made {
-        let made = Made {
+    ) -> Provenance {
+        let provenance = Provenance {
             software: concat!("wavesplat-render ", env!("CARGO_PKG_VERSION")).into(),
             size: self.size.0,
             tau: config.kernel.tau,
@@ -35,20 +35,20 @@ impl Cli {
             times: config.frames.iter().filter_map(|frame| times.get(*frame)).copied().collect(),
             ..self.of_modes()
         };
-        let made = of_transfer(made, scene, (config, file), colouring);
-        let made = file.map_or(made.clone(), |file| self.of_file(made, file, config));
+        let provenance = of_transfer(provenance, scene, (config, file), colouring);
+        let provenance = file.map_or(provenance.clone(), |file| self.of_file(provenance, file, config));
         match colouring.coloured().range {
-            Some(_) => in_colours(made, colouring, &colouring.of_pictures),
-            None => made,
+            Some(_) => in_colours(provenance, colouring, &colouring.of_pictures),
+            None => provenance,
         }
     }
 
-    fn of_modes(&self) -> Made {
+    fn of_modes(&self) -> Provenance {
         let quantity = match self.quantity {
             QuantityName::Mean => "mean",
             QuantityName::Emission => "emission",
         };
-        Made {
+        Provenance {
             method: match self.method {
                 MethodName::Coefficients => "coefficients",
                 MethodName::Direct => "direct",
@@ -59,68 +59,68 @@ impl Cli {
                 ModeName::Mip => "mip",
             },
             quantity: (self.along.mode == ModeName::Projection).then_some(quantity),
-            ..Made::default()
+            ..Provenance::default()
         }
     }
 
     /// With what is known of a file.
-    fn of_file(&self, made: Made, file: &CoefficientFile, config: &RenderConfig) -> Made {
+    fn of_file(&self, provenance: Provenance, file: &CoefficientFile, config: &RenderConfig) -> Provenance {
         let m = file.metadata();
         let reached = m.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         let certified = config.limited == Limit::Certified && !self.skip_damaged;
-        Made {
+        Provenance {
             sample_error: certified.then(|| config.allowed.unwrap_or(0.0).max(reached)),
             file_id: Some(file.id().to_string()),
-            file_promise: Some(PromiseReport::new(m.bound, m.tolerance, m.range()).promise),
+            file_promise: Some(BoundReport::new(m.bound, m.tolerance, m.range()).promise),
             file_reached: Some(reached),
-            ..made
+            ..provenance
         }
     }
 }
 
 /// With what turns samples into colours, before the transform or along the ray.
 fn of_transfer(
-    made: Made,
+    provenance: Provenance,
     scene: &dyn Scene,
     (config, file): (&RenderConfig, Option<&CoefficientFile>),
     colouring: &Colouring,
-) -> Made {
-    let painter = file.and_then(CoefficientFile::painter).map(|painter| painter.colours.words());
+) -> Provenance {
+    let painter = file.and_then(CoefficientFile::colour_transform).map(|painter| painter.colours.words());
     let words = || painter.unwrap_or_else(|| colouring.map.words());
-    let made = Made { transfer_function: (colouring.pixel != Pixel::Value).then(words), ..made };
-    let Mode::Composite { transfer, unit, .. } = &config.mode else { return made };
+    let provenance = Provenance { transfer_function: (colouring.pixel != Pixel::Value).then(words), ..provenance };
+    let Mode::Composite { transfer, unit, .. } = &config.mode else { return provenance };
     let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
-    Made { opacity: Some(transfer.opacity_words()), opacity_unit: Some(unit), ..made }
+    Provenance { opacity: Some(transfer.opacity_words()), opacity_unit: Some(unit), ..provenance }
 }
 
 /// With the colours that pixels have.
-fn in_colours(made: Made, colouring: &Colouring, scale: &Scale) -> Made {
+fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> Provenance {
     let norm = match scale.norm() {
         Norm::Linear => "linear",
         Norm::Log => "log",
     };
     let [r, g, b] = scale.background();
-    Made {
+    Provenance {
         colormap: (colouring.pixel == Pixel::Value).then(|| colouring.map.description()),
         range: Some(scale.range()),
         norm: Some(norm),
         background: Some(format!("{r:02x}{g:02x}{b:02x}")),
-        ..made
+        ..provenance
     }
 }
 
 /// What pictures of errors are made with, of what the pictures are.
-pub(crate) fn made_of_errors(made: &Made, colouring: &Colouring) -> Made {
-    let made = Made {
+pub(crate) fn made_of_errors(provenance: &Provenance, colouring: &Colouring) -> Provenance {
+    let provenance = Provenance {
         shows: Shows::CertifiedError,
         colormap: None,
         range: None,
         norm: None,
         background: None,
-        ..made.clone()
+        ..provenance.clone()
     };
     match colouring.coloured().error_range {
-        Some(_) => in_colours(made, colouring, &colouring.of_errors),
-        None => made,
+        Some(_) => in_colours(provenance, colouring, &colouring.of_errors),
+        None => provenance,
     }
 }

@@ -7,7 +7,7 @@ use crate::codec::real::Real;
 
 /// The amounts of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]
-pub enum Amounts<'a> {
+pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
     /// One for each voxel, x fastest.
@@ -18,7 +18,7 @@ pub enum Amounts<'a> {
     Few(&'a [(u32, f64)]),
 }
 
-impl Amounts<'_> {
+impl PlaneValues<'_> {
     /// Calls `visit(voxel, amount)` for all that are not zero, ascending.
     pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
         let mut all = |amounts: &mut dyn Iterator<Item = f64>| {
@@ -48,7 +48,7 @@ fn add_scaled<R: Real>(amounts: &[R], factor: f64, sums: &mut [f64]) {
     sums.iter_mut().zip(amounts).for_each(|(sum, amount)| *sum += factor * amount.to_f64());
 }
 
-impl<'a> From<Plane<'a>> for Amounts<'a> {
+impl<'a> From<Plane<'a>> for PlaneValues<'a> {
     fn from(plane: Plane<'a>) -> Self {
         match plane {
             Plane::Zero => Self::Nothing,
@@ -64,7 +64,7 @@ pub trait BlockPlanes: Send + Sync {
     fn voxels(&self) -> usize;
 
     /// The amounts of a plane, which may be in `room`.
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Room) -> Result<Amounts<'a>>;
+    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
     /// Nonzero coefficients, and stored bytes that were read for them.
     fn held(&self) -> [u64; 2];
@@ -72,25 +72,25 @@ pub trait BlockPlanes: Send + Sync {
 
 /// Room for the amounts of a plane while they are made.
 #[derive(Debug, Default)]
-pub struct Room {
+pub struct Scratch {
     pub(super) bytes: Vec<u8>,
     pub(super) single: Vec<f32>,
     pub(super) double: Vec<f64>,
 }
 
-impl Room {
+impl Scratch {
     /// The samples that lie in `bytes`, of which none is missing.
-    pub(super) fn samples(&mut self, ty: SampleType) -> Amounts<'_> {
+    pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();
         if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
             // Singles do not hold them.
             self.double.resize(count, 0.0);
             load_as(ty, &self.bytes, &mut self.double, |v| v);
-            return Amounts::Double(&self.double);
+            return PlaneValues::Double(&self.double);
         }
         self.single.resize(count, 0.0);
         load_as(ty, &self.bytes, &mut self.single, |v| v as f32);
-        Amounts::Single(&self.single)
+        PlaneValues::Single(&self.single)
     }
 
     /// Those with zeros for what is missing; or, if `absent`, a 1 for that and zeros else.
@@ -99,7 +99,7 @@ impl Room {
         ty: SampleType,
         absent: bool,
         is_missing: impl Fn(usize, f64) -> bool,
-    ) -> Amounts<'_> {
+    ) -> PlaneValues<'_> {
         self.double.resize(self.bytes.len() / ty.size(), 0.0);
         load_as(ty, &self.bytes, &mut self.double, |v| v);
         for (index, v) in self.double.iter_mut().enumerate() {
@@ -109,23 +109,23 @@ impl Room {
                 (false, false) => *v,
             };
         }
-        Amounts::Double(&self.double)
+        PlaneValues::Double(&self.double)
     }
 }
 
 /// A 1 for each of so many voxels.
 #[derive(Debug)]
-pub(super) struct OnesOf(pub(super) usize);
+pub(super) struct UnitValues(pub(super) usize);
 
-impl BlockPlanes for OnesOf {
+impl BlockPlanes for UnitValues {
     fn voxels(&self) -> usize {
         self.0
     }
 
-    fn plane<'a>(&'a self, _: usize, room: &'a mut Room) -> Result<Amounts<'a>> {
+    fn plane<'a>(&'a self, _: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         room.single.clear();
         room.single.resize(self.0, 1.0);
-        Ok(Amounts::Single(&room.single))
+        Ok(PlaneValues::Single(&room.single))
     }
 
     fn held(&self) -> [u64; 2] {

@@ -13,7 +13,7 @@ pub const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// What makes samples into channels.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Painter {
+pub struct ColourTransform {
     /// The colours of values.
     pub colours: TransferFunction,
     /// The type of the samples that are coloured.
@@ -22,7 +22,7 @@ pub struct Painter {
     pub missing_value: Option<f64>,
 }
 
-impl Painter {
+impl ColourTransform {
     /// The type of a channel's samples: 0 to 1, NaN what is missing.
     pub const SAMPLE: SampleType = SampleType::F32;
 
@@ -69,21 +69,21 @@ impl Painter {
 }
 
 /// One channel of the colours of a window's samples.
-pub(crate) struct Coloured<'a, W> {
+pub(crate) struct ColourWindow<'a, W> {
     pub(crate) window: W,
-    pub(crate) painter: &'a Painter,
+    pub(crate) colour_transform: &'a ColourTransform,
     pub(crate) channel: usize,
 }
 
-impl<'a, W: Deref<Target = dyn FrameWindow + 'a> + Send + Sync> FrameWindow for Coloured<'_, W> {
+impl<'a, W: Deref<Target = dyn FrameWindow + 'a> + Send + Sync> FrameWindow for ColourWindow<'_, W> {
     fn frames(&self) -> usize {
         self.window.frames()
     }
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        let mut samples = vec![0; region.voxels() * self.painter.sample.size()];
+        let mut samples = vec![0; region.voxels() * self.colour_transform.sample.size()];
         self.window.read_box(frame, region, &mut samples)?;
-        self.painter.paint(self.channel, &samples, out);
+        self.colour_transform.paint(self.channel, &samples, out);
         Ok(())
     }
 
@@ -100,10 +100,10 @@ impl<'a, W: Deref<Target = dyn FrameWindow + 'a> + Send + Sync> FrameWindow for 
 mod tests {
     use super::*;
 
-    fn painted(painter: &Painter, channel: usize, values: &[f64]) -> Vec<f32> {
+    fn painted(colour_transform: &ColourTransform, channel: usize, values: &[f64]) -> Vec<f32> {
         let samples: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let mut out = vec![0; values.len() * 4];
-        painter.paint(channel, &samples, &mut out);
+        colour_transform.paint(channel, &samples, &mut out);
         out.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
     }
 
@@ -111,12 +111,13 @@ mod tests {
     fn values_become_the_channels_of_their_colours_and_what_is_missing_nan() {
         let points = vec![(0.0, [0.0, 0.5, 1.0]), (2.0, [1.0, 0.5, 0.0])];
         let nan = Some([0.25; 3]);
-        let colours = TransferFunction::of_points(points, crate::colour::Space::Rgb, None, nan).expect("two points");
-        let painter = Painter { colours, sample: SampleType::F64, missing_value: Some(1.0) };
+        let colours =
+            TransferFunction::of_points(points, crate::colour::ColourSpace::Rgb, None, nan).expect("two points");
+        let colour_transform = ColourTransform { colours, sample: SampleType::F64, missing_value: Some(1.0) };
         let values = [0.0, -0.0, 0.5, 0.5, 3.0, 1.0, f64::NAN, f64::INFINITY, -7.0];
         let missing = |v: &f32| v.is_nan();
         for (channel, expected) in [[0.0, 0.25, 1.0], [0.5; 3], [1.0, 0.75, 0.0]].into_iter().enumerate() {
-            let found = painted(&painter, channel, &values);
+            let found = painted(&colour_transform, channel, &values);
             assert_eq!([found[1], found[3], found[4]], expected);
             assert_eq!((found[0], found[2], found[8]), (found[1], found[3], expected[0]));
             assert!(found[5..8].iter().all(missing) && found.iter().filter(|v| missing(v)).count() == 3);

@@ -10,14 +10,14 @@ pub(super) const TILE: usize = 64;
 
 /// A rectangle of pixels.
 #[derive(Debug, Clone)]
-pub(super) struct Place {
+pub(super) struct TileRect {
     /// Columns of the picture.
     pub(super) x: Range<usize>,
     /// Rows of the picture.
     pub(super) y: Range<usize>,
 }
 
-impl Place {
+impl TileRect {
     /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels wide.
     pub(super) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn tiles_cover_each_pixel_once() {
         let mut seen = vec![0; 150 * 100];
-        for place in Place::cover(150, 30..100, TILE) {
+        for place in TileRect::cover(150, 30..100, TILE) {
             for y in place.y.clone() {
                 place.x.clone().for_each(|x| seen[y * 150 + x] += 1);
             }

@@ -1,6 +1,6 @@
 //! What a block adds to a picture: for each voxel some amounts in planes, and how the planes are used.
 
-use super::amounts::{BlockPlanes, Room};
+use super::plane_values::{BlockPlanes, Scratch};
 pub(super) use super::splat::Order;
 use crate::base::error::Result;
 
@@ -65,14 +65,14 @@ impl Layout {
 
 /// What a block adds to the planes: for each voxel in array order, some (plane, amount).
 #[derive(Debug)]
-pub(super) struct Terms {
+pub(super) struct SparseTerms {
     /// Where those of each voxel end.
     ends: Vec<u32>,
     planes: Vec<u16>,
     amounts: Vec<f64>,
 }
 
-impl Terms {
+impl SparseTerms {
     /// What those of a voxel take in so many planes, at most: as they are found, in a vector that grows, and in place.
     pub(super) const fn most_bytes(planes: usize) -> usize {
         planes * (2 * size_of::<(u32, u16, f64)>() + 2 + 8) + 2 * size_of::<u32>()
@@ -80,7 +80,7 @@ impl Terms {
 
     /// What a block has in so many planes.
     pub(super) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
-        let (mut found, mut room) = (Vec::new(), Room::default());
+        let (mut found, mut room) = (Vec::new(), Scratch::default());
         let mut ends = vec![0_u32; block.voxels() + 1];
         for plane in 0..planes {
             block.plane(plane, &mut room)?.for_each(|voxel, amount| {
@@ -114,7 +114,7 @@ impl Terms {
 
 #[cfg(test)]
 mod tests {
-    use super::super::amounts::Amounts;
+    use super::super::plane_values::PlaneValues;
     use super::*;
 
     #[test]
@@ -141,14 +141,14 @@ mod tests {
             fn voxels(&self) -> usize {
                 3
             }
-            fn plane<'a>(&'a self, plane: usize, _: &'a mut Room) -> Result<Amounts<'a>> {
-                Ok([Amounts::Single(&[0.0, 1.5, 2.0]), Amounts::Nothing, Amounts::Few(&[(2, -1.0)])][plane])
+            fn plane<'a>(&'a self, plane: usize, _: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+                Ok([PlaneValues::Single(&[0.0, 1.5, 2.0]), PlaneValues::Nothing, PlaneValues::Few(&[(2, -1.0)])][plane])
             }
             fn held(&self) -> [u64; 2] {
                 [0; 2]
             }
         }
-        let terms = Terms::of(&Three, 3).expect("no block fails here");
+        let terms = SparseTerms::of(&Three, 3).expect("no block fails here");
         assert_eq!(terms.of_voxel(0), (&[][..], &[][..]));
         assert_eq!(terms.of_voxel(1), (&[0][..], &[1.5][..]));
         assert_eq!(terms.of_voxel(2), (&[0, 2][..], &[2.0, -1.0][..]));

@@ -9,7 +9,7 @@ use std::fmt::Display;
 /// What the pictures of a run were made with: no path, no date, nothing that threads or memory change. Keys are named as the
 /// options are where there is one, and text is as these take it.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Made {
+pub struct Provenance {
     /// Name and version of the program.
     pub software: String,
     /// Whether coefficients or frames were splatted.
@@ -95,22 +95,22 @@ impl SinkConfig {
     }
 
     fn texts(&self, shown: &[(usize, usize)], views: &[ViewReport]) -> Vec<(String, String)> {
-        let Ok(Value::Object(all)) = serde_json::to_value(self.made.as_ref()) else { return Vec::new() };
+        let Ok(Value::Object(all)) = serde_json::to_value(self.provenance.as_ref()) else { return Vec::new() };
         let of_run = all.iter().filter(|(key, _)| !["software", "frames", "times"].contains(&key.as_str()));
         let mut texts: Vec<(&str, String)> = of_run.map(|(key, value)| (key.as_str(), text(value))).collect();
         texts.extend(of_views(views, shown));
         texts.extend(self.of_frames(shown));
         texts.retain(|(_, text)| !text.is_empty());
         let named = texts.into_iter().map(|(key, text)| (format!("{PREFIX}{key}"), text));
-        std::iter::once(("Software".into(), self.made.software.clone())).chain(named).collect()
+        std::iter::once(("Software".into(), self.provenance.software.clone())).chain(named).collect()
     }
 
     /// Which frames, and of a single one its time.
     fn of_frames(&self, shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
         let mut frames: Vec<usize> = shown.iter().map(|(_, frame)| *frame).collect();
         frames.dedup();
-        let at = self.made.frames.iter().position(|frame| [*frame] == frames[..]);
-        let time = at.and_then(|at| self.made.times.get(at)).map(f64::to_string);
+        let at = self.provenance.frames.iter().position(|frame| [*frame] == frames[..]);
+        let time = at.and_then(|at| self.provenance.times.get(at)).map(f64::to_string);
         vec![("frames", spans(&frames)), ("time", time.unwrap_or_default())]
     }
 }
