@@ -11,12 +11,12 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
+use wavesplat::convert::{ConvertConfig, PartialFile, SchemeConstraint, SpatialPredictor, resume};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
 use wavesplat::file::verify::verify;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::Metadata;
+use wavesplat_format::{Metadata, Unfinished};
 use xxhash_rust::xxh3::xxh3_64;
 
 fn folder() -> PathBuf {
@@ -90,15 +90,50 @@ fn window(basis: Basis) -> usize {
     if basis == Basis::Multi { 9 } else { 8 }
 }
 
+/// What a feature's golden file was made from.
+fn source(seed: usize, (ty, kind, mask): (SampleType, Kind, Mask)) -> Memory {
+    let grid = Grid { dims: [11, 7, 6], spacing: [1.0, 0.5, 2.0], origin: [0.0, -1.0, 3.0] };
+    Memory::new(grid, ty, volume(kind, ty, mask, grid.whole().voxels(), 20, seed as u64))
+}
+
+#[test]
+fn golden_files_are_continued_under_their_own_id() {
+    for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
+        let config = ConvertConfig { block: Some(6), ..config };
+        let golden = fs::read(folder().join(format!("{name}.wspl"))).unwrap();
+        let cut = &golden[..golden.len() * 2 / 3];
+        let unfinished = Unfinished::read(&cut).unwrap();
+        assert!(!unfinished.metadata().windows.is_empty(), "{name}: whole windows are left");
+        let (id, mut bytes) = (unfinished.id(), golden[..unfinished.bytes() as usize].to_vec());
+        let begun = Some(PartialFile { unfinished, before: 0 });
+        let mut memory = source(seed, (ty, kind, mask));
+        resume(&mut memory, &config, begun, Path::new("a.wspl"), &mut bytes, &Silent).unwrap();
+        let work = tempfile::tempdir().unwrap();
+        let path = work.path().join("continued.wspl");
+        fs::write(&path, &bytes).unwrap();
+        let file = open(&path);
+        assert_eq!(file.id(), id, "{name}");
+        assert_eq!(file.metadata(), open(&folder().join(format!("{name}.wspl"))).metadata(), "{name}");
+        assert_eq!(bytes, golden, "{name}");
+    }
+}
+
+#[test]
+fn a_file_id_follows_from_the_encoded_start_and_the_first_digest() {
+    let (_, ty, kind, mask, config) = features().swap_remove(0);
+    let file = stored(&mut source(0, (ty, kind, mask)), &config).open();
+    let mut bytes = file.metadata().start().encode().unwrap();
+    bytes.extend(file.metadata().windows[0].digest.to_le_bytes());
+    assert_eq!(file.id().0, xxhash_rust::xxh3::xxh3_128(&bytes).to_le_bytes());
+}
+
 /// Writes what is not there yet, and nothing else.
 #[test]
 #[ignore = "writes golden files of new features"]
 fn golden_files_are_made() {
-    let grid = Grid { dims: [11, 7, 6], spacing: [1.0, 0.5, 2.0], origin: [0.0, -1.0, 3.0] };
     for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
-        let data = volume(kind, ty, mask, grid.whole().voxels(), 20, seed as u64);
         let config = ConvertConfig { block: Some(6), ..config };
-        keep(&name, &stored(&mut Memory::new(grid, ty, data), &config).bytes());
+        keep(&name, &stored(&mut source(seed, (ty, kind, mask)), &config).bytes());
     }
     let mut damaged = fs::read(folder().join("haar-u8.wspl")).unwrap();
     let place = damaged.windows(4).position(|bytes| bytes == b"BLCK").unwrap();

@@ -1,9 +1,10 @@
 //! The fixed header: what the file is, which version and features it needs, and whose parts belong to it.
 
 use crate::bytes::{Check, Fields, Put};
+use crate::metadata::Metadata;
 use crate::{Error, Result};
 use std::fmt;
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::{xxh3_64, xxh3_128};
 
 /// Bytes of the header.
 pub(crate) const HEADER: usize = 128;
@@ -20,6 +21,19 @@ const REQUIRED: [&str; 0] = [];
 /// A file's identity, derived from settings and data by whoever writes it; every checksum is tied to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct FileId(pub [u8; 16]);
+
+impl FileId {
+    /// The id of a conversion: XXH3-128 of the start record's bytes followed by the digest of the first window
+    /// (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if `metadata` cannot be encoded.
+    pub fn derive(metadata: &Metadata, first_digest: u64) -> Result<Self> {
+        let mut bytes = metadata.start().encode()?;
+        bytes.put_u64(first_digest);
+        Ok(Self(xxh3_128(&bytes).to_le_bytes()))
+    }
+}
 
 impl fmt::Display for FileId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -15,7 +15,6 @@ use crossbeam::channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_format::{BlockId, FileId, Window};
-use xxhash_rust::xxh3::xxh3_128;
 
 /// Some blocks of one window: their samples, frame by frame.
 #[derive(Debug)]
@@ -39,10 +38,10 @@ pub(super) fn read(
         Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
         _ => Vec::new(),
     };
-    let (id, range, scheme) = (None, None, None);
+    let (id, range, scheme) = (done.id, None, None);
     let mut reader = WindowReader { config, plan, idle, archive, pixels, range, id, scheme, frames: 0, before: 0 };
     done.windows[..done.before].iter().for_each(|window| reader.take_over(window));
-    (reader.before, reader.id) = (reader.frames, done.id.filter(|_| done.before > 0));
+    reader.before = reader.frames;
     let mut busy = Duration::ZERO;
     for index in done.before.. {
         let started = Instant::now();
@@ -134,8 +133,7 @@ impl WindowReader<'_> {
     fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
         let seen = self.scan(window)?;
         window.check_unchanged()?;
-        let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
-        if Some(id) != done.id || seen.digest != known.digest || window.frames() != known.frames as usize {
+        if seen.digest != known.digest || window.frames() != known.frames as usize {
             let (first, end) = (known.first_frame, known.first_frame + u64::from(known.frames));
             let what = format!(
                 "frames {first}..{end} are not those that were converted before, of which {} holds the windows",
@@ -145,6 +143,14 @@ impl WindowReader<'_> {
         }
         self.take_over(known);
         Ok(())
+    }
+
+    /// The file's id: that of the file which is continued, or a new one that follows from the first window's digest.
+    fn id(&mut self, digest: u64) -> Result<FileId> {
+        let new = || FileId::derive(&self.plan.start, digest).map_err(|e| Error::usage(e.to_string()));
+        let id = self.id.map_or_else(new, Ok)?;
+        self.id = Some(id);
+        Ok(id)
     }
 
     /// Looks at the samples of a window as they are read.
@@ -179,7 +185,7 @@ impl WindowReader<'_> {
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
-        let id = *self.id.get_or_insert_with(|| file_id(self.plan, seen.digest));
+        let id = self.id(seen.digest)?;
         let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
         let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
         let first_frame = self.frames;
@@ -269,10 +275,3 @@ fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindo
 
 /// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
 const ANEW: usize = 8;
-
-/// A name for the file that follows from settings and the digest of its first window: the same conversion has the same
-/// one everywhere.
-fn file_id(plan: &Plan<'_>, digest: u64) -> FileId {
-    let all = format!("{:?} {digest}", plan.start);
-    FileId(xxh3_128(all.as_bytes()).to_le_bytes())
-}

@@ -318,6 +318,9 @@ impl WindowsDone {
         if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
             return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
         }
+        if *before == 0 && held.start() != plan.start {
+            return Err(Error::usage(format!("{}: was begun with other settings", name.display())));
+        }
         Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before, name: name.into() })
     }
 }
