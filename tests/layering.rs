@@ -26,9 +26,12 @@ const HOMES: [(&str, &[&str]); 22] = [
             "convert/choose.rs",
             "convert/sampled.rs",
             "source/scan.rs",
-            "render/canvas.rs",
+            "render/splat/accumulator.rs",
+            "render/splat/band.rs",
+            "render/splat/footprints.rs",
+            "render/splat/lattice_bands.rs",
             "render/plan.rs",
-            "render/weights.rs",
+            "render/weigh.rs",
             "extract/mod.rs",
             "file/coefficient_file.rs",
             "file/verify.rs",
@@ -99,6 +102,49 @@ fn rooms_use_lower_floors_only() {
             let to: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
             let Some(other) = floor(&to) else { continue };
             assert!(to == from || other < own, "src/{path}: {from} may not use {to}");
+        }
+    }
+}
+
+/// Folders whose `mod.rs` lists the modules in the order of the data's path: each uses only those listed before it.
+const ORDERED: [&str; 5] = ["base", "view", "file", "render", "render/splat"];
+
+/// The modules of a folder, in the order of its `mod.rs`.
+fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
+    let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/mod.rs")).expect("a folder with a mod.rs");
+    let module = |line: &str| Some(line.split("mod ").nth(1)?.strip_suffix(';')?.to_string());
+    code.lines().filter(|line| !line.starts_with(' ')).filter_map(module).collect()
+}
+
+/// The modules of a folder that a file below it names.
+fn siblings<'a>(folder: &str, below: &str, code: &'a str) -> impl Iterator<Item = &'a str> {
+    let is_direct = !below.contains('/') || below.ends_with("/mod.rs") && below.matches('/').count() == 1;
+    let prefix = if below.contains('/') { "super::super::" } else { "super::" };
+    let absolute = format!("crate::{}::", folder.replace('/', "::"));
+    let relative = move |code: &'a str| code.split(prefix).skip(usize::from(is_direct));
+    let named = |rest: &'a str| rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
+    let from_root: Vec<&str> = code.split(absolute.as_str()).skip(1).map(named).collect();
+    let from_here: Vec<&str> = if is_direct { relative(code).map(named).collect() } else { Vec::new() };
+    from_root.into_iter().chain(from_here)
+}
+
+#[test]
+fn modules_are_listed_from_the_lowest_to_the_highest() {
+    let all = sources();
+    for folder in ORDERED {
+        let order = listed(folder, &all);
+        assert!(order.len() > 1, "{folder} lists its modules");
+        for (path, code) in &all {
+            let Some(below) = path.strip_prefix(&format!("{folder}/")) else { continue };
+            let own = below.split('/').next().unwrap().trim_end_matches(".rs");
+            let Some(at) = order.iter().position(|module| module == own) else { continue };
+            for used in siblings(folder, below, code) {
+                let Some(other) = order.iter().position(|module| module == used) else { continue };
+                assert!(
+                    other <= at,
+                    "src/{path}: {own} is listed before {used} in {folder}/mod.rs, so it may not use it"
+                );
+            }
         }
     }
 }

@@ -12,14 +12,15 @@
 //! since the mean over the cut and that beyond it are both means of values in V. Where samples are missing, C counts the
 //! weights that are present; T may count all, since T / (C + T) grows with T.
 //!
-//! The r_i come from the directory by way of [`super::reading`] into the error planes (`SparseTerms::add_errors`), whose sums
-//! [`super::finish`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
+//! The r_i come from the directory by way of the selection of a batch into the error planes , whose sums
+//! [`super::reconstruct`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
 //! their absolute values, a weight by what [`weight_rounding`] says, and the inverse transform by [`INVERSE`]. A mean is
 //! off by that of its emission, and by that of its weights times itself.
 
+use super::config::Quantity;
 use super::scene::FrameBounds;
+use super::splat::ViewSetup;
 use super::weights::PixelWeight;
-use super::{Quantity, ViewSetup};
 use crate::base::sample::magnitude;
 use crate::view::footprint::Method;
 

@@ -4,7 +4,29 @@ use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::colour::TransferFunction;
 use crate::view::camera::View;
-use crate::view::footprint::Kernel;
+use crate::view::footprint::{Kernel, Method};
+
+/// A pixel is background where its weights sum to less than this share of the view's largest sum.
+pub(super) const BACKGROUND: f64 = 0.01;
+
+/// The default splat error for a file of this tolerance, or for frames: half the tolerance, at most 1e-3.
+pub fn default_splat_error(tolerance: Option<f64>) -> f64 {
+    tolerance.map_or(f64::INFINITY, |t| t / 2.0).min(1e-3)
+}
+
+/// The cheapest footprints within an error.
+pub fn splat_method(quantity: Quantity, error: f64) -> Method {
+    Method::within(most_splat_error(quantity, error))
+}
+
+/// The error that splatting may add.
+pub(super) fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
+    match quantity {
+        Quantity::Emission => error,
+        // A pixel that is not background must keep some of its weights.
+        Quantity::Mean => error.min(0.9 * BACKGROUND),
+    }
+}
 
 /// What a pixel means (method.md section 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,8 +13,8 @@
 //! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
 //! voxels, and what is missing to be there.
 
+use super::config::{Quantity, RenderConfig};
 use super::weights::WeightedView;
-use super::{Quantity, RenderConfig};
 use crate::base::grid::{Grid, Region};
 use std::f64::consts::PI;
 
@@ -29,20 +29,18 @@ pub struct Expectation<'a> {
     unit: f64,
     /// a / w.
     area: f64,
-    /// n.
-    footprint: f64,
 }
 
 /// What a block's errors, of a mean square of 1, come to in the mean square over pixels.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Seen {
+pub(super) struct BlockInfluence {
     /// If all err together.
     together: f64,
     /// If each errs by itself.
     apart: f64,
 }
 
-impl Seen {
+impl BlockInfluence {
     /// If `alike` err as one: F.
     pub(super) fn of(&self, alike: f64) -> f64 {
         if alike.is_finite() { (alike * self.apart).min(self.together) } else { self.together }
@@ -63,8 +61,8 @@ impl<'a> Expectation<'a> {
         }
         let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
         let unit = if config.quantity == Quantity::Mean { 1.0 } else { squares / pixels };
-        let (area, footprint) = (weighted.setup.footprint.area(), footprint(config, &weighted.setup.grid));
-        Self { weighted, quantity: config.quantity, pixels, unit, area, footprint }
+        let area = weighted.setup.footprint.area();
+        Self { weighted, quantity: config.quantity, pixels, unit, area }
     }
 
     /// The mean square over pixels that samples come to which all are off by `error`.
@@ -72,16 +70,10 @@ impl<'a> Expectation<'a> {
         error * error * self.unit
     }
 
-    /// F of boxes of `side` voxels: the same for all views.
-    pub(super) fn alike(&self, side: f64) -> f64 {
-        let across = (1.0 + self.footprint) / (1.0 + self.footprint / (side * side));
-        side * across
-    }
-
     /// What the errors of the block at `region` come to.
-    pub(super) fn of_block(&self, region: &Region) -> Seen {
+    pub(super) fn of_block(&self, region: &Region) -> BlockInfluence {
         let clip = region.intersect(&self.weighted.setup.clip);
-        let mut seen = Seen::default();
+        let mut seen = BlockInfluence::default();
         let mut points = 0.0;
         for voxel in spread(&clip) {
             let one = self.of_voxel(voxel);
@@ -90,19 +82,26 @@ impl<'a> Expectation<'a> {
             seen.apart += one.apart;
         }
         let share = clip.voxels() as f64 / (self.pixels * f64::max(points, 1.0));
-        Seen { together: seen.together * share, apart: seen.apart * share }
+        BlockInfluence { together: seen.together * share, apart: seen.apart * share }
     }
 
     /// Summed over pixels.
-    fn of_voxel(&self, voxel: [usize; 3]) -> Seen {
+    fn of_voxel(&self, voxel: [usize; 3]) -> BlockInfluence {
         let WeightedView { setup, weights } = self.weighted;
         let [x, y, z] = setup.camera.project(setup.grid.position(voxel));
-        let Some(sum) = weights.near([x, y], setup.footprint.reach) else { return Seen::default() };
+        let Some(sum) = weights.near([x, y], setup.footprint.reach) else { return BlockInfluence::default() };
         let weight = setup.footprint.at_depth(z);
         let unit = if self.quantity == Quantity::Mean { 1.0 } else { sum * sum };
         let together = self.area * weight / sum * unit;
-        Seen { together, apart: together * (0.5 * weight / sum) }
+        BlockInfluence { together, apart: together * (0.5 * weight / sum) }
     }
+}
+
+/// F of boxes of `side` voxels: how many voxels err as one. The same for all views.
+pub(super) fn alike(config: &RenderConfig, grid: &Grid, side: f64) -> f64 {
+    let footprint = footprint(config, grid);
+    let across = (1.0 + footprint) / (1.0 + footprint / (side * side));
+    side * across
 }
 
 /// n: the voxels of a footprint.

@@ -1,78 +1,65 @@
-//! A scene to pictures (method.md sections 6 and 7): splat the planes of a group of frames, then invert every pixel.
+//! A scene to pictures (method.md sections 6 and 7): splat the planes of a batch of frames, then invert every pixel.
+//!
+//! The modules are listed in the order in which a code becomes a pixel; each uses only those above it.
+//!
+//! ```text
+//! config            what is asked for
+//! layout            the planes of a batch; plane_values: a block's values, plane by plane
+//! splat/            a view's camera and backend; blocks into bands; bands into tiles
+//! weights           what a mean divides by; expectation: how errors of blocks show in a view
+//! scene             where blocks come from: a batch of frames, and the blocks that are selected for it
+//! scenes/           a coefficient file or an archive's frames as a scene
+//! slabs/            composites and largest values: the volume in slabs
+//! plan              what fits in memory; weigh: the weights of a view
+//! reconstruct       planes to pixels: inverse transform, division, certificate
+//! driver            the loop over batches of frames
+//! project, composite   what is made of each batch
+//! annotate/, sink/  letters and files
+//! ```
 //!
 //! ```text
 //! for some views                               plan: as many as fit in memory
-//!   for each group of frames of a window       plan: as many as fit
+//!   for each batch of frames of a window       driver: as many as fit; the scene selects its blocks
 //!     for each band of rows
-//!       for each batch of blocks               scene: read, decode            (workers)
-//!         every plane of every view takes it   lattice: amounts -> cells      (one owner per plane)
-//!       every tile inverts its pixels          lattice: cells -> planes of pixels
-//!                                              finish: planes -> frames, then / weights; certificate
+//!       for each run of blocks                 scene: read, decode                          (workers)
+//!         every plane of every view takes it   splat: values -> cells or tiles              (one owner each)
+//!       every tile inverts its pixels          reconstruct: planes -> frames, then / weights; certificate
 //!     give the finished frames to the sink
 //! ```
-//!
-//! Where footprints are less work, where the lattice of the view is not near enough, and where pictures are certified, every
-//! tile splats the terms of the batch itself (`splat`). All planes go the same way, weights and what is missing included, so
-//! that means stay means. Composites and largest values go slab by slab (`slabs`).
 
-mod plane_values;
-pub mod annotate;
-mod accumulator;
-mod certificate;
-mod coded;
-mod coefficients;
 mod config;
-mod expectation;
-mod view_setup;
-mod reconstruct;
-mod frames;
-mod lattice;
-mod tile_rect;
-mod plan;
-mod project;
-mod select;
-mod report;
-mod scene;
-pub mod sink;
-mod slabs;
+mod layout;
+mod plane_values;
 mod splat;
-mod sparse_terms;
-mod reference_weights;
 mod weights;
+mod expectation;
+mod scene;
+mod report;
+mod scenes;
+mod slabs;
+mod plan;
+mod certificate;
+mod weigh;
+mod reconstruct;
+mod driver;
+mod project;
+mod composite;
+pub mod annotate;
+pub mod sink;
 
-pub use coefficients::{CoefficientScene, SplatSource};
-pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig};
+pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
-pub use frames::FrameScene;
-pub use report::{RenderReport, ViewReport};
+pub use report::{Picture, RenderReport, Rendered, ViewReport};
 pub use scene::{LeftOut, Scene};
+pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
-use crate::view::footprint::Method;
 use plan::Budget;
+use splat::ViewSetup;
+use splat::reference_weights::without_what_is_dim;
 use std::time::{Duration, Instant};
-use view_setup::ViewSetup;
-
-/// A finished picture: as many numbers as the scene has channels for each of `width * height` pixels, row by row.
-pub type Picture<'a> = &'a [f32];
-
-/// A frame as it was rendered.
-#[derive(Debug, Clone, Copy)]
-pub struct Rendered<'a> {
-    /// How all views are splatted.
-    pub views: &'a [ViewReport],
-    /// The number of the view.
-    pub view: usize,
-    /// That of the frame.
-    pub frame: usize,
-    /// The quantity asked for.
-    pub picture: Picture<'a>,
-    /// If pictures are certified, a bound on the error of every pixel, in the same unit: against the picture of the
-    /// source's samples splatted without a cut and without rounding. NaN is background.
-    pub error: Option<Picture<'a>>,
-}
 
 /// Renders all frames from all views, giving each to `sink`; those of one view come in order.
 pub fn render(
@@ -96,7 +83,7 @@ pub fn render(
     if config.mode.is_projection() {
         project::project(scene, config, &setups, progress, &mut report, &mut sink)?;
     } else {
-        slabs::render(scene, config, &setups, progress, &mut report, &mut sink)?;
+        composite::composite(scene, config, &setups, progress, &mut report, &mut sink)?;
     }
     progress.finish();
     report.sum_up_expected_errors();
@@ -123,38 +110,16 @@ fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
             "--mode: the samples are colours already, of which only projections are made; leave it out, or convert without --transfer-function",
         ));
     }
-    let setup = |view: &View| reference_weights::without_what_is_dim(ViewSetup::new(scene, config, view)?, config);
+    let volume = (*scene.grid(), scene.blocks());
+    let setup = |view: &View| without_what_is_dim(ViewSetup::new(volume, config, view)?, config);
     let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
     match config.mode {
         Mode::Projection => Budget::check(config, scene, &setups)?,
         _ => {
-            setups.iter().try_for_each(|setup| Budget::check(config, scene, &slabs::cut(setup, config)?.setups[..1]))?
+            setups
+                .iter()
+                .try_for_each(|setup| Budget::check(config, scene, &slabs::cut(setup, config)?.setups[..1]))?;
         }
     }
     Ok(setups)
-}
-
-/// What splatting may add by default to pictures of a file of such a tolerance, or of frames: half of that, at most 1e-3.
-pub fn default_splat_error(tolerance: Option<f64>) -> f64 {
-    tolerance.map_or(f64::INFINITY, |t| t / 2.0).min(1e-3)
-}
-
-/// The cheapest splat method within an error.
-pub fn splat_method(quantity: Quantity, error: f64) -> Method {
-    Method::within(most_splat_error(quantity, error))
-}
-
-/// What splatting may be off by.
-fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
-    match quantity {
-        Quantity::Emission => error,
-        // A pixel that is not background must keep some of its weights.
-        Quantity::Mean => error.min(0.9 * view_setup::BACKGROUND),
-    }
-}
-
-/// Adds the seconds since `clock` to a stage, and restarts it.
-fn lap(clock: &mut Instant, stage: &mut f64) {
-    *stage += clock.elapsed().as_secs_f64();
-    *clock = Instant::now();
 }

@@ -3,13 +3,14 @@
 //! Neither the number of views and frames that are rendered together, nor the rows in a band, nor the blocks in a batch
 //! changes a pixel.
 
+use super::config::{Mode, RenderConfig};
+use super::layout::Layout;
 use super::scene::Scene;
 use super::slabs;
-use super::sparse_terms::{Layout, SparseTerms};
-use super::splat::Splats;
-use super::tile_rect::TILE;
-use super::view_setup::ViewSetup;
-use super::{Mode, RenderConfig};
+use super::splat::ViewSetup;
+use super::splat::footprints::Splats;
+use super::splat::sparse_terms::SparseTerms;
+use super::splat::tile_rect::TILE;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::memory;
@@ -116,27 +117,23 @@ impl<'a> Budget<'a> {
 
     /// A block, and if there are tiles to splat its terms and where they are in each view.
     fn block_bytes(&self, planes: usize) -> usize {
-        let footprints = self.setups.iter().filter(|setup| setup.lattice.is_none()).count();
+        let footprints = self.setups.iter().filter(|setup| !setup.backend.is_lattice()).count();
         let terms = if footprints > 0 { SparseTerms::most_bytes(planes) } else { 0 };
         let shares = slabs::of_block(self.setups, &self.block).1;
         self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES + shares)
     }
 
-    /// Finished pictures of a group.
+    /// Finished pictures of a batch.
     fn picture_bytes(&self, frames: usize) -> usize {
         (frames * self.pixel_bytes + self.together) * self.pixels()
     }
 
     /// Bands of so many rows with all planes, and what threads work with.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
-        let band = |setup: &ViewSetup| match &setup.lattice {
-            Some(lattice) => lattice.band_cells(self.size[0], rows),
-            None => self.size[0] * rows.next_multiple_of(TILE),
-        };
-        let lattices = self.setups.iter().filter_map(|setup| setup.lattice.as_ref());
+        let band = |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows);
         let sliced = self.setups.iter().any(|setup| setup.slab.is_some());
         let gathered = if sliced { planes.max(slabs::TOGETHER) } else { planes };
-        let scratch = lattices.map(|lattice| lattice.scratch(&self.block, gathered)).max().unwrap_or(0);
+        let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, gathered)).max().unwrap_or(0);
         let numbers = planes * self.setups.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
         numbers * size_of::<f64>()
     }
@@ -160,7 +157,7 @@ impl<'a> Budget<'a> {
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
         // What a lattice takes in plane by plane had better be near.
-        let most = if self.setups.iter().any(|setup| setup.lattice.is_some()) {
+        let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
         } else {
             memory::MOST_BLOCKS
@@ -182,23 +179,23 @@ fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     memory::FIXED + config.reserved + more
 }
 
-/// An upper bound of the planes that some frames of a group need.
+/// An upper bound of the planes that some frames of a batch need.
 fn most_planes(scene: &dyn Scene, frames: usize, config: &RenderConfig) -> usize {
     scene.most_planes(frames, config) + usize::from(!config.mode.is_projection())
 }
 
-/// The most frames of one group.
+/// The most frames of one batch.
 fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {
     let mut most = 0;
     while let Some(first) = frames.first() {
-        let (group, later) = frames.split_at(in_group(scene, *first, frames));
-        (most, frames) = (most.max(group.len()), later);
+        let (batch, later) = frames.split_at(in_batch(scene, *first, frames));
+        (most, frames) = (most.max(batch.len()), later);
     }
     most
 }
 
-/// How many of some frames are of the same group as the first.
-pub(super) fn in_group(scene: &dyn Scene, first: usize, frames: &[usize]) -> usize {
-    let end = scene.group_end(first);
+/// How many of some frames are of the same batch as the first.
+pub(super) fn in_batch(scene: &dyn Scene, first: usize, frames: &[usize]) -> usize {
+    let end = scene.batch_end(first);
     frames.partition_point(|f| *f < end)
 }

@@ -70,6 +70,12 @@ pub trait BlockPlanes: Send + Sync {
     fn held(&self) -> [u64; 2];
 }
 
+/// Where blocks come from.
+pub(super) trait BlockSource: Sync {
+    /// Reads a block.
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
+}
+
 /// Room for the amounts of a plane while they are made.
 #[derive(Debug, Default)]
 pub struct Scratch {

@@ -1,14 +1,16 @@
-//! Projections: the planes of a group of frames of every view, and from these its pictures.
+//! Projections: every batch of frames is splatted into all views, and inverted at their pixels.
 
-use super::accumulator::{self, BandAccumulator, Blocks};
+use super::config::RenderConfig;
+use super::driver::{Job, RenderedBatch, for_each_batch};
 use super::expectation::Expectation;
-use super::plan::{self, Budget};
-use super::plane_values::BlockPlanes;
+use super::plan::Budget;
+use super::plane_values::{BlockPlanes, BlockSource};
 use super::reconstruct::PixelReconstructor;
-use super::scene::{BatchOutcome, FrameBatch, Scene};
-use super::view_setup::ViewSetup;
+use super::report::{RenderReport, Rendered, lap};
+use super::scene::{FrameBatch, Scene};
+use super::splat::{BandAccumulator, ViewSetup, splat};
+use super::weigh::weigh;
 use super::weights::WeightedView;
-use super::{RenderConfig, RenderReport, Rendered, lap};
 use crate::base::error::Result;
 use crate::base::progress::Progress;
 use std::borrow::Cow;
@@ -46,59 +48,77 @@ fn render_views(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
     let mut clock = Instant::now();
-    let weighted_views =
-        budget.setups().iter().map(|setup| WeightedView::new(setup, config, budget)).collect::<Result<Vec<_>>>()?;
-    let expectations: Vec<_> = weighted_views.iter().map(|weighted| Expectation::new(weighted, config)).collect();
+    let weighted = budget.setups().iter().map(|setup| weigh(setup, config, budget)).collect::<Result<Vec<_>>>()?;
+    let expectations: Vec<_> = weighted.iter().map(|view| Expectation::new(view, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
-    let (mut rest, count) = (config.frames.as_slice(), scene.channels());
-    while let Some(first) = rest.first() {
-        let most = plan::in_group(scene, *first, rest);
-        let (now, later) = rest.split_at(budget.frames(scene, config, most));
-        let channel =
-            |channel| render_channel(scene, config, (now, channel), (&weighted_views, &expectations), budget, report);
-        let channels = (0..count).map(channel).collect::<Result<Vec<_>>>()?;
-        for (i, view) in (first_view..).take(weighted_views.len()).enumerate() {
-            let expected = channels.iter().map(|views| views[i].1).sum::<f64>() / count as f64;
-            // Frame by frame, so that it is the same however frames are grouped.
-            now.iter().for_each(|_| report.views[view].expected_error += expected);
-            let pictures: Vec<&Pictures> = channels.iter().map(|views| &views[i].0).collect();
-            Pictures::give(&pictures, (view, now), sink)?;
+    let job = Job { config, budget, views: &expectations };
+    let render = |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &weighted, job, report);
+    for_each_batch(scene, job, report, render, |frames, channels, report| {
+        for i in 0..weighted.len() {
+            expect(&channels, i, frames.len(), &mut report.views[first_view + i].expected_error);
+            let pictures: Vec<&Pictures> = channels.iter().map(|channel| &channel.pictures[i]).collect();
+            Pictures::give(&pictures, (first_view + i, frames), sink)?;
         }
-        rest = later;
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
-/// Renders a channel of some frames from some views, again where more is found than its layout has room for: of each view the
-/// pictures, and the mean square of the errors that are expected.
-fn render_channel(
-    scene: &mut dyn Scene,
-    config: &RenderConfig,
-    (frames, channel): (&[usize], usize),
-    (weighted_views, expectations): (&[WeightedView<'_>], &[Expectation<'_>]),
-    budget: &Budget<'_>,
-    report: &mut RenderReport,
-) -> Result<Vec<(Pictures, f64)>> {
-    loop {
-        let before = report.clone();
-        let group = scene.group(frames, channel, config, &expectations[0])?;
-        let pictures = render_group(group.as_ref(), weighted_views, config, budget, report)?;
-        let expected = |expectation| group.expected(&weighted_views[0].setup.clip, expectation);
-        let expected = expectations.iter().map(expected).collect::<Result<Vec<_>>>()?;
-        match group.finish()? {
-            BatchOutcome::Complete => return Ok(pictures.into_iter().zip(expected).collect()),
-            BatchOutcome::NeedsRelayout => *report = before,
-        }
-    }
+/// Adds the errors that are expected in a view: frame by frame, so that the sum does not depend on how frames are batched.
+fn expect(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize, sum: &mut f64) {
+    let mean = channels.iter().map(|channel| channel.expected[view]).sum::<f64>() / channels.len() as f64;
+    (0..frames).for_each(|_| *sum += mean);
 }
 
-impl Blocks for &dyn FrameBatch {
+impl BlockSource for &dyn FrameBatch {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         FrameBatch::planes(*self, block)
     }
 }
 
-/// The pictures of a channel of a group from one view.
+/// Renders all frames of a batch from some views.
+fn render_batch(
+    batch: &dyn FrameBatch,
+    weighted: &[WeightedView<'_>],
+    Job { config, budget, .. }: Job<'_>,
+    report: &mut RenderReport,
+) -> Result<Vec<Pictures>> {
+    let layout = batch.layout();
+    let blocks = visible_blocks(batch, weighted, report);
+    let reconstructors: Vec<_> = weighted.iter().map(|view| PixelReconstructor::new(batch, view, config)).collect();
+    let empty = |pixels: &PixelReconstructor<'_>| vec![f32::NAN; pixels.planes() * budget.pixels()];
+    let mut pictures: Vec<Vec<f32>> = reconstructors.iter().map(empty).collect();
+    for rows in budget.bands(&layout) {
+        let mut bands: Vec<_> =
+            weighted.iter().map(|view| BandAccumulator::new(view.setup, rows.clone(), &layout)).collect();
+        report.add_splatted(&splat(&mut bands, (&blocks, budget.batch(&layout, rows.len())), &batch)?);
+        let mut clock = Instant::now();
+        for ((band, pixels), pictures) in bands.into_iter().zip(&reconstructors).zip(&mut pictures) {
+            band.finish(pictures, |tile, rows| pixels.tile(tile, rows));
+        }
+        lap(&mut clock, &mut report.inverse_seconds);
+    }
+    if config.certify {
+        let of_errors = pictures.iter().flat_map(|all| &all[layout.frames * budget.pixels()..]);
+        let largest = of_errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
+        report.certified_error = Some(largest);
+    }
+    Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
+}
+
+/// The selected blocks that a pixel sees; counts the others in the report.
+fn visible_blocks(batch: &dyn FrameBatch, weighted: &[WeightedView<'_>], report: &mut RenderReport) -> Vec<usize> {
+    let all_rows = 0..weighted[0].setup.camera.size[1];
+    let mut blocks = batch.selection().blocks.clone();
+    let selected = blocks.len();
+    blocks.retain(|b| weighted.iter().any(|view| view.setup.reaches(*b, &all_rows)));
+    let reached = blocks.len();
+    blocks.retain(|b| weighted.iter().any(|view| view.setup.sees(*b, &all_rows)));
+    report.blocks_outside += (selected - reached) as u64;
+    report.blocks_dimmed += (reached - blocks.len()) as u64;
+    blocks
+}
+
+/// The pictures of a channel of a batch from one view.
 struct Pictures {
     pixels: usize,
     /// Those of the frames, and if they are certified, those of their errors.
@@ -138,57 +158,4 @@ impl Pictures {
         let pixel = |(at, value): (usize, &f32)| std::iter::once(*value).chain(others.iter().map(move |c| c[at]));
         Some(first.iter().enumerate().flat_map(pixel).collect())
     }
-}
-
-/// Renders all frames of a group from some views.
-fn render_group(
-    group: &dyn FrameBatch,
-    weighted_views: &[WeightedView<'_>],
-    config: &RenderConfig,
-    budget: &Budget<'_>,
-    report: &mut RenderReport,
-) -> Result<Vec<Pictures>> {
-    let layout = group.layout();
-    let blocks = blocks_to_read(group, weighted_views, report)?;
-    let finish: Vec<PixelReconstructor<'_>> =
-        weighted_views.iter().map(|weighted| PixelReconstructor::new(group, weighted, config)).collect();
-    let empty = |finish: &PixelReconstructor<'_>| vec![f32::NAN; finish.planes() * budget.pixels()];
-    let mut pictures: Vec<Vec<f32>> = finish.iter().map(empty).collect();
-    for rows in budget.bands(&layout) {
-        let mut accumulators: Vec<_> =
-            weighted_views.iter().map(|weighted| BandAccumulator::new(weighted.setup, rows.clone(), &layout)).collect();
-        accumulator::splat(&mut accumulators, &blocks, budget.batch(&layout, rows.len()), &group, report)?;
-        let mut clock = Instant::now();
-        for ((accumulator, finish), pictures) in accumulators.into_iter().zip(&finish).zip(&mut pictures) {
-            accumulator.finish(pictures, |tile, pixels| finish.tile(tile, pixels));
-        }
-        lap(&mut clock, &mut report.inverse_seconds);
-    }
-    if config.certify {
-        let of_errors = pictures.iter().flat_map(|all| &all[layout.frames * budget.pixels()..]);
-        let largest = of_errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
-        report.certified_error = Some(largest);
-    }
-    Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
-}
-
-/// The blocks of a group that a pixel sees, and a word in the report on the others.
-fn blocks_to_read(
-    group: &dyn FrameBatch,
-    weighted_views: &[WeightedView<'_>],
-    report: &mut RenderReport,
-) -> Result<Vec<usize>> {
-    let setup = weighted_views[0].setup;
-    let all_rows = 0..setup.camera.size[1];
-    let contents = group.blocks(&setup.clip)?;
-    report.add(&contents);
-    let mut blocks = contents.blocks;
-    let held = blocks.len();
-    blocks.retain(|b| weighted_views.iter().any(|weighted| weighted.setup.reaches(*b, &all_rows)));
-    let reached = blocks.len();
-    blocks.retain(|b| weighted_views.iter().any(|weighted| weighted.setup.sees(*b, &all_rows)));
-    report.blocks += setup.blocks.len() as u64;
-    report.blocks_outside += (held - reached) as u64;
-    report.blocks_dimmed += (reached - blocks.len()) as u64;
-    Ok(blocks)
 }

@@ -1,17 +1,16 @@
 //! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
 
-use super::accumulator::{Pixels, ResolvedTile};
 use super::certificate::Certificate;
+use super::config::{Quantity, RenderConfig};
+use super::layout::Layout;
 use super::scene::{FrameBatch, Inverse};
-use super::sparse_terms::Layout;
-use super::weights::WeightedView;
-use super::weights::{PixelWeight, Weights};
-use super::{Quantity, RenderConfig};
+use super::splat::{Pixels, ResolvedTile};
+use super::weights::{PixelWeight, WeightedView, Weights};
 use crate::wavelet::{LANES, Lane};
 
-/// What turns the planes of a group into pixels.
+/// What turns the planes of a batch into pixels.
 pub(super) struct PixelReconstructor<'a> {
-    group: &'a dyn FrameBatch,
+    batch: &'a dyn FrameBatch,
     layout: Layout,
     quantity: Quantity,
     weights: &'a Weights,
@@ -20,9 +19,9 @@ pub(super) struct PixelReconstructor<'a> {
 
 impl<'a> PixelReconstructor<'a> {
     /// For pictures of a view.
-    pub(super) fn new(group: &'a dyn FrameBatch, weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
+    pub(super) fn new(batch: &'a dyn FrameBatch, weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
         let certificate = config.certify.then(|| Certificate::new(weighted.setup, config.quantity));
-        Self { group, layout: group.layout(), quantity: config.quantity, weights: &weighted.weights, certificate }
+        Self { batch, layout: batch.layout(), quantity: config.quantity, weights: &weighted.weights, certificate }
     }
 
     /// Planes that a finished tile has: the frames, then their errors if they are certified.
@@ -32,14 +31,14 @@ impl<'a> PixelReconstructor<'a> {
 
     /// Turns the planes of a tile into its pixels. Those of background are left as they are.
     pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f32>) {
-        let mut inverse = self.group.inverse(&tile.used());
+        let mut inverse = self.batch.inverse(&tile.used());
         let mut planes = vec![Lane::default(); self.layout.planes()];
         let mut frames = vec![Lane::default(); self.layout.frames];
-        let width = tile.place.x.len();
-        for (y, at) in tile.place.y.clone().zip((0..).step_by(width)) {
+        let width = tile.rect.x.len();
+        for (y, at) in tile.rect.y.clone().zip((0..).step_by(width)) {
             for first in (0..width).step_by(LANES) {
                 let count = LANES.min(width - first);
-                let x = tile.place.x.start + first;
+                let x = tile.rect.x.start + first;
                 let weights = Lanes::of(self.weights, [x, y], count);
                 if self.quantity == Quantity::Mean && weights.are_background() {
                     continue;
@@ -76,7 +75,7 @@ impl<'a> PixelReconstructor<'a> {
             };
             put(f, values);
             if let Some(certificate) = self.certificate {
-                let bounds = &self.group.errors().frames[f];
+                let bounds = &self.batch.errors().frames[f];
                 let error = |l| certificate.error(bounds, &weights.0[l], absent[l], errors[l], values[l]).into();
                 put(self.layout.frames + f, std::array::from_fn(error));
             }
@@ -91,7 +90,7 @@ impl<'a> PixelReconstructor<'a> {
             absent = std::array::from_fn(|l| one[l] + all[l]);
         }
         let sums = &planes[self.layout.first_error()..self.layout.planes()];
-        for (sum, factors) in sums.iter().zip(&self.group.errors().factors) {
+        for (sum, factors) in sums.iter().zip(&self.batch.errors().factors) {
             (0..LANES).for_each(|l| errors[l] += sum[l] * factors[frame]);
         }
         (absent, errors)

@@ -1,9 +1,29 @@
 //! What a rendering did.
 
-use super::scene::{Contents, LeftOut};
-use super::view_setup::ViewSetup;
+use super::scene::{LeftOut, Selection};
+use super::splat::{SplatStats, ViewSetup};
 use crate::view::camera::View;
 use serde::Serialize;
+use std::time::Instant;
+
+/// A finished picture: as many numbers as the scene has channels for each of `width * height` pixels, row by row.
+pub type Picture<'a> = &'a [f32];
+
+/// A frame as it was rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Rendered<'a> {
+    /// How all views are splatted.
+    pub views: &'a [ViewReport],
+    /// The number of the view.
+    pub view: usize,
+    /// That of the frame.
+    pub frame: usize,
+    /// The quantity asked for.
+    pub picture: Picture<'a>,
+    /// If pictures are certified, a bound on the error of every pixel, in the same unit: against the picture of the
+    /// source's samples splatted without a cut and without rounding. NaN is background.
+    pub error: Option<Picture<'a>>,
+}
 
 /// What a rendering did.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -80,12 +100,22 @@ pub struct ViewReport {
 }
 
 impl RenderReport {
-    /// Adds what a group says of its blocks.
-    pub(super) fn add(&mut self, contents: &Contents) {
-        self.blocks_empty += contents.empty;
-        self.left_out += contents.left_out;
-        self.other_frames += contents.other_frames;
-        self.certified_sample_error = self.certified_sample_error.max(contents.certified);
+    /// Adds the blocks of a batch.
+    pub(super) fn add_selection(&mut self, blocks: usize, selection: &Selection) {
+        self.blocks += blocks as u64;
+        self.blocks_empty += selection.empty;
+        self.left_out += selection.left_out;
+        self.other_frames += selection.other_frames;
+        self.certified_sample_error = self.certified_sample_error.max(selection.certified);
+    }
+
+    /// Adds what splatting took.
+    pub(super) fn add_splatted(&mut self, stats: &SplatStats) {
+        self.blocks_read += stats.blocks;
+        self.coefficients += stats.coefficients;
+        self.bytes_read += stats.bytes;
+        self.decode_seconds += stats.decode.as_secs_f64();
+        self.splat_seconds += stats.splat.as_secs_f64();
     }
 
     /// Turns sums over the frames of each view into root mean squares, and all these into one.
@@ -106,4 +136,10 @@ impl ViewReport {
         let expected_error = if slabs.is_some() { f64::NAN } else { 0.0 };
         Self { azimuth, elevation, roll, scale, center, method, slabs, stated_splat_error, expected_error }
     }
+}
+
+/// Adds the seconds since `clock` to a stage, and restarts it.
+pub(super) fn lap(clock: &mut Instant, stage: &mut f64) {
+    *stage += clock.elapsed().as_secs_f64();
+    *clock = Instant::now();
 }

@@ -3,12 +3,12 @@
 //! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes, and a
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
-use super::RenderConfig;
+use super::config::RenderConfig;
 use super::expectation::Expectation;
+use super::layout::Layout;
 use super::plane_values::BlockPlanes;
-use super::sparse_terms::Layout;
 use crate::base::error::Result;
-use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::grid::{BlockGrid, Grid};
 use crate::wavelet::Lane;
 use serde::Serialize;
 
@@ -28,8 +28,8 @@ pub trait Scene {
     /// Number of frames, if it is known before they are read.
     fn frames(&self) -> Option<usize>;
 
-    /// Where the frames end that can be rendered together with `frame`.
-    fn group_end(&self, frame: usize) -> usize;
+    /// One past the last frame that can be rendered together with `frame`.
+    fn batch_end(&self, frame: usize) -> usize;
 
     /// An upper bound of the planes that `frames` frames of a group need.
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
@@ -37,14 +37,21 @@ pub trait Scene {
     /// An upper bound of the bytes that one block takes.
     fn block_bytes(&self) -> usize;
 
-    /// Opens one channel of some frames of one group, ascending. What is read, where that is chosen by the view, is chosen by `expectation`.
-    fn group<'a>(
-        &'a mut self,
-        frames: &[usize],
-        channel: usize,
-        config: &RenderConfig,
-        expectation: &'a Expectation<'_>,
-    ) -> Result<Box<dyn FrameBatch + 'a>>;
+    /// Opens one channel of some frames, and decides which blocks are read.
+    fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>>;
+}
+
+/// Frames that are to be rendered together.
+#[derive(Debug, Clone, Copy)]
+pub struct BatchRequest<'a> {
+    /// Frame numbers, ascending, all before the same [`Scene::batch_end`].
+    pub frames: &'a [usize],
+    /// The channel: 0 unless samples are colours.
+    pub channel: usize,
+    /// How to render.
+    pub config: &'a RenderConfig,
+    /// The views, for errors that are expected in them; none of composites.
+    pub views: &'a [Expectation<'a>],
 }
 
 /// Some frames that are rendered together.
@@ -52,15 +59,8 @@ pub trait FrameBatch: Sync {
     /// How the planes are used.
     fn layout(&self) -> Layout;
 
-    /// The blocks that touch `region` and have terms.
-    fn blocks(&self, region: &Region) -> Result<Contents>;
-
-    /// The blocks that touch `region`, each with a range that holds its samples as they are splatted; out of order if all are
-    /// missing.
-    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>>;
-
-    /// What the errors of all samples in `region` are expected to come to in a view, in the mean square over its pixels.
-    fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64>;
+    /// The blocks that are read.
+    fn selection(&self) -> &Selection;
 
     /// What a block adds to the planes.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
@@ -78,7 +78,7 @@ pub trait FrameBatch: Sync {
 /// The frames at some pixels from all planes. Overwrites these.
 pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
-/// What reading a group found.
+/// What reading a batch found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BatchOutcome {
     /// Nothing else than its layout has room for.
@@ -87,19 +87,24 @@ pub enum BatchOutcome {
     NeedsRelayout,
 }
 
-/// The blocks of a group.
+/// The blocks of a batch, chosen once when it is opened.
 #[derive(Debug, Default)]
-pub struct Contents {
-    /// Those that have terms, ascending.
+pub struct Selection {
+    /// Blocks that touch the region and add to a plane, ascending.
     pub blocks: Vec<usize>,
-    /// How many others hold nothing in the region.
+    /// Of composites: every block that touches the region, and a range that holds its samples as they are splatted; out
+    /// of order if all are missing. Empty for projections.
+    pub ranges: Vec<(usize, (f64, f64))>,
+    /// Blocks that hold nothing in the region.
     pub empty: u64,
-    /// What a looser tolerance leaves out of all.
+    /// What a looser tolerance leaves out.
     pub left_out: LeftOut,
     /// What is only of frames that are not asked for.
     pub other_frames: LeftOut,
-    /// No sample of them is further off.
+    /// No sample is further from the source's, in the samples' unit.
     pub certified: f64,
+    /// For each view of the request, the mean square over its pixels that the samples' errors are expected to come to.
+    pub expected: Vec<f64>,
 }
 
 /// What need not be read of blocks.
@@ -124,7 +129,7 @@ impl std::ops::AddAssign for LeftOut {
     }
 }
 
-/// What is known of the errors of a group's samples.
+/// What is known of the errors of a batch's samples.
 #[derive(Debug, Clone, Default)]
 pub struct SampleErrors {
     /// `factors[plane][frame]`: how much the sums of an error plane count in a frame.

@@ -3,7 +3,7 @@
 use super::medium::Medium;
 
 /// A way to make one pixel of slabs.
-pub(super) trait Blend: Sync {
+pub(in crate::render) trait Blend: Sync {
     /// A pixel so far.
     type Pixel: Copy + Send + Sync;
 
@@ -27,10 +27,10 @@ pub(super) trait Blend: Sync {
 }
 
 /// Emission and absorption: light of each slab through those before it.
-pub(super) struct Composite {
-    pub(super) medium: Medium,
+pub(in crate::render) struct Composite {
+    pub(in crate::render) medium: Medium,
     /// World units of a path that has such opacities.
-    pub(super) unit: f64,
+    pub(in crate::render) unit: f64,
 }
 
 /// What comes through of less is not seen: an eighth of a level of an 8-bit picture.
@@ -67,7 +67,7 @@ impl Blend for Composite {
 }
 
 /// The largest value.
-pub(super) struct Largest;
+pub(in crate::render) struct Largest;
 
 impl Blend for Largest {
     /// NaN before any.

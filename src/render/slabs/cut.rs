@@ -1,12 +1,14 @@
 //! How a view is cut into slabs, and what that takes.
 
-use super::slab::Slab;
 use super::visible::Visible;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
-use crate::render::RenderConfig;
-use crate::render::view_setup::ViewSetup;
+use crate::render::config::RenderConfig;
+use crate::render::splat::Slab;
+use crate::render::splat::ViewSetup;
 
+/// Planes of slabs that are gathered together, about: they share the weights of a pixel.
+pub(in crate::render) const TOGETHER: usize = 64;
 /// More slabs than this are refused.
 const MOST_SLABS: usize = 1 << 16;
 /// Standard deviations of the kernel in front of the first voxels and behind the last ones that slabs are cut in, too.
@@ -18,7 +20,7 @@ pub(in crate::render) struct Slabs {
     /// An eye for each, from front to back.
     pub(in crate::render) setups: Vec<ViewSetup>,
     /// World units of each.
-    pub(super) thickness: f64,
+    pub(in crate::render) thickness: f64,
 }
 
 /// The depths between which a view is cut.
@@ -53,7 +55,7 @@ pub(in crate::render) fn cut(setup: &ViewSetup, config: &RenderConfig) -> Result
 
 /// Bytes that the slabs of a view take, and to tell which of their tiles can be seen.
 pub(in crate::render) fn bytes(setup: &ViewSetup, config: &RenderConfig) -> usize {
-    let tiles: usize = setup.camera.size.iter().map(|pixels| pixels.div_ceil(setup.tile())).product();
+    let tiles: usize = setup.camera.size.iter().map(|pixels| pixels.div_ceil(setup.backend.tile())).product();
     count(setup, config) * (tiles * Visible::BYTES + size_of::<ViewSetup>()) + setup.blocks.len() * Visible::BLOCK_BYTES
 }
 

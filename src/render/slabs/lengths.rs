@@ -1,41 +1,37 @@
-//! What a group of frames adds to slabs: its own planes, and the lengths of rays.
+//! What a batch of frames adds to slabs: its own planes, and the lengths of rays.
 
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
-use crate::render::RenderReport;
-use crate::render::accumulator::Blocks;
-use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch, UnitValues};
+use crate::render::layout::Layout;
+use crate::render::plane_values::{BlockPlanes, BlockSource, PlaneValues, Scratch, UnitValues};
 use crate::render::scene::{FrameBatch, Inverse};
-use crate::render::sparse_terms::Layout;
-use crate::render::view_setup::ViewSetup;
+use crate::render::splat::ViewSetup;
 use crate::wavelet::Lane;
 use std::collections::HashSet;
 
-/// The blocks of a group, with the weights of all their voxels in a plane of its own.
-pub(super) struct WithLengths<'a> {
-    group: &'a dyn FrameBatch,
-    pub(super) layout: Layout,
+/// The blocks of a batch, with the weights of all their voxels in a plane of its own.
+pub(in crate::render) struct WithLengths<'a> {
+    batch: &'a dyn FrameBatch,
+    pub(in crate::render) layout: Layout,
     blocks: BlockGrid,
     /// Those that have terms.
     with_terms: HashSet<usize>,
 }
 
 impl<'a> WithLengths<'a> {
-    pub(super) fn new(group: &'a dyn FrameBatch, setup: &ViewSetup, report: &mut RenderReport) -> Result<Self> {
-        let contents = group.blocks(&setup.clip)?;
-        report.blocks += setup.blocks.len() as u64;
-        report.add(&contents);
-        let layout = Layout { lengths: true, ..group.layout() };
-        Ok(Self { group, layout, blocks: setup.blocks, with_terms: contents.blocks.into_iter().collect() })
+    pub(in crate::render) fn new(batch: &'a dyn FrameBatch, setup: &ViewSetup) -> Self {
+        let layout = Layout { lengths: true, ..batch.layout() };
+        let with_terms = batch.selection().blocks.iter().copied().collect();
+        Self { batch, layout, blocks: setup.blocks, with_terms }
     }
 
     /// Some layers of a tile, of which these planes may have sums.
-    pub(super) fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
+    pub(in crate::render) fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
         let count = self.layout.planes();
         let layer = |n: usize| {
             let used: Vec<usize> =
                 used.iter().filter(|plane| **plane / count == n).map(|plane| plane % count).collect();
-            let inverse = (!used.is_empty()).then(|| self.group.inverse(&used));
+            let inverse = (!used.is_empty()).then(|| self.batch.inverse(&used));
             Layer { layout: self.layout, inverse, frames: vec![Lane::default(); self.layout.frames] }
         };
         (0..layers).map(layer).collect()
@@ -43,7 +39,7 @@ impl<'a> WithLengths<'a> {
 }
 
 /// A slab of a tile.
-pub(super) struct Layer<'a> {
+pub(in crate::render) struct Layer<'a> {
     layout: Layout,
     /// None if it holds nothing.
     inverse: Option<Box<Inverse<'a>>>,
@@ -52,7 +48,7 @@ pub(super) struct Layer<'a> {
 
 impl Layer<'_> {
     /// Calls `each(frame, sums, lengths)` for all frames at some pixels; overwrites their planes.
-    pub(super) fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
+    pub(in crate::render) fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
         let Self { layout, inverse: Some(inverse), frames } = self else { return };
         let lengths = lengths(layout, planes);
         if lengths.iter().flatten().all(|length| *length <= 0.0) {
@@ -77,9 +73,9 @@ fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
     (0..layout.frames).map(of_frame).collect()
 }
 
-impl Blocks for WithLengths<'_> {
+impl BlockSource for WithLengths<'_> {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        let planes = self.with_terms.contains(&block).then(|| self.group.planes(block)).transpose()?;
+        let planes = self.with_terms.contains(&block).then(|| self.batch.planes(block)).transpose()?;
         let ones = UnitValues(self.blocks.region(block).voxels());
         Ok(Box::new(BlockWithLengths { planes, ones, last: self.layout.planes() - 1 }))
     }

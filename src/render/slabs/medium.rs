@@ -4,7 +4,7 @@ use crate::colour::TransferFunction;
 
 /// What is along the rays: colour and extinction for every value.
 #[derive(Debug, Clone)]
-pub(super) struct Medium {
+pub(in crate::render) struct Medium {
     colours: Table<3>,
     /// Of a path of a unit.
     extinctions: Table<1>,
@@ -14,7 +14,7 @@ pub(super) struct Medium {
 const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
 
 impl Medium {
-    pub(super) fn new(transfer: &TransferFunction) -> Self {
+    pub(in crate::render) fn new(transfer: &TransferFunction) -> Self {
         let extinction = |value| -libm::log1p(-transfer.opacity(value).min(MOST_OPAQUE));
         Self {
             colours: Table::new(transfer.range(), |value| transfer.colour(value).unwrap_or_default()),
@@ -23,17 +23,17 @@ impl Medium {
     }
 
     /// Red, green and blue of a value.
-    pub(super) fn colour(&self, value: f64) -> [f32; 3] {
+    pub(in crate::render) fn colour(&self, value: f64) -> [f32; 3] {
         self.colours.at(value)
     }
 
     /// -ln(1 - opacity) of a value.
-    pub(super) fn extinction(&self, value: f64) -> f32 {
+    pub(in crate::render) fn extinction(&self, value: f64) -> f32 {
         self.extinctions.at(value)[0]
     }
 
     /// Whether no value from `lo` to `hi` can be seen.
-    pub(super) fn is_clear(&self, (lo, hi): (f64, f64)) -> bool {
+    pub(in crate::render) fn is_clear(&self, (lo, hi): (f64, f64)) -> bool {
         let place = |value: f64| self.extinctions.place(value);
         self.extinctions.entries[place(lo).floor() as usize..=place(hi).ceil() as usize].iter().all(|e| e[0] == 0.0)
     }

@@ -1,16 +1,15 @@
 //! Which tiles of which slabs can show anything, and the blocks that these need.
 
 use super::blend::Blend;
-use crate::base::error::Result;
 use crate::base::grid::Region;
-use crate::render::scene::FrameBatch;
-use crate::render::tile_rect::TileRect;
-use crate::render::view_setup::ViewSetup;
+use crate::render::scene::Selection;
+use crate::render::splat::TileRect;
+use crate::render::splat::ViewSetup;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// The tiles of all slabs of a view.
-pub(super) struct Visible {
+pub(in crate::render) struct Visible {
     /// Pixels a side of a tile.
     side: usize,
     columns: usize,
@@ -33,20 +32,20 @@ struct Reached {
 
 impl Visible {
     /// What a tile of a slab takes.
-    pub(super) const BYTES: usize = size_of::<(f64, f64)>() + size_of::<bool>();
+    pub(in crate::render) const BYTES: usize = size_of::<(f64, f64)>() + size_of::<bool>();
     /// What a block takes.
-    pub(super) const BLOCK_BYTES: usize = size_of::<Reached>() + size_of::<(usize, (f64, f64))>();
+    pub(in crate::render) const BLOCK_BYTES: usize = size_of::<Reached>() + size_of::<(usize, (f64, f64))>();
 
-    /// Of a group from a view that is cut into slabs: a mean lies between the least and the largest value of all blocks
+    /// Of a batch from a view that is cut into slabs: a mean lies between the least and the largest value of all blocks
     /// that reach its tile, so where no such value can be seen nothing of the tile can.
-    pub(super) fn new<B: Blend>(group: &dyn FrameBatch, slabs: &[ViewSetup], blend: &B) -> Result<Self> {
+    pub(in crate::render) fn new<B: Blend>(selection: &Selection, slabs: &[ViewSetup], blend: &B) -> Self {
         let setup = &slabs[0];
-        let side = setup.tile();
+        let side = setup.backend.tile();
         let [columns, rows] = setup.camera.size.map(|pixels| pixels.div_ceil(side));
         let tiles = columns * rows;
         let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); tiles * slabs.len()];
         let mut blocks = Vec::new();
-        for (block, (lo, hi)) in group.ranges(&setup.clip)? {
+        for (block, (lo, hi)) in selection.ranges.iter().copied() {
             let region = setup.blocks.region(block);
             for part in parts(&region) {
                 for at in Reached::new(block, &part, slabs, side).places(columns, tiles) {
@@ -57,11 +56,11 @@ impl Visible {
         }
         let needed = ranges.into_iter().map(|range| range.0 <= range.1 && blend.shows(range)).collect();
         let closed = (0..tiles).map(|_| AtomicBool::new(false)).collect();
-        Ok(Self { side, columns, tiles, needed, closed, blocks })
+        Self { side, columns, tiles, needed, closed, blocks }
     }
 
     /// Whether the tile of a slab that begins at a place can still show anything.
-    pub(super) fn is_open(&self, slab: usize, place: &TileRect) -> bool {
+    pub(in crate::render) fn is_open(&self, slab: usize, place: &TileRect) -> bool {
         self.can_show(slab, self.tile(place))
     }
 
@@ -70,7 +69,7 @@ impl Visible {
     }
 
     /// Notes that a tile is opaque in all frames.
-    pub(super) fn close(&self, place: &TileRect) {
+    pub(in crate::render) fn close(&self, place: &TileRect) {
         self.closed[self.tile(place)].store(true, Relaxed);
     }
 
@@ -79,13 +78,13 @@ impl Visible {
     }
 
     /// Whether any tile of some rows of a slab can still show anything.
-    pub(super) fn any(&self, slab: usize, rows: &Range<usize>) -> bool {
+    pub(in crate::render) fn any(&self, slab: usize, rows: &Range<usize>) -> bool {
         let tiles = rows.start / self.side * self.columns..rows.end.div_ceil(self.side) * self.columns;
         tiles.into_iter().any(|tile| self.can_show(slab, tile))
     }
 
     /// The blocks that reach any such tile of some slabs in some rows.
-    pub(super) fn blocks(&self, slabs: &[usize], rows: &Range<usize>) -> Vec<usize> {
+    pub(in crate::render) fn blocks(&self, slabs: &[usize], rows: &Range<usize>) -> Vec<usize> {
         let within = rows.start / self.side..rows.end.div_ceil(self.side);
         let needs = |b: &&Reached| {
             slabs.iter().filter(|slab| b.slabs.contains(slab)).any(|slab| {
@@ -98,7 +97,7 @@ impl Visible {
     }
 
     /// Tiles of slabs, those among them that cannot show anything, and tiles that became opaque.
-    pub(super) fn counts(&self) -> [u64; 3] {
+    pub(in crate::render) fn counts(&self) -> [u64; 3] {
         let clear = self.needed.iter().filter(|needed| !**needed).count();
         let closed = self.closed.iter().filter(|closed| closed.load(Relaxed)).count();
         [self.needed.len(), clear, closed].map(|n| n as u64)

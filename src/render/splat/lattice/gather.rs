@@ -3,7 +3,7 @@
 use super::cells::Cells;
 use super::kernel::Weights;
 use super::picture::Lattice;
-use crate::render::tile_rect::TileRect;
+use crate::render::splat::tile_rect::TileRect;
 use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 

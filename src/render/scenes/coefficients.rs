@@ -1,18 +1,20 @@
 //! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
 
 use super::coded::CodedBlock;
-use super::expectation::Expectation;
-use super::plane_values::BlockPlanes;
-use super::scene::{BatchOutcome, Contents, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene};
-use super::select::{BlockSelector, KeptParts, Place, RateAllocator, Rule, left_out};
-use super::sparse_terms::{Layout, Order};
-use super::{Limit, RenderConfig};
+use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::file::CoefficientFile;
+use crate::render::config::{Limit, RenderConfig};
+use crate::render::expectation::Expectation;
+use crate::render::layout::{Layout, Order};
+use crate::render::plane_values::BlockPlanes;
+use crate::render::scene::{
+    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
+};
 use crate::wavelet::{Lane, needed};
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind, Window};
@@ -56,7 +58,7 @@ impl Scene for CoefficientScene {
         Some(self.file.frames())
     }
 
-    fn group_end(&self, frame: usize) -> usize {
+    fn batch_end(&self, frame: usize) -> usize {
         self.file.window_range(self.file.window_of(frame)).end
     }
 
@@ -75,17 +77,8 @@ impl Scene for CoefficientScene {
         self.file.largest_block() * (4 + 5 + 8 + refined + missing)
     }
 
-    fn group<'a>(
-        &'a mut self,
-        frames: &[usize],
-        channel: usize,
-        config: &RenderConfig,
-        expectation: &'a Expectation<'_>,
-    ) -> Result<Box<dyn FrameBatch + 'a>> {
-        let window = self.file.window_of(frames[0]);
-        let first = self.file.window_range(window).start;
-        let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-        Ok(Box::new(CoefficientBatch::new(&self.file, self.what, (window, channel), frames, config, expectation)?))
+    fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
+        Ok(Box::new(CoefficientBatch::open(&self.file, self.what, request)?))
     }
 }
 
@@ -103,8 +96,34 @@ fn is_dense(window: &Window, series: usize) -> bool {
     window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
 }
 
+/// The planes of a batch of `frames` frames that needs `kept` coefficients.
+fn layout(
+    file: &CoefficientFile,
+    codec: &WindowCodec,
+    (window, channel): (u32, usize),
+    (what, by_values): (SplatSource, bool),
+    (kept, frames): (usize, usize),
+    config: &RenderConfig,
+) -> Layout {
+    let leaves = file.leaves_of(window, channel);
+    let coded = leaves.iter().any(|leaf| leaf.coded > 0);
+    let exact = leaves.iter().any(|leaf| leaf.exact > 0);
+    let record = &file.metadata().windows[window as usize];
+    let (values, missing) = (what == SplatSource::Samples || by_values, file.has_missing(window));
+    let is_dense = is_dense(record, file.channels() * file.grid.whole().voxels());
+    Layout {
+        coefficients: if values || !coded { 0 } else { kept },
+        frames,
+        values: values || exact || record.outliers > 0 || missing,
+        absent: missing,
+        error_planes: error_planes(config, codec.parts()),
+        lengths: false,
+        order: if values || is_dense { Order::Pixels } else { Order::Planes },
+    }
+}
+
 /// Whether so few frames of a window are asked for that their values are less work than the coefficients that they need. Judged by
-/// all that are asked for, not by a group, whose frames depend on the memory that there is.
+/// all that are asked for, not by a batch, whose frames depend on the memory that there is.
 fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
     let range = file.window_range(window);
     let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();
@@ -127,121 +146,146 @@ pub(super) struct CoefficientBatch<'a> {
     /// Which coefficients the frames need, and those in order.
     wanted: Vec<bool>,
     pub(super) kept: Vec<usize>,
-    /// Whether planes are of what these give in each frame, and not of each of these.
+    /// Whether planes hold the values of each frame instead of coefficients.
     pub(super) by_values: bool,
     pub(super) layout: Layout,
-    expectation: &'a Expectation<'a>,
-    allowance: BlockSelector,
+    views: &'a [Expectation<'a>],
+    selector: BlockSelector,
+    selection: Selection,
     errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
-    fn new(
-        file: &'a CoefficientFile,
-        what: SplatSource,
-        (window, channel): (u32, usize),
-        frames: Vec<usize>,
-        config: &RenderConfig,
-        expectation: &'a Expectation<'a>,
-    ) -> Result<Self> {
+    fn open(file: &'a CoefficientFile, what: SplatSource, request: &BatchRequest<'a>) -> Result<Self> {
+        let BatchRequest { channel, config, views, .. } = *request;
+        let window = file.window_of(request.frames[0]);
+        let first = file.window_range(window).start;
+        let frames: Vec<usize> = request.frames.iter().map(|f| f - first).collect();
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let leaves = file.leaves_of(window, channel);
-        let coded = leaves.iter().any(|leaf| leaf.coded > 0);
-        let exact = leaves.iter().any(|leaf| leaf.exact > 0);
-        let record = &file.metadata().windows[window as usize];
-        let (samples, missing) = (what == SplatSource::Samples, file.has_missing(window));
-        let by_values = !samples && !config.certify && few_asked(file, &codec, window, config);
-        let layout = Layout {
-            coefficients: if samples || by_values || !coded { 0 } else { kept.len() },
-            frames: frames.len(),
-            values: samples || by_values || exact || record.outliers > 0 || missing,
-            absent: missing,
-            error_planes: error_planes(config, codec.parts()),
-            lengths: false,
-            order: if samples || by_values || is_dense(record, file.channels() * file.grid.whole().voxels()) {
-                Order::Pixels
-            } else {
-                Order::Planes
-            },
-        };
-        let allowance = BlockSelector::new(&codec, expectation);
-        let (errors, leaf) = (SampleErrors::default(), Mutex::default());
-        let mut group = Self {
+        let by_values = what != SplatSource::Samples && !config.certify && few_asked(file, &codec, window, config);
+        let mut batch = Self {
             file,
             what,
             window,
             channel,
+            layout: layout(file, &codec, (window, channel), (what, by_values), (kept.len(), frames.len()), config),
+            selector: BlockSelector::new(&codec, config, &file.grid),
             codec,
             frames,
             wanted,
             kept,
             by_values,
-            layout,
-            expectation,
-            allowance,
-            errors,
-            leaf,
+            views,
+            selection: Selection::default(),
+            errors: SampleErrors::default(),
+            leaf: Mutex::default(),
         };
-        // Decoded samples are rounded to their type, so that what parts leave out would not be all that they are off.
-        if let Some(allowed) = config.allowed.filter(|_| !samples) {
-            let rule = group.rule(allowed, config)?;
-            group.allowance = group.allowance.by(rule);
+        batch.select(config)?;
+        Ok(batch)
+    }
+
+    /// Decides what is read: the rule first, then every block by that rule.
+    fn select(&mut self, config: &RenderConfig) -> Result<()> {
+        let region = config.region.unwrap_or(self.file.grid.whole());
+        // Decoded samples are rounded to their type, so an error of parts that are left out would not be all of it.
+        if let Some(allowed) = config.allowed.filter(|_| self.what != SplatSource::Samples) {
+            let rule = self.rule(allowed, config.limited, &region)?;
+            self.selector.rule = rule;
+        }
+        let with_ranges = !config.mode.is_projection();
+        let expected = vec![0.0; self.views.len()];
+        let mut found = Selection { empty: self.file.blocks.len() as u64, expected, ..Selection::default() };
+        let mut absolute_sum = 0.0_f64;
+        for entries in self.file.entries(self.window, self.channel, &region) {
+            for entry in entries? {
+                let kept = self.keep(&entry);
+                absolute_sum = absolute_sum.max(self.selector.absolute_sum(&entry));
+                if with_ranges {
+                    found.ranges.push((entry.id.block as usize, self.range(&entry, &kept)));
+                }
+                self.expect(&entry, &kept, &mut found.expected);
+                self.add(&entry, &kept, &mut found);
+            }
         }
         if config.certify {
-            group.errors = group.sample_errors()?;
+            self.errors = self.sample_errors(found.certified, absolute_sum);
         }
-        Ok(group)
+        self.selection = found;
+        Ok(())
     }
 
     /// What may be left out so that an error keeps within what is allowed.
-    fn rule(&self, allowed: f64, config: &RenderConfig) -> Result<Rule> {
-        if config.limited == Limit::Certified {
-            return Ok(Rule::Within(allowed));
+    fn rule(&self, allowed: f64, limited: Limit, region: &Region) -> Result<Rule> {
+        let (Limit::Expected, [view, ..]) = (limited, self.views) else { return Ok(Rule::Within(allowed)) };
+        let mut cheapest = RateAllocator::new(&self.selector);
+        for entries in self.file.entries(self.window, self.channel, region) {
+            entries?.iter().for_each(|entry| cheapest.add(&self.view_of(entry, Some(view))));
         }
-        let region = config.region.unwrap_or(self.file.grid.whole());
-        let mut cheapest = RateAllocator::new(&self.allowance);
-        for entries in self.file.entries(self.window, self.channel, &region) {
-            entries?.iter().for_each(|entry| cheapest.add(&self.place(entry, self.expectation)));
-        }
-        Ok(cheapest.within(self.expectation.allowed(allowed)))
+        Ok(cheapest.within(view.allowed(allowed)))
     }
 
-    fn sample_errors(&self) -> Result<SampleErrors> {
+    /// Adds a block to a selection.
+    fn add(&self, entry: &BlockEntry, kept: &KeptParts, found: &mut Selection) {
+        found.left_out += kept.left_out;
+        found.other_frames += self.of_other_frames(&kept.entry);
+        found.certified = found.certified.max(kept.certified);
+        found.empty -= u64::from(!entry.parts.is_empty() || entry.lost);
+        if !self.adds_nothing(kept) {
+            found.blocks.push(entry.id.block as usize);
+        }
+    }
+
+    /// A range that holds the samples of a block as they are splatted.
+    fn range(&self, entry: &BlockEntry, kept: &KeptParts) -> (f64, f64) {
+        let BlockStats { min, max, reached, .. } = entry.stats;
+        // With less than all parts, samples are as near to the source's as those of all, and that near again.
+        let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
+        let off = off + rounding(self.codec.sample, magnitude((min, max)));
+        (min - off, max + off)
+    }
+
+    /// Adds to each view what the errors of a block are expected to come to.
+    fn expect(&self, entry: &BlockEntry, kept: &KeptParts, sums: &mut [f64]) {
+        let [first, others @ ..] = sums else { return };
+        *first += kept.expected;
+        for (sum, view) in others.iter_mut().zip(&self.views[1..]) {
+            *sum += self.selector.keep(&self.view_of(entry, Some(view))).expected;
+        }
+    }
+
+    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms that
+    /// sum to more than `absolute_sum`.
+    fn sample_errors(&self, certified: f64, absolute_sum: f64) -> SampleErrors {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
-        let (mut sum, mut certified) = (0.0_f64, 0.0_f64);
-        for leaf in self.file.leaves_of(self.window, self.channel) {
-            for entry in self.file.leaf(leaf)? {
-                sum = sum.max(self.allowance.absolute_sum(&entry));
-                certified = certified.max(self.keep(&entry).certified);
-            }
-        }
         let frame = FrameBounds {
             error: record.reached.max(certified),
             range,
-            // What overrides a sample is the sample less what the coefficients give.
-            absolute_sum: 2.0 * sum + magnitude(range),
+            // An outlier adds its sample less what the coefficients give.
+            absolute_sum: 2.0 * absolute_sum + magnitude(range),
         };
         let of_part = |gains: &Vec<f64>| self.frames.iter().map(|f| gains[*f]).collect();
-        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.allowance.gains.iter().map(of_part));
-        Ok(SampleErrors {
+        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.selector.gains.iter().map(of_part));
+        SampleErrors {
             factors: factors.take(self.layout.error_planes).collect(),
             frames: vec![frame; self.frames.len()],
-        })
+        }
     }
 
     /// What is read of a block.
     fn keep(&self, entry: &BlockEntry) -> KeptParts {
-        self.allowance.keep(&self.place(entry, self.expectation))
+        self.selector.keep(&self.view_of(entry, self.views.first()))
     }
 
-    fn place<'b>(&self, entry: &'b BlockEntry, view: &Expectation<'_>) -> Place<'b> {
+    /// A block as a view sees it; without a view, it influences no pixel.
+    fn view_of<'b>(&self, entry: &'b BlockEntry, view: Option<&Expectation<'_>>) -> BlockView<'b> {
         let region = self.file.blocks.region(entry.id.block as usize);
-        Place { entry, voxels: region.voxels(), seen: view.of_block(&region) }
+        let influence = view.map(|view| view.of_block(&region)).unwrap_or_default();
+        BlockView { entry, voxels: region.voxels(), influence }
     }
 
     /// The parts that say nothing of the group's frames.
@@ -285,44 +329,8 @@ impl FrameBatch for CoefficientBatch<'_> {
         self.layout
     }
 
-    fn blocks(&self, region: &Region) -> Result<Contents> {
-        let mut found = Contents { empty: self.file.blocks.len() as u64, ..Contents::default() };
-        for entries in self.file.entries(self.window, self.channel, region) {
-            for entry in entries? {
-                let kept = self.keep(&entry);
-                found.left_out += kept.left_out;
-                found.other_frames += self.of_other_frames(&kept.entry);
-                found.certified = found.certified.max(kept.certified);
-                found.empty -= u64::from(!entry.parts.is_empty() || entry.lost);
-                if !self.adds_nothing(&kept) {
-                    found.blocks.push(entry.id.block as usize);
-                }
-            }
-        }
-        Ok(found)
-    }
-
-    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>> {
-        let mut ranges = Vec::new();
-        for entries in self.file.entries(self.window, self.channel, region) {
-            for entry in entries? {
-                let BlockStats { min, max, reached, .. } = entry.stats;
-                let kept = self.keep(&entry);
-                // With less than all parts, samples are as near to the source's as those of all, and that near again.
-                let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
-                let off = off + rounding(self.codec.sample, magnitude((min, max)));
-                ranges.push((entry.id.block as usize, (min - off, max + off)));
-            }
-        }
-        Ok(ranges)
-    }
-
-    fn expected(&self, region: &Region, view: &Expectation<'_>) -> Result<f64> {
-        let mut sum = 0.0;
-        for entries in self.file.entries(self.window, self.channel, region) {
-            entries?.iter().for_each(|entry| sum += self.allowance.keep(&self.place(entry, view)).expected);
-        }
-        Ok(sum)
+    fn selection(&self) -> &Selection {
+        &self.selection
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

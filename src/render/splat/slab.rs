@@ -17,7 +17,7 @@ pub(in crate::render) struct Slab {
 
 impl Slab {
     /// Of a kernel of deviation `sigma` that is cut `radius` deviations from its centre.
-    pub(super) fn new([near, far]: [f64; 2], (sigma, radius): (f64, f64), thickness: f64) -> Self {
+    pub(in crate::render) fn new([near, far]: [f64; 2], (sigma, radius): (f64, f64), thickness: f64) -> Self {
         Self { near, far, radius, scale: std::f64::consts::FRAC_1_SQRT_2 / sigma, thickness }
     }
 

@@ -6,37 +6,37 @@ use crate::view::footprint::Footprint;
 use std::ops::Range;
 
 /// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
-pub(super) const TILE: usize = 64;
+pub(in crate::render) const TILE: usize = 64;
 
 /// A rectangle of pixels.
 #[derive(Debug, Clone)]
-pub(super) struct TileRect {
+pub(in crate::render) struct TileRect {
     /// Columns of the picture.
-    pub(super) x: Range<usize>,
+    pub(in crate::render) x: Range<usize>,
     /// Rows of the picture.
-    pub(super) y: Range<usize>,
+    pub(in crate::render) y: Range<usize>,
 }
 
 impl TileRect {
     /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels wide.
-    pub(super) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
+    pub(in crate::render) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
         pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
     }
 
     /// Number of pixels.
-    pub(super) fn pixels(&self) -> usize {
+    pub(in crate::render) fn pixels(&self) -> usize {
         self.x.len() * self.y.len()
     }
 
     /// The column and the row of a pixel, counted row by row.
-    pub(super) fn pixel(&self, n: usize) -> [usize; 2] {
+    pub(in crate::render) fn pixel(&self, n: usize) -> [usize; 2] {
         [self.x.start + n % self.x.len(), self.y.start + n / self.x.len()]
     }
 }
 
 /// The columns and rows of the picture that any voxel of a block can reach; where it reaches none of these, none of those.
-pub(super) fn pixels_reached(
+pub(in crate::render) fn pixels_reached(
     region: &Region,
     grid: &Grid,
     camera: &Camera,
@@ -49,7 +49,11 @@ pub(super) fn pixels_reached(
 
 /// The columns and rows of a picture of such a size that are within `reach` pixels of the box around some places; none of
 /// either if there are none of one.
-pub(super) fn pixels_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, size: [usize; 2]) -> [Range<usize>; 2] {
+pub(in crate::render) fn pixels_around(
+    places: impl Iterator<Item = [f64; 2]>,
+    reach: f64,
+    size: [usize; 2],
+) -> [Range<usize>; 2] {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for place in places {
         (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
@@ -64,12 +68,12 @@ pub(super) fn pixels_around(places: impl Iterator<Item = [f64; 2]>, reach: f64, 
 }
 
 /// Whether two ranges share anything.
-pub(super) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+pub(in crate::render) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
     !intersect(a, b).is_empty()
 }
 
 /// What two ranges share.
-pub(super) fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+pub(in crate::render) fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     a.start.max(b.start)..a.end.min(b.end)
 }
 

@@ -2,13 +2,13 @@
 
 use super::lattice::Shear;
 use super::view_setup::ViewSetup;
-use super::{RenderConfig, most_splat_error};
 use crate::base::error::Result;
+use crate::render::config::{RenderConfig, most_splat_error};
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
 /// Leaves out voxels so deep that what they add is within what the method leaves of the splat error.
-pub(super) fn without_what_is_dim(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
+pub(in crate::render) fn without_what_is_dim(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
     let share = most_splat_error(config.quantity, config.splat_error) - setup.stated_error;
     if config.certify || setup.tau == 0.0 || share <= 0.0 {
         return Ok(setup);
@@ -22,7 +22,7 @@ pub(super) fn without_what_is_dim(mut setup: ViewSetup, config: &RenderConfig) -
 }
 
 /// The sums of weights of a view at single pixels.
-pub(super) struct ReferenceWeights<'a> {
+pub(in crate::render) struct ReferenceWeights<'a> {
     setup: &'a ViewSetup,
     footprint: &'a Footprint,
     shear: Shear,
@@ -30,12 +30,12 @@ pub(super) struct ReferenceWeights<'a> {
 
 impl<'a> ReferenceWeights<'a> {
     /// By a footprint that stands in for an uncut one.
-    pub(super) fn new(setup: &'a ViewSetup, footprint: &'a Footprint) -> Self {
+    pub(in crate::render) fn new(setup: &'a ViewSetup, footprint: &'a Footprint) -> Self {
         Self { setup, footprint, shear: Shear::new(&setup.camera, &setup.grid, 1) }
     }
 
     /// The sum at a pixel's centre: slice by slice, row by row, over the voxels that are near enough.
-    pub(super) fn at(&self, [x, y]: [usize; 2]) -> f64 {
+    pub(in crate::render) fn at(&self, [x, y]: [usize; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
         let clip = &self.setup.clip;
         let place = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
@@ -58,7 +58,7 @@ impl<'a> ReferenceWeights<'a> {
     /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one another,
     /// footprints included, each a step deeper than the last; it may meet the first one before the volume begins, and voxels
     /// of a slice may be nearer than the place where it meets that.
-    pub(super) fn most(&self) -> f64 {
+    pub(in crate::render) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.setup.tau, self.setup.clip.dims());
         let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
@@ -75,7 +75,7 @@ impl<'a> ReferenceWeights<'a> {
     /// ```text
     /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))
     /// ```
-    pub(super) fn deepest(&self, share: f64) -> f64 {
+    pub(in crate::render) fn deepest(&self, share: f64) -> f64 {
         let (tau, deeper, nearer) = (self.setup.tau, self.deeper(), self.nearer());
         let slices = 2.0 * nearer / deeper + 1.0 - 1.0 / libm::expm1(-tau * deeper);
         self.nearest() + libm::log(self.slice() * slices / share) / tau

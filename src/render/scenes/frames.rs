@@ -1,20 +1,21 @@
 //! The conventional method: the frames of an archive, each splatted as it is.
 
-use super::RenderConfig;
-use super::expectation::Expectation;
-use super::plane_values::{BlockPlanes, PlaneValues, Scratch};
-use super::scene::{BatchOutcome, Contents, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene};
-use super::sparse_terms::{Layout, Order};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
+use crate::render::config::RenderConfig;
+use crate::render::layout::{Layout, Order};
+use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
+use crate::render::scene::{
+    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
+};
 use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, CHANNELS, ColourTransform, ColourWindow, FrameSource, FrameWindow};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Frames that are splatted together, so that the weights of voxels, or of pixels, are computed once for all of them.
-const GROUP: usize = 32;
+const BATCH: usize = 32;
 /// Voxels a side of the boxes in which frames are read.
 const EDGE: usize = 32;
 
@@ -65,8 +66,8 @@ impl Scene for FrameScene {
         self.archive.frames
     }
 
-    fn group_end(&self, frame: usize) -> usize {
-        frame + GROUP
+    fn batch_end(&self, frame: usize) -> usize {
+        frame + BATCH
     }
 
     fn most_planes(&self, frames: usize, _config: &RenderConfig) -> usize {
@@ -79,13 +80,8 @@ impl Scene for FrameScene {
         self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)
     }
 
-    fn group<'a>(
-        &'a mut self,
-        frames: &[usize],
-        channel: usize,
-        config: &RenderConfig,
-        _: &'a Expectation<'_>,
-    ) -> Result<Box<dyn FrameBatch + 'a>> {
+    fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
+        let BatchRequest { frames, channel, config, views } = *request;
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
         let window: Box<dyn FrameWindow + 'a> = match &self.colour_transform {
@@ -94,12 +90,12 @@ impl Scene for FrameScene {
         };
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let weighted = |frame: &usize| {
+        let look = |frame: &usize| {
             scan_frame(Scan::NOTHING, window.as_ref(), frame - first, &archive.grid, archive.sample, declared)
         };
         let look_first = can_miss && self.missing_seen.load(Relaxed);
         let looked_at = if look_first || config.certify { frames } else { &[] };
-        let seen = looked_at.iter().map(weighted).collect::<Result<Vec<Scan>>>()?;
+        let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
         let absent = seen.iter().any(|s| s.missing > 0);
         let layout = Layout {
             coefficients: 0,
@@ -114,6 +110,7 @@ impl Scene for FrameScene {
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
         let (blocks, seen) = (self.blocks(), &self.missing_seen);
+        let selection = select(blocks, config, views.len());
         let unexpected = (can_miss && looked_at.is_empty()).then_some(seen);
         Ok(Box::new(SampleBatch {
             archive,
@@ -123,8 +120,24 @@ impl Scene for FrameScene {
             window,
             frames,
             layout,
+            selection,
             errors,
         }))
+    }
+}
+
+/// All blocks that touch the region; of their values nothing is known before they are read.
+fn select(blocks: BlockGrid, config: &RenderConfig, views: usize) -> Selection {
+    let region = config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
+    let touching: Vec<usize> = blocks.touching(&region).collect();
+    let any = (f64::NEG_INFINITY, f64::INFINITY);
+    let ranged = if config.mode.is_projection() { &[][..] } else { &touching };
+    Selection {
+        ranges: ranged.iter().map(|block| (*block, any)).collect(),
+        empty: (blocks.len() - touching.len()) as u64,
+        blocks: touching,
+        expected: vec![0.0; views],
+        ..Selection::default()
     }
 }
 
@@ -139,6 +152,7 @@ struct SampleBatch<'a> {
     /// Counted from the first frame of the window.
     frames: Vec<usize>,
     layout: Layout,
+    selection: Selection,
     errors: SampleErrors,
 }
 
@@ -147,23 +161,12 @@ impl FrameBatch for SampleBatch<'_> {
         self.layout
     }
 
-    fn blocks(&self, region: &Region) -> Result<Contents> {
-        let blocks: Vec<usize> = self.blocks.touching(region).collect();
-        let empty = (self.blocks.len() - blocks.len()) as u64;
-        Ok(Contents { blocks, empty, ..Contents::default() })
-    }
-
-    fn ranges(&self, region: &Region) -> Result<Vec<(usize, (f64, f64))>> {
-        let of_any = (f64::NEG_INFINITY, f64::INFINITY);
-        Ok(self.blocks.touching(region).map(|block| (block, of_any)).collect())
-    }
-
-    fn expected(&self, _: &Region, _: &Expectation<'_>) -> Result<f64> {
-        Ok(0.0)
+    fn selection(&self) -> &Selection {
+        &self.selection
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        Ok(Box::new(FrameBlock { group: self, region: self.blocks.region(block) }))
+        Ok(Box::new(FrameBlock { batch: self, region: self.blocks.region(block) }))
     }
 
     fn inverse(&self, _: &[usize]) -> Box<Inverse<'_>> {
@@ -191,7 +194,7 @@ impl SampleBatch<'_> {
 
 /// A block of frames that are read when they are needed.
 struct FrameBlock<'a> {
-    group: &'a SampleBatch<'a>,
+    batch: &'a SampleBatch<'a>,
     region: Region,
 }
 
@@ -201,7 +204,7 @@ impl BlockPlanes for FrameBlock<'_> {
     }
 
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        let SampleBatch { archive, layout, window, frames, missing_value, .. } = self.group;
+        let SampleBatch { archive, layout, window, frames, missing_value, .. } = self.batch;
         let Some((frame, absent)) = layout.samples(plane) else { return Ok(PlaneValues::Nothing) };
         room.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
         window.read_box(frames[frame], &self.region, &mut room.bytes)?;
@@ -210,8 +213,8 @@ impl BlockPlanes for FrameBlock<'_> {
         }
         let samples = room.samples(archive.sample);
         match samples {
-            PlaneValues::Single(values) => self.group.note_missing(values),
-            PlaneValues::Double(values) => self.group.note_missing(values),
+            PlaneValues::Single(values) => self.batch.note_missing(values),
+            PlaneValues::Double(values) => self.batch.note_missing(values),
             PlaneValues::Few(_) | PlaneValues::Nothing => {}
         }
         Ok(samples)

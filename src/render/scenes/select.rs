@@ -1,9 +1,11 @@
 //! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
 
-use super::expectation::{Expectation, Seen};
-use super::scene::LeftOut;
+use crate::base::grid::Grid;
 use crate::base::sample::magnitude;
 use crate::codec::WindowCodec;
+use crate::render::config::RenderConfig;
+use crate::render::expectation::{BlockInfluence, alike};
+use crate::render::scene::LeftOut;
 use std::collections::BTreeMap;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
@@ -36,7 +38,7 @@ pub(super) struct BlockSelector {
     /// Whether what the directory says of a part counts all finer ones, too.
     cumulative: bool,
     frames: usize,
-    rule: Rule,
+    pub(super) rule: Rule,
 }
 
 /// What may be left out.
@@ -68,10 +70,10 @@ struct Step {
 
 /// A block as its entry and the view have it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
+pub(super) struct BlockView<'a> {
     pub(super) entry: &'a BlockEntry,
     pub(super) voxels: usize,
-    pub(super) seen: Seen,
+    pub(super) influence: BlockInfluence,
 }
 
 /// What some level parts of a block come to where they are left out.
@@ -86,7 +88,7 @@ struct Alternative {
 /// Finds what is cheapest to leave out of a window.
 #[derive(Debug)]
 pub(super) struct RateAllocator<'a> {
-    allowance: &'a BlockSelector,
+    selector: &'a BlockSelector,
     /// The mean square of the file's own errors.
     own: f64,
     /// What the steps of each price come to.
@@ -94,15 +96,15 @@ pub(super) struct RateAllocator<'a> {
 }
 
 impl<'a> RateAllocator<'a> {
-    pub(super) fn new(allowance: &'a BlockSelector) -> Self {
-        Self { allowance, own: 0.0, changes: BTreeMap::new() }
+    pub(super) fn new(selector: &'a BlockSelector) -> Self {
+        Self { selector, own: 0.0, changes: BTreeMap::new() }
     }
 
     /// Goes on to a further block.
-    pub(super) fn add(&mut self, place: &Place<'_>) {
-        self.own += self.allowance.own(place);
+    pub(super) fn add(&mut self, block: &BlockView<'_>) {
+        self.own += self.selector.own(block);
         let mut before = 0.0;
-        for step in self.allowance.steps(place) {
+        for step in self.selector.steps(block) {
             *self.changes.entry(step.price).or_default() += step.change - before;
             before = step.change;
         }
@@ -122,42 +124,37 @@ impl<'a> RateAllocator<'a> {
 
 impl BlockSelector {
     /// Leaves nothing out yet.
-    pub(super) fn new(codec: &WindowCodec, expectation: &Expectation<'_>) -> Self {
+    pub(super) fn new(codec: &WindowCodec, config: &RenderConfig, grid: &Grid) -> Self {
         let gains = codec.part_gains();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
         let cumulative = codec.scheme.pyramid.is_some();
-        let alike = codec.sides_alike().into_iter().map(|side| expectation.alike(side)).collect();
+        let alike = codec.sides_alike().into_iter().map(|side| alike(config, grid, side)).collect();
         let (energy_gain, frames) = (codec.energy_gains(), codec.frames());
         Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
     }
 
-    /// With a rule.
-    pub(super) fn by(self, rule: Rule) -> Self {
-        Self { rule, ..self }
-    }
-
     /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that the
     /// rule leaves out.
-    pub(super) fn keep(&self, place: &Place<'_>) -> KeptParts {
-        let (entry, stats) = (place.entry, place.entry.stats);
+    pub(super) fn keep(&self, block: &BlockView<'_>) -> KeptParts {
+        let (entry, stats) = (block.entry, block.entry.stats);
         let mut kept = KeptParts {
             entry: entry.clone(),
             errors: vec![0.0; 1 + self.gains.len()],
             certified: stats.reached,
-            expected: self.own(place),
+            expected: self.own(block),
             left_out: LeftOut::default(),
         };
         kept.errors[0] = stats.reached;
         match self.rule {
             Rule::Nothing => {}
-            Rule::Within(allowed) if as_zero(entry) <= allowed => self.leave_all_out(place, &mut kept),
-            Rule::Within(allowed) => self.leave_out_within(allowed, place, &mut kept),
+            Rule::Within(allowed) if as_zero(entry) <= allowed => self.leave_all_out(block, &mut kept),
+            Rule::Within(allowed) => self.leave_out_within(allowed, block, &mut kept),
             Rule::Cheap(price) => {
-                let parts = self.steps(place).iter().take_while(|s| s.price <= price).last().map_or(0, |s| s.parts);
+                let parts = self.steps(block).iter().take_while(|s| s.price <= price).last().map_or(0, |s| s.parts);
                 let levels = levels(entry);
                 levels[..parts].iter().fold(Alternative::default(), |without, part| {
-                    let more = self.with(without, part, place);
-                    self.leave_out(part, more, place, &mut kept);
+                    let more = self.with(without, part, block);
+                    self.leave_out(part, more, block, &mut kept);
                     more
                 });
             }
@@ -166,22 +163,25 @@ impl BlockSelector {
         kept
     }
 
-    fn leave_all_out(&self, place: &Place<'_>, kept: &mut KeptParts) {
-        let as_zero = as_zero(place.entry);
+    fn leave_all_out(&self, block: &BlockView<'_>, kept: &mut KeptParts) {
+        let as_zero = as_zero(block.entry);
         (kept.errors[0], kept.certified) = (as_zero, as_zero);
-        let all = levels(place.entry).iter().fold(Alternative::default(), |w, part| self.with(w, part, place));
-        let exact = place.entry.part(PartKind::Exact).is_some();
-        kept.expected =
-            if exact { finite(as_zero * as_zero * place.seen.of(f64::INFINITY)) } else { kept.expected + all.change };
+        let all = levels(block.entry).iter().fold(Alternative::default(), |w, part| self.with(w, part, block));
+        let exact = block.entry.part(PartKind::Exact).is_some();
+        kept.expected = if exact {
+            finite(as_zero * as_zero * block.influence.of(f64::INFINITY))
+        } else {
+            kept.expected + all.change
+        };
         kept.entry.parts.retain(|p| p.kind == PartKind::Missing);
     }
 
-    fn leave_out_within(&self, allowed: f64, place: &Place<'_>, kept: &mut KeptParts) {
+    fn leave_out_within(&self, allowed: f64, block: &BlockView<'_>, kept: &mut KeptParts) {
         let mut without = Alternative::default();
-        for part in levels(place.entry) {
-            let more = self.with(without, &part, place);
-            if (place.entry.stats.reached + more.largest).next_up() <= allowed {
-                self.leave_out(&part, more, place, kept);
+        for part in levels(block.entry) {
+            let more = self.with(without, &part, block);
+            if (block.entry.stats.reached + more.largest).next_up() <= allowed {
+                self.leave_out(&part, more, block, kept);
                 without = more;
             } else if self.cumulative {
                 break;
@@ -190,9 +190,9 @@ impl BlockSelector {
     }
 
     /// Leaves out a part, with which all that is left out comes to `without`.
-    fn leave_out(&self, part: &LevelPart, without: Alternative, place: &Place<'_>, kept: &mut KeptParts) {
-        kept.certified = (place.entry.stats.reached + without.largest).next_up();
-        kept.expected = self.own(place) + without.change;
+    fn leave_out(&self, part: &LevelPart, without: Alternative, block: &BlockView<'_>, kept: &mut KeptParts) {
+        kept.certified = (block.entry.stats.reached + without.largest).next_up();
+        kept.expected = self.own(block) + without.change;
         if self.cumulative {
             kept.errors[1..].fill(0.0);
         }
@@ -201,7 +201,7 @@ impl BlockSelector {
     }
 
     /// What parts come to with one more.
-    fn with(&self, without: Alternative, part: &LevelPart, place: &Place<'_>) -> Alternative {
+    fn with(&self, without: Alternative, part: &LevelPart, block: &BlockView<'_>) -> Alternative {
         let (level, stats) = (part.level, part.entry.stats);
         let energy = stats.energy * self.energy_gain[level];
         let largest = stats.largest * self.largest_gain[level];
@@ -210,25 +210,25 @@ impl BlockSelector {
         } else {
             (without.largest + largest, without.energy + energy, energy)
         };
-        let change = finite(without.change + self.in_pixels(more, self.alike[level], place));
+        let change = finite(without.change + self.in_pixels(more, self.alike[level], block));
         Alternative { largest: largest.next_up(), energy, change }
     }
 
     /// What the file's own errors come to in the mean square over pixels.
-    fn own(&self, place: &Place<'_>) -> f64 {
-        self.in_pixels(place.entry.stats.squared_error, self.alike[self.alike.len() - 1], place)
+    fn own(&self, block: &BlockView<'_>) -> f64 {
+        self.in_pixels(block.entry.stats.squared_error, self.alike[self.alike.len() - 1], block)
     }
 
-    fn in_pixels(&self, energy: f64, alike: f64, place: &Place<'_>) -> f64 {
-        finite(energy / (self.frames * place.voxels) as f64 * place.seen.of(alike))
+    fn in_pixels(&self, energy: f64, alike: f64, block: &BlockView<'_>) -> f64 {
+        finite(energy / (self.frames * block.voxels) as f64 * block.influence.of(alike))
     }
 
     /// The ways to leave out parts of a block, of which each costs more for a byte than the one before; none of a block
     /// that is not seen.
-    fn steps(&self, place: &Place<'_>) -> Vec<Step> {
+    fn steps(&self, block: &BlockView<'_>) -> Vec<Step> {
         let (mut steps, mut at, mut without) = (vec![Step::default()], Step::default(), Alternative::default());
-        for part in levels(place.entry) {
-            without = self.with(without, &part, place);
+        for part in levels(block.entry) {
+            without = self.with(without, &part, block);
             at = Step {
                 parts: at.parts + 1,
                 bytes: at.bytes + u64::from(part.entry.stored_len),
@@ -244,7 +244,7 @@ impl BlockSelector {
             steps.push(at);
         }
         steps.remove(0);
-        steps.retain(|_| !place.seen.is_nothing());
+        steps.retain(|_| !block.influence.is_nothing());
         steps
     }
 

@@ -10,8 +10,8 @@ use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::render::plane_values::PlaneValues;
-use crate::render::slabs::Slab;
-use crate::render::tile_rect::intersect;
+use crate::render::splat::slab::Slab;
+use crate::render::splat::tile_rect::intersect;
 use std::ops::Range;
 
 /// Where the voxels of a block are in cells: the same for all planes.
@@ -104,7 +104,7 @@ impl Placed {
             PlaneValues::Single(amounts) => self.add_all(amounts, plane, work),
             PlaneValues::Double(amounts) => self.add_all(amounts, plane, work),
             PlaneValues::Few(amounts) => {
-                amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane))
+                amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane));
             }
         }
     }

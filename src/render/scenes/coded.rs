@@ -1,16 +1,16 @@
-//! A block of a file that has been read, as what it adds to the planes of its group.
+//! A block of a file that has been read, as what it adds to the planes of its batch.
 
 use super::coefficients::{CoefficientBatch, SplatSource};
-use super::plane_values::{BlockPlanes, PlaneValues, Scratch};
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
+use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 
 /// A block of a file that has been read.
 pub(super) struct CodedBlock<'a> {
-    group: &'a CoefficientBatch<'a>,
+    batch: &'a CoefficientBatch<'a>,
     block: Block,
     /// What its samples may be off by, for each error plane.
     errors: Vec<f64>,
@@ -23,41 +23,41 @@ pub(super) struct CodedBlock<'a> {
 enum Dense {
     /// Samples to frames; here those of the whole window.
     Samples(Buffer<u8>),
-    /// What coefficients give to frames: `frame of the group * voxels + voxel`; empty if all are zero.
+    /// What coefficients give to frames: `frame of the batch * voxels + voxel`; empty if all are zero.
     Values(Vec<f64>),
     /// Coefficients, here what all codes give if that was needed at once.
     Coefficients(Option<Field<'static>>),
 }
 
 impl<'a> CodedBlock<'a> {
-    /// Of a block of a group whose samples may be off by so much.
-    pub(super) fn new(group: &'a CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
-        let codec = &group.codec;
-        if block.exact.is_some() || group.what == SplatSource::Samples {
+    /// Of a block of a batch whose samples may be off by so much.
+    pub(super) fn new(batch: &'a CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
+        let codec = &batch.codec;
+        if block.exact.is_some() || batch.what == SplatSource::Samples {
             let dense = Dense::Samples(block.samples(codec));
-            return Self { group, block, errors, dense, few: Vec::new() };
+            return Self { batch, block, errors, dense, few: Vec::new() };
         }
         let field = block.field_at_once(codec);
-        let mut few = overrides(group, &block, field.as_ref());
-        let dense = match group.by_values {
-            true => Dense::Values(values(group, &block, field.as_ref(), &mut few)),
+        let mut few = overrides(batch, &block, field.as_ref());
+        let dense = match batch.by_values {
+            true => Dense::Values(values(batch, &block, field.as_ref(), &mut few)),
             false => Dense::Coefficients(field),
         };
-        Self { group, block, errors, dense, few }
+        Self { batch, block, errors, dense, few }
     }
 
     fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, room: &'r mut Scratch) -> PlaneValues<'r> {
-        let Self { group, block, .. } = self;
-        let Some((frame, absent)) = group.layout.samples(plane) else { return PlaneValues::Nothing };
-        let bytes = samples.len() / group.codec.frames();
+        let Self { batch, block, .. } = self;
+        let Some((frame, absent)) = batch.layout.samples(plane) else { return PlaneValues::Nothing };
+        let bytes = samples.len() / batch.codec.frames();
         room.bytes.clear();
-        room.bytes.extend_from_slice(&samples[group.frames[frame] * bytes..][..bytes]);
-        let first = group.frames[frame] * block.voxels;
+        room.bytes.extend_from_slice(&samples[batch.frames[frame] * bytes..][..bytes]);
+        let first = batch.frames[frame] * block.voxels;
         // An exact block may do without a mask.
-        let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || group.codec.is_missing(v);
-        match group.layout.absent {
-            true => room.masked(group.codec.sample, absent, is_missing),
-            false => room.samples(group.codec.sample),
+        let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || batch.codec.is_missing(v);
+        match batch.layout.absent {
+            true => room.masked(batch.codec.sample, absent, is_missing),
+            false => room.samples(batch.codec.sample),
         }
     }
 
@@ -67,7 +67,7 @@ impl<'a> CodedBlock<'a> {
             return PlaneValues::Nothing;
         }
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let error = |voxel| if coded && misses_all(self.group, &self.block, voxel) { 0.0 } else { error };
+        let error = |voxel| if coded && misses_all(self.batch, &self.block, voxel) { 0.0 } else { error };
         room.double.clear();
         room.double.extend((0..self.block.voxels).map(error));
         PlaneValues::Double(&room.double)
@@ -80,9 +80,9 @@ impl BlockPlanes for CodedBlock<'_> {
     }
 
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        let Self { group, block, errors, dense, few } = self;
+        let Self { batch, block, errors, dense, few } = self;
         let voxels = block.voxels;
-        if let Some(error) = plane.checked_sub(group.layout.first_error()) {
+        if let Some(error) = plane.checked_sub(batch.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], room));
         }
         let few =
@@ -90,8 +90,8 @@ impl BlockPlanes for CodedBlock<'_> {
         Ok(match dense {
             Dense::Samples(samples) => self.plane_of_samples(samples, plane, room),
             Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
-            Dense::Coefficients(field) if plane < group.layout.coefficients => {
-                coefficients(group, block, field.as_ref(), group.kept[plane], room)
+            Dense::Coefficients(field) if plane < batch.layout.coefficients => {
+                coefficients(batch, block, field.as_ref(), batch.kept[plane], room)
             }
             Dense::Coefficients(_) => few,
         })
@@ -106,7 +106,7 @@ impl BlockPlanes for CodedBlock<'_> {
 
 /// The coefficients of one k of a block.
 fn coefficients<'a>(
-    group: &CoefficientBatch<'_>,
+    batch: &CoefficientBatch<'_>,
     block: &'a Block,
     field: Option<&'a Field<'_>>,
     k: usize,
@@ -114,13 +114,13 @@ fn coefficients<'a>(
 ) -> PlaneValues<'a> {
     match field {
         Some(field) => field.plane(k, block.voxels, &mut room.double).into(),
-        None => block.plane(&group.codec, k, (&mut room.single, &mut room.double)).into(),
+        None => block.plane(&batch.codec, k, (&mut room.single, &mut room.double)).into(),
     }
 }
 
-/// What coefficients give in each frame of a group, and what overrides that, which is taken out of `few`.
+/// What coefficients give in each frame of a batch, and what overrides that, which is taken out of `few`.
 fn values(
-    group: &CoefficientBatch<'_>,
+    batch: &CoefficientBatch<'_>,
     block: &Block,
     field: Option<&Field<'_>>,
     few: &mut [Vec<(u32, f64)>],
@@ -128,12 +128,12 @@ fn values(
     if block.codes.is_empty() && few.is_empty() {
         return Vec::new();
     }
-    let mut values = vec![0.0; group.frames.len() * block.voxels];
+    let mut values = vec![0.0; batch.frames.len() * block.voxels];
     let room = &mut Scratch::default();
-    for k in &group.kept {
-        let amounts = coefficients(group, block, field, *k, room);
-        for (frame, values) in group.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
-            amounts.add_to(group.codec.synthesis[*k][*frame], values);
+    for k in &batch.kept {
+        let amounts = coefficients(batch, block, field, *k, room);
+        for (frame, values) in batch.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
+            amounts.add_to(batch.codec.synthesis[*k][*frame], values);
         }
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
@@ -142,37 +142,37 @@ fn values(
     values
 }
 
-/// What overrides the coefficients of a block, for each plane of a group; empty if nothing does.
-fn overrides(group: &CoefficientBatch<'_>, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
-    let (layout, codec) = (&group.layout, &group.codec);
+/// What overrides the coefficients of a block, for each plane of a batch; empty if nothing does.
+fn overrides(batch: &CoefficientBatch<'_>, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
+    let (layout, codec) = (&batch.layout, &batch.codec);
     if !block.overrides() {
         return Vec::new();
     }
     let mut few = vec![Vec::new(); layout.planes()];
     let whole = field.is_none().then(|| block.field(codec));
-    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &group.frames));
+    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &batch.frames));
     for (voxel, frame, amount) in samples.into_iter().flatten() {
         few[layout.value(frame)].push((voxel as u32, amount));
     }
     for voxel in (0..block.voxels).filter(|_| layout.absent) {
         let mut add = |plane: usize| few[plane].push((voxel as u32, 1.0));
-        if misses_all(group, block, voxel) {
+        if misses_all(batch, block, voxel) {
             add(layout.absent_in_all());
         } else {
-            let missing = |f: &usize| block.is_missing(group.frames[*f] * block.voxels + voxel);
+            let missing = |f: &usize| block.is_missing(batch.frames[*f] * block.voxels + voxel);
             (0..layout.frames).filter(missing).for_each(|f| add(layout.absent(f)));
         }
     }
     few
 }
 
-/// Whether a voxel has no sample, judged by the window and not by the group, whose frames depend on the memory there is.
-fn misses_all(group: &CoefficientBatch<'_>, block: &Block, voxel: usize) -> bool {
-    (0..group.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
+/// Whether a voxel has no sample, judged by the window and not by the batch, whose frames depend on the memory there is.
+fn misses_all(batch: &CoefficientBatch<'_>, block: &Block, voxel: usize) -> bool {
+    (0..batch.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
 }
 
 /// What must be added to single frames because coefficients don't give it: an outlier's sample less what they give,
-/// and for a missing sample minus what they give. (voxel, frame of the group, amount), ascending.
+/// and for a missing sample minus what they give. (voxel, frame of the batch, amount), ascending.
 fn overridden_samples(
     block: &Block,
     codec: &WindowCodec,
@@ -194,7 +194,7 @@ fn overridden_samples(
     subtract_series(block, codec, field, &targets)
 }
 
-/// Turns (voxel, frame of the group, frame of the window, sample) into (voxel, frame, sample - what the codes give).
+/// Turns (voxel, frame of the batch, frame of the window, sample) into (voxel, frame, sample - what the codes give).
 fn subtract_series(
     block: &Block,
     codec: &WindowCodec,

@@ -1,7 +1,7 @@
 //! What of the voxels of a block is in a slab.
 
 use super::Shear;
-use crate::render::slabs::Slab;
+use crate::render::splat::slab::Slab;
 use std::ops::Range;
 
 /// The shares of a block's voxels that lie in a slab, row by row.

@@ -1,28 +1,72 @@
-//! The splat: terms of voxels times footprints into the planes of one tile of the picture (eq 4 and 9).
+//! The footprint backend: terms of voxels times footprints into the planes of tiles (eq 4 and 9).
 //!
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.
 
+use super::band::{Band, BandGroup};
 use super::sparse_terms::SparseTerms;
 use super::tile_rect::{TileRect, intersect, overlap};
 use super::view_setup::ViewSetup;
+use crate::base::error::Result;
+use crate::render::layout::Order;
+use crate::render::plane_values::BlockPlanes;
 use crate::view::footprint::Footprint;
 use crate::wavelet::Lane;
+use rayon::prelude::*;
 use std::ops::Range;
 
-/// How the planes of a tile lie in memory. No sum depends on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
-    /// Plane by plane: fast where voxels have terms in few planes, a row of pixels at a time.
-    Planes,
-    /// Pixel by pixel: fast where voxels have terms in most planes, all planes of a pixel at a time.
-    Pixels,
+/// Bands of views that take footprints.
+pub(in crate::render) struct FootprintBands<'a, 'c> {
+    bands: Vec<Band<'a>>,
+    tiles: Vec<&'c mut Vec<Tile>>,
+    planes: usize,
+}
+
+/// The terms of a block, and its voxels in every band that sees it.
+pub(in crate::render) struct ProjectedBlock {
+    terms: SparseTerms,
+    splats: Vec<Option<Splats>>,
+}
+
+impl<'a, 'c> FootprintBands<'a, 'c> {
+    /// Bands with so many planes.
+    pub(super) fn new(bands: Vec<(Band<'a>, &'c mut Vec<Tile>)>, planes: usize) -> Self {
+        let (bands, tiles) = bands.into_iter().unzip();
+        Self { bands, tiles, planes }
+    }
+}
+
+impl BandGroup for FootprintBands<'_, '_> {
+    type Block<'b> = ProjectedBlock;
+
+    fn bands(&self) -> &[Band<'_>] {
+        &self.bands
+    }
+
+    fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<ProjectedBlock> {
+        let terms = SparseTerms::of(planes.as_ref(), self.planes)?;
+        let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.setup));
+        Ok(ProjectedBlock { splats: self.bands.iter().map(splats).collect(), terms })
+    }
+
+    /// Each tile has one owner, so that its sums do not depend on threads.
+    fn add(&mut self, blocks: &[ProjectedBlock]) -> Result<()> {
+        for (n, tiles) in self.tiles.iter_mut().enumerate() {
+            let footprint = &self.bands[n].setup.footprint;
+            tiles.par_iter_mut().for_each(|tile| {
+                for ProjectedBlock { terms, splats } in blocks {
+                    splats[n].iter().for_each(|splats| tile.splat(splats, terms, footprint));
+                }
+            });
+        }
+        Ok(())
+    }
 }
 
 /// A rectangle of pixels with its planes.
 #[derive(Debug)]
-pub(super) struct Tile {
-    pub(super) place: TileRect,
+pub(in crate::render) struct Tile {
+    pub(in crate::render) place: TileRect,
     /// Number of planes.
     count: usize,
     order: Order,
@@ -31,12 +75,12 @@ pub(super) struct Tile {
 
 impl Tile {
     /// With all planes at zero.
-    pub(super) fn new(place: TileRect, count: usize, order: Order) -> Self {
+    pub(in crate::render) fn new(place: TileRect, count: usize, order: Order) -> Self {
         Self { sums: vec![0.0; count * place.pixels()], place, count, order }
     }
 
     /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
-    pub(super) fn load(&self, first: usize, count: usize, planes: &mut [Lane]) {
+    pub(in crate::render) fn load(&self, first: usize, count: usize, planes: &mut [Lane]) {
         let pixels = self.place.pixels();
         for (p, lane) in planes.iter_mut().enumerate() {
             for (l, sum) in lane.iter_mut().enumerate().take(count) {
@@ -49,7 +93,7 @@ impl Tile {
     }
 
     /// Adds a block's voxels, of which these are the terms.
-    pub(super) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
+    pub(in crate::render) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;
         }
@@ -124,7 +168,7 @@ fn add_to_pixels(sums: &mut [f64], width: usize, amounts: &[f64], row: &[f64], c
 
 /// A block's voxels as the camera sees them.
 #[derive(Debug)]
-pub(super) struct Splats {
+pub(in crate::render) struct Splats {
     voxels: Vec<Splat>,
     size: [usize; 2],
     /// Columns and rows of the picture that they reach.
@@ -144,10 +188,10 @@ struct Splat {
 
 impl Splats {
     /// What a voxel takes.
-    pub(super) const BYTES: usize = size_of::<Splat>();
+    pub(in crate::render) const BYTES: usize = size_of::<Splat>();
 
     /// Projects the voxels of a block that are splatted and have terms.
-    pub(super) fn new(terms: &SparseTerms, block: usize, setup: &ViewSetup) -> Self {
+    pub(in crate::render) fn new(terms: &SparseTerms, block: usize, setup: &ViewSetup) -> Self {
         let ViewSetup { camera, footprint, grid, clip, .. } = setup;
         let region = setup.blocks.region(block);
         let mut voxels = Vec::new();

@@ -1,0 +1,69 @@
+//! The loop over batches of frames, the same for projections and composites.
+
+use super::config::RenderConfig;
+use super::expectation::Expectation;
+use super::plan::{self, Budget};
+use super::report::RenderReport;
+use super::scene::{BatchOutcome, BatchRequest, FrameBatch, Scene};
+use crate::base::error::Result;
+
+/// What a rendering works with.
+#[derive(Clone, Copy)]
+pub(super) struct Job<'a> {
+    pub(super) config: &'a RenderConfig,
+    pub(super) budget: &'a Budget<'a>,
+    /// The views, where errors are expected in them.
+    pub(super) views: &'a [Expectation<'a>],
+}
+
+/// The pictures of a channel of a batch, and the errors that are expected in each view.
+pub(super) struct RenderedBatch<P> {
+    pub(super) pictures: P,
+    pub(super) expected: Vec<f64>,
+}
+
+/// Renders all frames, as many at a time as the budget has room for. `render` makes the pictures of one channel of a batch;
+/// `give` takes those of all its channels.
+pub(super) fn for_each_batch<P>(
+    scene: &mut dyn Scene,
+    job: Job<'_>,
+    report: &mut RenderReport,
+    mut render: impl FnMut(&dyn FrameBatch, &mut RenderReport) -> Result<P>,
+    mut give: impl FnMut(&[usize], Vec<RenderedBatch<P>>, &mut RenderReport) -> Result<()>,
+) -> Result<()> {
+    let Job { config, budget, views } = job;
+    let mut rest = config.frames.as_slice();
+    while let Some(first) = rest.first() {
+        let most = plan::in_batch(scene, *first, rest);
+        let (frames, later) = rest.split_at(budget.frames(scene, config, most));
+        let channels = 0..scene.channels();
+        let request = |channel| BatchRequest { frames, channel, config, views };
+        let channels = channels.map(|channel| render_channel(scene, &request(channel), report, &mut render));
+        let channels = channels.collect::<Result<Vec<_>>>()?;
+        give(frames, channels, report)?;
+        rest = later;
+    }
+    Ok(())
+}
+
+/// Renders a channel of a batch, and again where more was found than its layout has room for.
+fn render_channel<P>(
+    scene: &mut dyn Scene,
+    request: &BatchRequest<'_>,
+    report: &mut RenderReport,
+    render: &mut impl FnMut(&dyn FrameBatch, &mut RenderReport) -> Result<P>,
+) -> Result<RenderedBatch<P>> {
+    loop {
+        let before = report.clone();
+        let blocks = scene.blocks().len();
+        let batch = scene.open(request)?;
+        report.add_selection(blocks, batch.selection());
+        let pictures = render(batch.as_ref(), report)?;
+        match batch.finish()? {
+            BatchOutcome::Complete => {
+                return Ok(RenderedBatch { pictures, expected: batch.selection().expected.clone() });
+            }
+            BatchOutcome::NeedsRelayout => *report = before,
+        }
+    }
+}

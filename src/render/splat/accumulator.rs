@@ -1,0 +1,197 @@
+//! A band of a picture while blocks are splatted into it, and its tiles once it has them all.
+
+use super::backend::SplatBackend;
+use super::band::{Band, SplatStats, splat_in_batches};
+use super::footprints::{FootprintBands, Tile};
+use super::lattice::{Cells, Gather, Lattice};
+use super::lattice_bands::LatticeBands;
+use super::tile_rect::{TILE, TileRect};
+use super::view_setup::ViewSetup;
+use crate::base::error::Result;
+use crate::render::layout::Layout;
+use crate::render::plane_values::BlockSource;
+use crate::wavelet::Lane;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A band of a picture.
+pub(in crate::render) struct BandAccumulator<'a> {
+    band: Band<'a>,
+    planes: usize,
+    sums: BandSums<'a>,
+}
+
+enum BandSums<'a> {
+    Tiles(Vec<Tile>),
+    Cells(&'a Lattice, Cells),
+}
+
+impl<'a> BandAccumulator<'a> {
+    /// Some rows of a picture with all planes at zero.
+    pub(in crate::render) fn new(setup: &'a ViewSetup, rows: Range<usize>, layout: &Layout) -> Self {
+        let (width, planes) = (setup.camera.size[0], layout.planes());
+        let tile = |rect| Tile::new(rect, planes, layout.order);
+        let sums = match &setup.backend {
+            SplatBackend::Lattice(lattice) => BandSums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
+            SplatBackend::Footprints => {
+                BandSums::Tiles(TileRect::cover(width, rows.clone(), TILE).into_iter().map(tile).collect())
+            }
+        };
+        Self { band: Band { setup, rows }, planes, sums }
+    }
+
+    /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
+    pub(in crate::render) fn finish<T: Send>(
+        &self,
+        pictures: &mut [T],
+        finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
+    ) {
+        Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
+    }
+
+    /// The same for the same rows of several pictures that look alike, layers one behind the other: of every tile first those
+    /// that are `wanted` of the first few layers together, then of the next.
+    pub(in crate::render) fn finish_layers<T: Send>(
+        layers: &[Self],
+        together: usize,
+        pictures: &mut [T],
+        wanted: impl Fn(usize, &TileRect) -> bool + Sync,
+        finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
+    ) {
+        let Some(Self { band, .. }) = layers.first() else { return };
+        let (width, side) = (band.setup.camera.size[0], band.setup.backend.tile());
+        let columns = width.div_ceil(side);
+        let rects = TileRect::cover(width, band.rows.clone(), side);
+        let bands = layers[0].by_rows_of_tiles(pictures, side);
+        rects.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (rects, planes))| {
+            let mut pixels = Pixels { planes, width, top: rects[0].y.start };
+            for (i, rect) in rects.iter().enumerate() {
+                for first in (0..layers.len()).step_by(together) {
+                    let some = first..layers.len().min(first + together);
+                    let some: Vec<&Self> = some.filter(|n| wanted(*n, rect)).map(|n| &layers[n]).collect();
+                    if !some.is_empty() {
+                        finish(ResolvedTile::new(&some, rect, n * columns + i), &mut pixels);
+                    }
+                }
+            }
+        });
+    }
+
+    /// For every row of tiles its rows of every picture.
+    fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
+        let [width, height] = self.band.setup.camera.size;
+        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
+        bands.resize_with(self.band.rows.len().div_ceil(side), Vec::new);
+        for picture in pictures.chunks_exact_mut(width * height) {
+            let rows = picture[self.band.rows.start * width..self.band.rows.end * width].chunks_mut(side * width);
+            bands.iter_mut().zip(rows).for_each(|(band, rows)| band.push(rows));
+        }
+        bands
+    }
+}
+
+/// A tile that has all its blocks, in one layer or more.
+pub(in crate::render) struct ResolvedTile<'a> {
+    pub(in crate::render) rect: &'a TileRect,
+    pub(in crate::render) layers: usize,
+    /// Of a layer.
+    planes: usize,
+    sums: TileSums<'a>,
+}
+
+enum TileSums<'a> {
+    Tiles(Vec<&'a Tile>),
+    Gather(Gather<'a>),
+}
+
+impl<'a> ResolvedTile<'a> {
+    /// The tile with such a number in some layers that look alike.
+    fn new(layers: &[&'a BandAccumulator<'a>], rect: &'a TileRect, number: usize) -> Self {
+        let (mut tiles, mut cells) = (Vec::new(), Vec::new());
+        for layer in layers {
+            match &layer.sums {
+                BandSums::Tiles(of_band) => tiles.push(&of_band[number]),
+                BandSums::Cells(lattice, of_band) => cells.push((*lattice, of_band)),
+            }
+        }
+        let planes = layers[0].planes;
+        let sums = match cells.first() {
+            Some((lattice, _)) => {
+                let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
+                TileSums::Gather(lattice.gather((&cells, planes), rect))
+            }
+            None => TileSums::Tiles(tiles),
+        };
+        Self { rect, layers: layers.len(), planes, sums }
+    }
+
+    /// The planes that may have sums, counted through all layers.
+    pub(in crate::render) fn used(&self) -> Vec<usize> {
+        match &self.sums {
+            TileSums::Tiles(_) => (0..self.layers * self.planes).collect(),
+            TileSums::Gather(gather) => gather.used().to_vec(),
+        }
+    }
+
+    /// The planes of all layers at `count` pixels from `first` on, into the first lanes of `planes`.
+    pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
+        match &mut self.sums {
+            TileSums::Tiles(tiles) => {
+                let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // of none there is nothing to load
+                tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
+            }
+            TileSums::Gather(gather) => gather.load(first, count, planes),
+        }
+    }
+
+    /// The same where there is one plane only.
+    pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
+        let mut planes = [Lane::default()];
+        match &mut self.sums {
+            TileSums::Tiles(tiles) => tiles[0].load(first, count, &mut planes),
+            TileSums::Gather(gather) => planes[0] = gather.load_one(first, count),
+        }
+        planes[0]
+    }
+}
+
+/// The rows of some pictures that a row of tiles is in.
+pub(in crate::render) struct Pixels<'a, T> {
+    planes: Vec<&'a mut [T]>,
+    width: usize,
+    top: usize,
+}
+
+impl<T> Pixels<'_, T> {
+    /// Neighbouring pixels of a row of a picture.
+    pub(in crate::render) fn at(&mut self, picture: usize, [x, y]: [usize; 2], count: usize) -> &mut [T] {
+        &mut self.planes[picture][(y - self.top) * self.width + x..][..count]
+    }
+}
+
+impl<T: Copy> Pixels<'_, T> {
+    /// Puts neighbouring pixels of a row into a picture.
+    pub(in crate::render) fn put(&mut self, picture: usize, [x, y]: [usize; 2], pixels: &[T]) {
+        self.at(picture, [x, y], pixels.len()).copy_from_slice(pixels);
+    }
+}
+
+/// Splats blocks in order, `batch` at a time, each into all bands that see it. A block is decoded once for all bands that
+/// take footprints, and once for all that have a lattice.
+pub(in crate::render) fn splat(
+    accumulators: &mut [BandAccumulator<'_>],
+    blocks: (&[usize], usize),
+    source: &dyn BlockSource,
+) -> Result<SplatStats> {
+    let (mut tiles, mut cells) = (Vec::new(), Vec::new());
+    let planes = accumulators.first().map_or(0, |accumulator| accumulator.planes);
+    for BandAccumulator { band, sums, .. } in accumulators {
+        match sums {
+            BandSums::Tiles(of_band) => tiles.push((band.clone(), of_band)),
+            BandSums::Cells(lattice, of_band) => cells.push((band.clone(), *lattice, of_band)),
+        }
+    }
+    let mut stats = splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
+    stats += splat_in_batches(&mut LatticeBands::new(cells), blocks, source)?;
+    Ok(stats)
+}

@@ -1,0 +1,90 @@
+//! The seam behind which a view is splatted: which backend a view takes, and what that backend needs.
+//!
+//! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels reached,
+//! tile sizes, memory) and hands it blocks through [`super::accumulator`].
+
+use super::lattice::Lattice;
+use super::tile_rect::{TILE, pixels_reached};
+use crate::base::grid::{Grid, Region};
+use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
+use crate::view::camera::Camera;
+use crate::view::footprint::{Footprint, Method};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// How the voxels of a view become pixels.
+#[derive(Debug, Clone)]
+pub(in crate::render) enum SplatBackend {
+    /// Every voxel adds its footprint to the pixels that it covers.
+    Footprints,
+    /// Voxels are spread to the cells of the view's sheared lattice, and pixels gather from these.
+    Lattice(Arc<Lattice>),
+}
+
+/// The footprints of a view at the configured splat error.
+///
+/// Where pictures are certified, weights may be as small as the background's, so cuts are tighter.
+pub(super) fn footprint_method(config: &RenderConfig) -> Method {
+    let share = if config.certify && config.quantity == Quantity::Mean { BACKGROUND } else { 1.0 };
+    splat_method(config.quantity, share * config.splat_error)
+}
+
+impl SplatBackend {
+    /// The backend of a view, and the method that reports name. Certified pictures take footprints.
+    pub(super) fn choose(
+        config: &RenderConfig,
+        volume: (&Grid, &Region),
+        camera: &Camera,
+        footprint: &Footprint,
+    ) -> (Self, Method) {
+        let error = most_splat_error(config.quantity, config.splat_error);
+        let lattice = (!config.certify).then(|| Lattice::within(error, config.kernel, volume, camera, footprint));
+        match lattice.flatten() {
+            Some((lattice, method)) => (Self::Lattice(Arc::new(lattice)), method),
+            None => (Self::Footprints, footprint_method(config)),
+        }
+    }
+
+    /// Whether voxels are spread to cells.
+    pub(in crate::render) fn is_lattice(&self) -> bool {
+        matches!(self, Self::Lattice(_))
+    }
+
+    /// Pixels per side of a tile.
+    pub(in crate::render) fn tile(&self) -> usize {
+        match self {
+            Self::Footprints => TILE,
+            Self::Lattice(lattice) => lattice.tile(),
+        }
+    }
+
+    /// The columns and rows that any voxel of a region can reach.
+    pub(super) fn pixels_reached(
+        &self,
+        region: &Region,
+        grid: &Grid,
+        camera: &Camera,
+        footprint: &Footprint,
+    ) -> [Range<usize>; 2] {
+        match self {
+            Self::Footprints => pixels_reached(region, grid, camera, footprint),
+            Self::Lattice(lattice) => lattice.pixels_reached(region, camera.size),
+        }
+    }
+
+    /// Sums of a plane in a band of so many pixels, at most.
+    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize) -> usize {
+        match self {
+            Self::Footprints => width * rows.next_multiple_of(TILE),
+            Self::Lattice(lattice) => lattice.band_cells(width, rows),
+        }
+    }
+
+    /// Numbers that a thread holds while it splats a block, or reads a tile with so many planes.
+    pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.scratch(block, planes),
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Bands of pictures take in blocks: read in batches, in file order, so that sums depend neither on threads nor on memory.
+
+use super::view_setup::ViewSetup;
+use crate::base::error::Result;
+use crate::render::plane_values::{BlockPlanes, BlockSource};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+/// Some rows of the picture of a view.
+#[derive(Clone)]
+pub(super) struct Band<'a> {
+    pub(super) setup: &'a ViewSetup,
+    pub(super) rows: Range<usize>,
+}
+
+impl Band<'_> {
+    /// Whether a block is to be splatted here.
+    pub(super) fn sees(&self, block: usize) -> bool {
+        self.setup.sees(block, &self.rows)
+    }
+}
+
+/// What splatting some blocks took.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::render) struct SplatStats {
+    /// Blocks that were read.
+    pub(in crate::render) blocks: u64,
+    /// Nonzero coefficients in them.
+    pub(in crate::render) coefficients: u64,
+    /// Stored bytes that were read of them.
+    pub(in crate::render) bytes: u64,
+    /// Time spent reading and decoding.
+    pub(in crate::render) decode: Duration,
+    /// Time spent splatting.
+    pub(in crate::render) splat: Duration,
+}
+
+impl std::ops::AddAssign for SplatStats {
+    fn add_assign(&mut self, other: Self) {
+        self.blocks += other.blocks;
+        self.coefficients += other.coefficients;
+        self.bytes += other.bytes;
+        self.decode += other.decode;
+        self.splat += other.splat;
+    }
+}
+
+/// Bands of several views that one backend splats together, so that a block is decoded once for all.
+pub(super) trait BandGroup: Sync {
+    /// A block, ready to be added to the bands that see it.
+    type Block<'b>: Send + Sync;
+
+    /// The bands.
+    fn bands(&self) -> &[Band<'_>];
+
+    /// Makes a block ready. Called by several threads.
+    fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<Self::Block<'b>>;
+
+    /// Adds blocks in order.
+    fn add(&mut self, blocks: &[Self::Block<'_>]) -> Result<()>;
+}
+
+/// Splats those of `blocks` that a band sees, in order, `batch` at a time.
+pub(super) fn splat_in_batches(
+    group: &mut impl BandGroup,
+    (blocks, batch): (&[usize], usize),
+    source: &dyn BlockSource,
+) -> Result<SplatStats> {
+    let is_seen = |block: &usize| group.bands().iter().any(|band| band.sees(*block));
+    let seen: Vec<usize> = blocks.iter().copied().filter(is_seen).collect();
+    let mut stats = SplatStats { blocks: seen.len() as u64, ..SplatStats::default() };
+    for blocks in seen.chunks(batch) {
+        let clock = Instant::now();
+        let read = |block: &usize| {
+            let planes = source.planes(*block)?;
+            Ok((planes.held(), group.prepare(*block, planes)?))
+        };
+        let (held, ready): (Vec<_>, Vec<_>) =
+            blocks.par_iter().map(read).collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        stats.decode += clock.elapsed();
+        let clock = Instant::now();
+        group.add(&ready)?;
+        stats.splat += clock.elapsed();
+        for [coefficients, bytes] in held {
+            stats.coefficients += coefficients;
+            stats.bytes += bytes;
+        }
+    }
+    Ok(stats)
+}

@@ -1,0 +1,95 @@
+//! The lattice backend: values of all voxels, plane by plane, to the cells of each view's lattice.
+
+use super::band::{Band, BandGroup};
+use super::lattice::{CellPlane, Cells, Lattice, Placed, Rectangle, Work};
+use crate::base::error::Result;
+use crate::render::plane_values::{BlockPlanes, Scratch};
+use rayon::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Bands of views that have a lattice.
+pub(super) struct LatticeBands<'a, 'c> {
+    bands: Vec<Band<'a>>,
+    lattices: Vec<&'a Lattice>,
+    cells: Vec<&'c mut Cells>,
+    /// The cells that each band holds.
+    rectangles: Vec<Rectangle>,
+    /// Used again: memory fresh from the system costs as much as the work that it is for.
+    spare: Mutex<Vec<(Scratch, Work)>>,
+}
+
+/// A block and its place in every band that sees it.
+pub(super) struct PlacedBlock<'b> {
+    planes: Box<dyn BlockPlanes + 'b>,
+    placed: Vec<Option<Placed>>,
+}
+
+impl<'a, 'c> LatticeBands<'a, 'c> {
+    pub(super) fn new(bands: Vec<(Band<'a>, &'a Lattice, &'c mut Cells)>) -> Self {
+        let mut group = Self {
+            bands: Vec::new(),
+            lattices: Vec::new(),
+            cells: Vec::new(),
+            rectangles: Vec::new(),
+            spare: Mutex::default(),
+        };
+        for (band, lattice, cells) in bands {
+            group.bands.push(band);
+            group.lattices.push(lattice);
+            group.rectangles.push(cells.rectangle());
+            group.cells.push(cells);
+        }
+        group
+    }
+
+    /// Where a block lies in a band.
+    fn place(&self, band: usize, block: usize) -> Option<Placed> {
+        let setup = self.bands[band].setup;
+        let (region, clip) = (setup.blocks.region(block), (&setup.clip, setup.slab.as_ref()));
+        self.bands[band].sees(block).then(|| self.lattices[band].placed(&region, clip, &self.rectangles[band]))
+    }
+}
+
+impl BandGroup for LatticeBands<'_, '_> {
+    type Block<'b> = PlacedBlock<'b>;
+
+    fn bands(&self) -> &[Band<'_>] {
+        &self.bands
+    }
+
+    fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<PlacedBlock<'b>> {
+        let placed = (0..self.bands.len()).map(|band| self.place(band, block)).collect();
+        Ok(PlacedBlock { planes, placed })
+    }
+
+    /// Each plane has one owner, so that its sums do not depend on threads.
+    fn add(&mut self, blocks: &[PlacedBlock<'_>]) -> Result<()> {
+        let spare = &self.spare;
+        by_planes(&mut self.cells).into_par_iter().enumerate().try_for_each(|(plane, mut bands)| {
+            let (mut scratch, mut work) = lock(spare).pop().unwrap_or_default();
+            for PlacedBlock { planes, placed } in blocks {
+                let values = planes.plane(plane, &mut scratch)?;
+                for (sums, placed) in bands.iter_mut().zip(placed) {
+                    placed.iter().for_each(|placed| placed.add(values, sums, &mut work));
+                }
+            }
+            lock(spare).push((scratch, work));
+            Ok(())
+        })
+    }
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For every plane its cells in all bands.
+fn by_planes<'a>(cells: &'a mut [&mut Cells]) -> Vec<Vec<CellPlane<'a>>> {
+    let mut planes: Vec<Vec<CellPlane<'_>>> = Vec::new();
+    for of_band in cells {
+        let of_band = of_band.planes_mut();
+        planes.resize_with(of_band.len(), Vec::new);
+        planes.iter_mut().zip(of_band).for_each(|(plane, sums)| plane.push(sums));
+    }
+    planes
+}

@@ -1,0 +1,29 @@
+//! How voxels become sums of pixels: the geometry of a view's picture, the two backends, and the bands that they fill.
+//!
+//! ```text
+//! a view            view_setup: camera, kernel, which voxels; backend: footprints or lattice, decided once
+//! a block           plane values, from a scene                                      (read by workers)
+//!   footprints      sparse_terms -> footprints: each voxel's footprint into the tiles of the band
+//!   lattice         lattice_bands -> lattice: spread to cells, plane by plane
+//! a tile            accumulator: its planes, pixel by pixel, for [`super::reconstruct`] to invert
+//! ```
+//!
+//! Nothing here knows what the planes mean or where blocks come from.
+
+pub(super) mod tile_rect;
+pub(super) mod slab;
+pub(super) mod lattice;
+pub(super) mod backend;
+pub(super) mod view_setup;
+pub(super) mod reference_weights;
+pub(super) mod sparse_terms;
+mod band;
+pub(super) mod footprints;
+mod lattice_bands;
+pub(super) mod accumulator;
+
+pub(super) use accumulator::{BandAccumulator, Pixels, ResolvedTile, splat};
+pub(super) use band::SplatStats;
+pub(super) use slab::Slab;
+pub(super) use tile_rect::TileRect;
+pub(super) use view_setup::ViewSetup;

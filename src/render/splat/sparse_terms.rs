@@ -1,0 +1,79 @@
+//! The values of a block, voxel by voxel: what footprints take in.
+
+use crate::base::error::Result;
+use crate::render::plane_values::{BlockPlanes, Scratch};
+
+/// What a block adds to the planes: for each voxel in array order, some (plane, amount).
+#[derive(Debug)]
+pub(in crate::render) struct SparseTerms {
+    /// Where those of each voxel end.
+    ends: Vec<u32>,
+    planes: Vec<u16>,
+    amounts: Vec<f64>,
+}
+
+impl SparseTerms {
+    /// What those of a voxel take in so many planes, at most: as they are found, in a vector that grows, and in place.
+    pub(in crate::render) const fn most_bytes(planes: usize) -> usize {
+        planes * (2 * size_of::<(u32, u16, f64)>() + 2 + 8) + 2 * size_of::<u32>()
+    }
+
+    /// What a block has in so many planes.
+    pub(in crate::render) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
+        let (mut found, mut room) = (Vec::new(), Scratch::default());
+        let mut ends = vec![0_u32; block.voxels() + 1];
+        for plane in 0..planes {
+            block.plane(plane, &mut room)?.for_each(|voxel, amount| {
+                found.push((voxel as u32, plane as u16, amount));
+                ends[voxel + 1] += 1;
+            });
+        }
+        for voxel in 1..ends.len() {
+            ends[voxel] += ends[voxel - 1];
+        }
+        let mut terms = Self { planes: vec![0; found.len()], amounts: vec![0.0; found.len()], ends };
+        found.into_iter().for_each(|(voxel, plane, amount)| terms.put(voxel as usize, plane, amount));
+        terms.ends.pop();
+        Ok(terms)
+    }
+
+    /// Puts a term behind those of its voxel; until all are there, a voxel ends where its next term comes.
+    fn put(&mut self, voxel: usize, plane: u16, amount: f64) {
+        let at = &mut self.ends[voxel];
+        (self.planes[*at as usize], self.amounts[*at as usize]) = (plane, amount);
+        *at += 1;
+    }
+
+    /// The planes and amounts of a voxel.
+    pub(in crate::render) fn of_voxel(&self, voxel: usize) -> (&[u16], &[f64]) {
+        let start = if voxel == 0 { 0 } else { self.ends[voxel - 1] as usize };
+        let range = start..self.ends[voxel] as usize;
+        (&self.planes[range.clone()], &self.amounts[range])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::plane_values::PlaneValues;
+
+    #[test]
+    fn every_voxel_has_the_terms_of_all_planes() {
+        struct Three;
+        impl BlockPlanes for Three {
+            fn voxels(&self) -> usize {
+                3
+            }
+            fn plane<'a>(&'a self, plane: usize, _: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+                Ok([PlaneValues::Single(&[0.0, 1.5, 2.0]), PlaneValues::Nothing, PlaneValues::Few(&[(2, -1.0)])][plane])
+            }
+            fn held(&self) -> [u64; 2] {
+                [0; 2]
+            }
+        }
+        let terms = SparseTerms::of(&Three, 3).expect("no block fails here");
+        assert_eq!(terms.of_voxel(0), (&[][..], &[][..]));
+        assert_eq!(terms.of_voxel(1), (&[0][..], &[1.5][..]));
+        assert_eq!(terms.of_voxel(2), (&[0, 2][..], &[2.0, -1.0][..]));
+    }
+}

@@ -1,0 +1,98 @@
+//! Everything that is the same for all frames of a view: camera, kernel, backend, and which voxels count.
+
+use super::backend::{SplatBackend, footprint_method};
+use super::slab::Slab;
+use super::tile_rect::overlap;
+use crate::base::error::{Error, Result};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::render::config::{Quantity, RenderConfig};
+use crate::view::camera::{Camera, View};
+use crate::view::footprint::{Footprint, Method};
+use std::ops::Range;
+
+/// A mean needs some voxel that is not deeper than this over tau: exponentials lose digits at 708, and vanish.
+const DEEPEST: f64 = 640.0;
+
+/// Everything that is the same for all frames of a view.
+#[derive(Debug, Clone)]
+pub(in crate::render) struct ViewSetup {
+    pub(in crate::render) camera: Camera,
+    pub(in crate::render) footprint: Footprint,
+    pub(in crate::render) tau: f64,
+    pub(in crate::render) grid: Grid,
+    pub(in crate::render) blocks: BlockGrid,
+    /// The voxels that are splatted.
+    pub(in crate::render) clip: Region,
+    pub(in crate::render) backend: SplatBackend,
+    /// The method's name and its stated error.
+    pub(in crate::render) method: Method,
+    /// The error of the method, and of voxels left out for their depth.
+    pub(in crate::render) stated_error: f64,
+    /// Voxels further away may be left out.
+    pub(in crate::render) deepest: f64,
+    /// The slab that is seen; none: the whole volume.
+    pub(in crate::render) slab: Option<Slab>,
+}
+
+impl ViewSetup {
+    /// The setup of a view of `grid`, which is cut into `blocks`.
+    ///
+    /// # Errors
+    /// A region outside the volume, a camera without a picture, or an attenuation that leaves no weights.
+    pub(in crate::render) fn new(
+        (grid, blocks): (Grid, BlockGrid),
+        config: &RenderConfig,
+        view: &View,
+    ) -> Result<Self> {
+        let clip = config.region.unwrap_or(grid.whole());
+        if !grid.whole().contains(&clip) || clip.is_empty() {
+            let d = grid.dims;
+            return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
+        }
+        let camera = Camera::new(view, &grid)?;
+        let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
+        let nearest = camera.nearest_of(&grid.crop(&clip));
+        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
+            let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
+            return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
+        }
+        let (backend, method) = SplatBackend::choose(config, (&grid, &clip), &camera, &footprint);
+        let (tau, stated_error, deepest) = (config.kernel.tau, method.stated_error, f64::INFINITY);
+        Ok(Self { camera, footprint, tau, grid, blocks, clip, backend, method, stated_error, deepest, slab: None })
+    }
+
+    pub(in crate::render) fn pixels(&self) -> usize {
+        self.camera.size[0] * self.camera.size[1]
+    }
+
+    /// Whether a block is so deep that it may be left out.
+    pub(in crate::render) fn is_too_deep(&self, block: usize) -> bool {
+        self.camera.nearest_of(&self.grid.crop(&self.blocks.region(block))) > self.deepest
+    }
+
+    /// Whether a block is to be splatted into these rows of the picture.
+    pub(in crate::render) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
+        self.is_in_slab(block) && self.reaches(block, rows) && !self.is_too_deep(block)
+    }
+
+    /// Whether any kernel of a block reaches into the slab that is seen.
+    pub(in crate::render) fn is_in_slab(&self, block: usize) -> bool {
+        let region = || self.blocks.region(block).intersect(&self.clip);
+        let reached = |slab: Slab| !region().is_empty() && slab.is_reached(&region(), &self.grid, &self.camera);
+        self.slab.is_none_or(reached)
+    }
+
+    /// Whether any voxel of a block can reach these rows of the picture.
+    pub(in crate::render) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
+        overlap(&self.pixels_reached(&self.blocks.region(block))[1], rows)
+    }
+
+    /// The columns and rows that any voxel of a region can reach.
+    pub(in crate::render) fn pixels_reached(&self, region: &Region) -> [Range<usize>; 2] {
+        let region = region.intersect(&self.clip);
+        if region.is_empty() {
+            return [0..0, 0..0];
+        }
+        self.backend.pixels_reached(&region, &self.grid, &self.camera, &self.footprint)
+    }
+}

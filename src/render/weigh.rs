@@ -1,0 +1,94 @@
+//! Makes the sums of weights of a view: a 1 for every voxel, splatted the way values are (eq 12).
+
+use super::certificate;
+use super::config::{BACKGROUND, Quantity, RenderConfig};
+use super::layout::{Layout, Order};
+use super::plan::Budget;
+use super::plane_values::{BlockPlanes, BlockSource, UnitValues};
+use super::splat::reference_weights::ReferenceWeights;
+use super::splat::{BandAccumulator, Pixels, ResolvedTile, ViewSetup, splat};
+use super::weights::{WeightedView, Weights};
+use crate::base::error::Result;
+use crate::base::grid::BlockGrid;
+use crate::view::footprint::{Footprint, Method};
+use crate::wavelet::LANES;
+use rayon::prelude::*;
+
+/// A view with its sums of weights.
+pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Budget<'_>) -> Result<WeightedView<'a>> {
+    let by = |method: Method| Footprint::new(config.kernel, &setup.grid, setup.camera.scale, method);
+    let sums = sums(setup, budget)?;
+    let largest = sums.iter().copied().fold(0.0, f64::max);
+    let mut weights = Weights { size: setup.camera.size, threshold: BACKGROUND * largest, sums, ..Weights::default() };
+    if config.quantity == Quantity::Mean && setup.method != Method::EXACT {
+        judge_background(&mut weights, &ReferenceWeights::new(setup, &by(Method::EXACT)?), setup.stated_error);
+    }
+    if config.certify {
+        let whole = ViewSetup { footprint: by(certificate::WHOLE)?, ..setup.clone() };
+        weights.beyond = self::sums(&whole, budget)?;
+        certificate::leave_beyond(&whole, &weights.sums, &mut weights.beyond);
+    }
+    Ok(WeightedView { setup, weights })
+}
+
+/// Replaces sums by uncut ones where the difference may decide what is background, so that every method has the same one.
+///
+/// Sums are off by at most `off` of the largest sum anywhere. So the largest sum here is taken anew, and so are all sums
+/// near the threshold that follows from it.
+fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off: f64) {
+    let pixel = |at: usize| [at % weights.size[0], at / weights.size[0]];
+    let brighter = |best: usize, at: usize| if weights.sums[at] > weights.sums[best] { at } else { best };
+    let largest = reference.at(pixel((0..weights.sums.len()).fold(0, brighter)));
+    let (threshold, near) = (BACKGROUND * largest, off * reference.most());
+    let mut sums = weights.sums.clone();
+    sums.par_iter_mut().enumerate().for_each(|(at, sum)| {
+        if (*sum - threshold).abs() <= near {
+            *sum = reference.at(pixel(at));
+        }
+    });
+    (weights.threshold, weights.reference) = (threshold, sums);
+}
+
+/// The sums of weights as the setup splats them.
+fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<Vec<f64>> {
+    let layout = Layout {
+        coefficients: 1,
+        frames: 1,
+        values: false,
+        absent: false,
+        error_planes: 0,
+        lengths: false,
+        order: Order::Planes,
+    };
+    let mut out = vec![0.0; setup.pixels()];
+    for rows in budget.bands(&layout) {
+        let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
+        let mut accumulator = BandAccumulator::new(setup, rows.clone(), &layout);
+        let batch = budget.batch(&layout, rows.len());
+        splat(std::slice::from_mut(&mut accumulator), (&blocks, batch), &Ones(&setup.blocks))?;
+        accumulator.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
+    }
+    Ok(out)
+}
+
+/// A 1 for every voxel of a block.
+struct Ones<'a>(&'a BlockGrid);
+
+impl BlockSource for Ones<'_> {
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        Ok(Box::new(UnitValues(self.0.region(block).voxels())))
+    }
+}
+
+fn put_first_plane(tile: &mut ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
+    let place = tile.rect;
+    if tile.used().is_empty() {
+        return;
+    }
+    for (y, at) in place.y.clone().zip((0..).step_by(place.x.len())) {
+        for first in (0..place.x.len()).step_by(LANES) {
+            let count = LANES.min(place.x.len() - first);
+            pixels.put(0, [place.x.start + first, y], &tile.load_one(at + first, count)[..count]);
+        }
+    }
+}
