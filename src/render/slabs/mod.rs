@@ -1,5 +1,8 @@
-//! Along the rays, slab by slab (method.md section 7): the volume is cut across the view direction, the planes of each slab
-//! are splatted and inverted for all frames, and its means are coloured and composited front to back.
+//! Colour and opacity along the rays, slab by slab.
+//!
+//! The volume is cut into slabs across the view direction, as in image-aligned splatting
+//! ([Mueller](crate::bibliography)). The planes of each slab are splatted and inverted for all frames, and its means
+//! are coloured and composited front to back.
 //!
 //! ```text
 //! for each view
@@ -7,21 +10,29 @@
 //!     which tiles of which slabs can be seen       visible: from the ranges of blocks
 //!     for each band of rows
 //!       for each run of slabs, front to back       as many as fit, and as a block is deep
-//!         splat the blocks that they need          canvas, as for several views: each slab is an eye of its own
+//!         splat the blocks that they need          as for several views: each slab is a view of its own
 //!         each slab: every tile inverts its pixels, and blends them behind what is there
 //!     give the finished frames to the sink
 //! ```
 //!
-//! A slab takes of each voxel what of its kernel lies in the slab: the kernel is a product of one along the ray and one
-//! across it, so a weight is that of the projection times a share of a Gaussian's integral ([`Slab`]). With w those weights and
-//! v the samples, a pixel of a slab has the length l = sum w and the mean g = sum w v / l, and
+//! A slab takes of each voxel the part of its kernel that lies in the slab. The kernel is a product of a Gaussian along
+//! the ray and one across it, so the weight is that of the projection times a share of the Gaussian's integral (Phi is
+//! the normal distribution):
 //!
 //! ```text
-//! T = exp(-kappa(g) l)       kappa(v) = -ln(1 - opacity(v)) / unit
+//! w_{i,slab} = w_i (Phi((far - z_i) / sigma) - Phi((near - z_i) / sigma))                                 (eq 29)
 //! ```
 //!
-//! is what it lets through. As slabs become thinner that tends to the integral along the ray through the field that the kernels
-//! make of the samples. Every mean is off by no more than the file's bound.
+//! With these weights, a pixel of a slab has the length l = sum of w and the mean g = sum of w v / l. Its light is that
+//! of the emission-absorption model of [Max](crate::bibliography):
+//!
+//! ```text
+//! through = exp(-kappa(g) l)        kappa(v) = -ln(1 - opacity(v)) / unit                                 (eq 30)
+//! light = sum over slabs of (product of through before) (1 - through) colour(g)                           (eq 31)
+//! ```
+//!
+//! As slabs become thinner, that tends to the integral along the ray through the field that the kernels make of the
+//! samples. Every mean is off by no more than the file's bound (eq 24).
 
 mod blend;
 mod cut;
