@@ -154,7 +154,10 @@ fn every_page_that_is_named_is_there() {
 #[test]
 fn citations_are_found() {
     assert_eq!(cited("as [Max](crate::bibliography) and [x](y) say").collect::<Vec<_>>(), ["Max"]);
-    assert_eq!(numbered("(eq 1-4), eqs 9 and 12; eq (5); assert_eq 7, eq x", "eq").collect::<Vec<_>>(), [1, 4, 9, 12, 5]);
+    assert_eq!(
+        numbered("(eq 1-4), eqs 9 and 12; eq (5); assert_eq 7, eq x", "eq").collect::<Vec<_>>(),
+        [1, 4, 9, 12, 5]
+    );
     assert_eq!(pages("see ../a/B.md, and c.md.").collect::<Vec<_>>(), ["../a/B.md", "c.md"]);
     assert_eq!(comments("a(); // one\n    /// two\n//! three\nb();"), "one two three");
 }
