@@ -1,4 +1,4 @@
-//! The promise of method.md section 5, searched for series that break it. Nothing here calls the library's own bound.
+//! The error bounds (eq 21-23), searched for series that break them. Nothing here calls the library's own bound.
 
 use crate::common::exact::Limit;
 use crate::common::memory::Memory;

@@ -1,4 +1,4 @@
-//! Certified pictures (method.md section 5): no pixel is further from the truth than its certificate says.
+//! Certified pictures (eq 26): no pixel is further from the truth than its certificate says.
 //!
 //! The truth is brute force over the samples of the source, with a kernel that is never cut. Nothing is allowed beyond
 //! the certificate itself.

@@ -1,4 +1,4 @@
-//! Pictures of single frames against brute force (method.md section 2).
+//! Pictures of single frames against brute force (eq 4 and 12).
 
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{MEMORY, direct, looking, pictures, rendered, rendered_if_it_can_be};

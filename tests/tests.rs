@@ -22,6 +22,7 @@ mod inputs;
 mod lattice;
 mod layering;
 mod left_out;
+mod literature;
 mod partial;
 mod python;
 mod real;

@@ -1,4 +1,4 @@
-//! How near the library's choice of coefficients comes to the fewest possible (method.md section 4), on tiny series.
+//! How near the library's choice of coefficients (eq 7) comes to the fewest possible, on tiny series.
 //!
 //! The library quantises, so its codes may do with fewer coefficients than exact values need. What rounding to codes
 //! moves is at most the bound, so it never has fewer than exact values need for TWICE the bound; and with Haar under rms,

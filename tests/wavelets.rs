@@ -1,4 +1,4 @@
-//! The transforms against the matrices of method.md section 3.
+//! The transforms against the matrices of `reference::transform` (eq 17-19).
 
 use crate::common::random::Random;
 use crate::reference::transform::{Matrix, apply, ghm_matrix, haar_matrix, inverse, transpose};

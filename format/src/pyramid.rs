@@ -1,8 +1,10 @@
 //! The passes of a pyramid: how the coefficients of a block are refined, axis by axis, from one node to all.
 //!
-//! A block has nodes at `[x, y, z, k]`, k a frame or a coefficient along time. The coarsest lattice holds every 2^L-th
-//! node along the refined axes: one node. A pass halves the stride along one axis; the nodes that it adds, at odd
-//! multiples of the new stride, are predicted from those on both sides, and a code says what is missing.
+//! A block has nodes at `[x, y, z, k]`; k is a frame, or a coefficient along time. The coarsest lattice is one node
+//! along every refined axis. A pass halves the stride along one axis. It adds the nodes at odd multiples of the new
+//! stride: they are predicted from their neighbours along that axis (eq 33), and a code times the step of the level is
+//! added (eq 32 and 34). The method page of the package `wavesplat` has these equations; `FORMAT.md`, section 8, has
+//! the arithmetic to the bit.
 
 use crate::bytes::{Check, ensure};
 use bincode::{Decode, Encode};
@@ -27,7 +29,7 @@ impl Axis {
     }
 }
 
-/// What predicts a node from its neighbours along an axis; new ones are appended.
+/// The weights with which the neighbours of a node along an axis predict it (eq 33); new ones are appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
 pub enum Stencil {
     /// (1, 1) / 2.
@@ -116,7 +118,7 @@ impl Pyramid {
         }
     }
 
-    /// The step of the codes of a level.
+    /// The step of the codes of a level: `step / min(growth^level, most)` (eq 34).
     pub fn step(&self, step: f64, level: u32) -> f64 {
         let grown = (0..level).fold(1.0, |product: f64, _| (product * self.growth).min(self.most));
         step / grown

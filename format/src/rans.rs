@@ -1,6 +1,19 @@
-//! Bytes in about their entropy: the range variant of asymmetric numeral systems (rANS) with fixed frequencies.
+//! Bytes in about their entropy: the range variant of asymmetric numeral systems (rANS), with fixed frequencies
+//! ([Duda](https://arxiv.org/abs/1311.2540)).
 //!
-//! A state holds 16 to 32 bits; long strings take turns in several states, so that a processor works on them at once.
+//! Frequencies F add up to 2^b. Byte value s owns F slots from `start`, the sum of the frequencies of lower values.
+//! Coding s turns a state X into
+//!
+//! ```text
+//! X' = 2^b floor(X / F) + start + X mod F                                                                 (eq 38)
+//! ```
+//!
+//! and decoding undoes that: X' mod 2^b is a slot of s, and X = F floor(X' / 2^b) + X' mod 2^b - start. A state holds
+//! 16 to 32 bits: it gives up its low 16 bits before it would grow beyond 32. Symbols are coded from the last to the
+//! first, so that they are decoded in order.
+//!
+//! Symbols of long strings take turns in several states, so that a processor works on them at once
+//! ([Giesen](https://arxiv.org/abs/1402.3392)).
 
 use crate::bits::{BitReader, BitWriter, take_bytes, take_varint};
 use crate::bytes::{Check, ensure};

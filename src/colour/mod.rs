@@ -1,8 +1,8 @@
 //! Values to colours and opacities.
 //!
 //! A [`TransferFunction`] is a colour, and where it is asked for an opacity, for every value: one of the field's named maps
-//! over a range, or what a file says (`file`). It is applied to samples before the transform (method.md 4.1), to pixels
-//! after projection, or along the ray; [`Scale`] is what a picture's pixels need of it.
+//! over a range, or what a file says (`file`). It is applied to samples before the transform (eq 28), to the means of pixels
+//! after projection, or along the ray (eq 31). [`Scale`] colours pixels.
 
 mod file;
 mod lab;

@@ -1,21 +1,22 @@
-//! Certified pictures: a bound on the error of every pixel (method.md section 5).
+//! Certified pictures: a bound on the error of every pixel.
 //!
-//! With w_i the weights of the uncut kernel and c_i those that are splatted, the true pictures are I = sum w_i v_i and
-//! g = I / sum w_i; the rendered ones have c_i for w_i and v^_i for v_i. Let r_i bound |v^_i - v_i|, let C = sum c_i,
-//! T = sum (w_i - c_i) be what lies beyond the cut, and the range V hold every v_i. Then
+//! Let w_i be the weights of the uncut kernel and w'_i those that are splatted. The true pictures are I = sum of w_i
+//! v_i and g = I / sum of w_i. The rendered ones have w'_i for w_i and v^_i for v_i. Let r_i bound |v^_i - v_i|, W' =
+//! sum of w'_i, B = sum of (w_i - w'_i), what lies beyond the cut (eq 15), and let the range V hold every v_i. Then
 //!
 //! ```text
-//! |I^ - I| <= sum c_i r_i + T max |V|
-//! |g^ - g| <= sum c_i r_i / C + T / (C + T) (max V - min V)
+//! |I^ - I| <= sum of w'_i r_i + B max |V|                                                                 (eq 26)
+//! |g^ - g| <= sum of w'_i r_i / W' + B / (W' + B) (max V - min V)
 //! ```
 //!
-//! since the mean over the cut and that beyond it are both means of values in V. Where samples are missing, C counts the
-//! weights that are present; T may count all, since T / (C + T) grows with T.
+//! The first line is the triangle inequality. For the second, g is a mean of two means, of the voxels as cut and of
+//! what lies beyond, with weights W' and B; both are within V. Where samples are missing, W' counts the weights that
+//! are present. B may count all weights, since B / (W' + B) grows with B.
 //!
-//! The r_i come from the directory by way of the selection of a batch into the error planes , whose sums
-//! [`super::reconstruct`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
-//! their absolute values, a weight by what [`weight_rounding`] says, and the inverse transform by [`INVERSE`]. A mean is
-//! off by that of its emission, and by that of its weights times itself.
+//! The directory of a file stores the r_i block by block. They are splatted like samples, into error planes. Rounding
+//! comes on top: a sum of N terms is off by N units in the last place of the sum of their absolute values, a weight by
+//! `weight_rounding`, and the inverse transform by `INVERSE`. A mean is off by the rounding of its emission, and by
+//! that of its weights times itself.
 
 use super::config::Quantity;
 use super::scene::FrameBounds;

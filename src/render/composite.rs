@@ -1,13 +1,12 @@
-//! Along the rays, slab by slab (method.md section 7): the volume is cut across the view direction, the planes of each slab
-//! are splatted and inverted for all frames, and its means are coloured and composited front to back.
+//! Composites and largest values: every batch of frames is splatted slab by slab, and slabs blend front to back.
 //!
 //! ```text
 //! for each view
-//!   for each group of frames of a window          plan: as many as fit
-//!     which tiles of which slabs can be seen       visible: from the ranges of blocks
+//!   for each batch of frames of a window           driver: as many as fit
+//!     which tiles of which slabs can be seen       slabs::visible: from the ranges of blocks
 //!     for each band of rows
 //!       for each run of slabs, front to back       as many as fit, and as a block is deep
-//!         splat the blocks that they need          canvas, as for several views: each slab is an eye of its own
+//!         splat the blocks that they need          as for several views: each slab is a view of its own
 //!         each slab: every tile inverts its pixels, and blends them behind what is there
 //!     give the finished frames to the sink
 //! ```

@@ -1,17 +1,18 @@
-//! How far off pixels are expected to be: the energies of blocks' errors by way of the weights of a view. An estimate.
+//! How far off pixels are expected to be, from the mean square errors of blocks and the weights of a view. An estimate.
 //!
-//! A pixel is the mean of its voxels by their weights w_i. Where these are off by s_i in the mean square, each by itself,
-//! the pixel is off by sum w_i^2 s_i^2 / W^2, with W = sum w_i; where all err together, by at most sum w_i s_i^2 / W.
-//! Errors of neighbours are alike, as if boxes of so many voxels erred together, so what counts is between the two:
+//! A pixel is the mean of its voxels by their weights w_i. Let s_i^2 be the mean square error of voxel i, and W = sum
+//! of w_i. If errors are independent, the pixel's expected squared error is sum of w_i^2 s_i^2 / W^2. If all voxels err
+//! together, it is at most sum of w_i s_i^2 / W. Errors of neighbours are alike, as if boxes of L voxels a side erred
+//! together. Then F voxels count as one, and the error is between the two:
 //!
 //! ```text
-//! s_i^2 w_i / W min(1, F w_i / W)        F = L L^2 (1 + n) / (L^2 + n)
+//! expected squared error of g = sum of s_i^2 w_i / W min(1, F w_i / W)                                    (eq 27)
+//! F = L L^2 (1 + n) / (L^2 + n)        n = 4 pi sigma^2, the voxels of a footprint
 //! ```
 //!
-//! for boxes of L voxels a side and footprints of n = 4 pi sigma^2 voxels: along the ray L voxels count as one, and
-//! across it those of a box that a footprint holds. In the mean over pixels w_i becomes a = 2 pi sigma^2 w_i pixels, and
-//! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
-//! voxels, and what is missing to be there.
+//! Along the ray, all L voxels of a box count as one. Across it, those that a footprint holds do. In the mean over
+//! pixels, w_i becomes a = 2 pi sigma^2 w_i pixels, and w_i^2 half of a w_i. For the emission, everything is multiplied
+//! by W^2. A block's errors are taken to be spread evenly over its voxels, and missing samples to be present.
 
 use super::config::{Quantity, RenderConfig};
 use super::weights::WeightedView;

@@ -1,4 +1,16 @@
-//! A scene to pictures (method.md sections 6 and 7): splat the planes of a batch of frames, then invert every pixel.
+//! A scene to pictures: splat the planes of a batch of frames, then invert every pixel.
+//!
+//! Splatting is linear, so it may come before the inverse transform along time, as in [Dobashi](crate::bibliography):
+//!
+//! ```text
+//! I^(t_j) = sum over k of C_k u_k(t_j)                                                                    (eq 8)
+//! C_k(x, y) = sum of c_{i,k} w_i(x, y)                                                                    (eq 9)
+//! g = I / sum of w_i                                                                                      (eq 12)
+//! ```
+//!
+//! A *plane* is the image of one k (or of one frame, where decoded samples are splatted). It holds sums over pixels, or
+//! over the cells of a lattice from which pixels follow. Coefficients are splatted once for all frames of a window, and
+//! a new view needs no new conversion. Partial sums over any split of the voxels add up.
 //!
 //! The modules are listed in the order in which a code becomes a pixel; each uses only those above it.
 //!
@@ -26,6 +38,11 @@
 //!       every tile inverts its pixels          reconstruct: planes -> frames, then / weights; certificate
 //!     give the finished frames to the sink
 //! ```
+//!
+//! A tile splats the voxels of a batch itself (`splat::footprints`) where footprints are less work than the lattice, where the
+//! lattice is not precise enough, and where pictures are certified. All planes of a view are splatted in the same way,
+//! weights and missing samples included, so that means stay means. Composites and largest values go slab by slab
+//! (`composite`).
 
 mod config;
 mod layout;

@@ -1,4 +1,5 @@
-//! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
+//! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by the sum of weights
+//! (eq 12).
 
 use super::certificate::Certificate;
 use super::config::{Quantity, RenderConfig};

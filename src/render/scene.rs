@@ -1,7 +1,7 @@
-//! What is splatted: a scene gives the terms of its blocks, whatever they are made of.
+//! What is splatted: a scene gives the terms of its blocks.
 //!
-//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes, and a
-//! linear map from planes to frames. That is all the rest of the renderer knows of them.
+//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes (eq 9), and
+//! a linear map from planes to frames (eq 8). The rest of the renderer knows no more of them.
 
 use super::config::RenderConfig;
 use super::expectation::Expectation;

@@ -1,4 +1,13 @@
-//! The sums of weights that a weighted mean divides by (eq 12), and which pixels are background.
+//! The sums of weights that the weighted mean divides by, and the background.
+//!
+//! ```text
+//! g = sum of v_i w_i / sum of w_i                                                                         (eq 12)
+//! background: sum of w_i < 1 % of the largest sum in the view                                             (eq 16)
+//! ```
+//!
+//! Both sums of eq 12 are splatted in the same way, so g is a mean whatever the splat leaves out. Eq 16 is judged by
+//! uncut weights, so that the background does not depend on the splat. Missing samples have no weight; their weights
+//! are taken away.
 
 use super::splat::ViewSetup;
 

@@ -1,4 +1,9 @@
-//! Samples as the colours that a transfer function gives them: three channels before any transform (method.md section 7).
+//! Samples as the colours of a transfer function: three channels before any transform, as in
+//! [Dobashi](crate::bibliography), section 4.1.
+//!
+//! ```text
+//! v_i^colour(t_j) = map_colour(v_i(t_j))        colour = red, green, blue                                 (eq 28)
+//! ```
 
 use super::FrameWindow;
 use crate::base::error::Result;

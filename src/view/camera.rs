@@ -1,4 +1,24 @@
-//! The parallel camera of method.md section 2: world positions to pixels and depth.
+//! The parallel camera: world positions to pixels and depth.
+//!
+//! With azimuth a and elevation e, the view looks along `forward`, and `right` is forward x up:
+//!
+//! ```text
+//! forward = (sin a cos e, -cos a cos e, -sin e)
+//! up      = (sin a sin e, -cos a sin e,  cos e)
+//! right   = (-cos a, -sin a, 0)
+//! ```
+//!
+//! At a = e = 0 it looks along -y with z up. The azimuth turns counter-clockwise seen from +z. The roll turns the
+//! picture counter-clockwise. The camera maps a world position p to a pixel position and a depth ([`crate::method`],
+//! section 2):
+//!
+//! ```text
+//! x = W/2 + S right.(p - c)    y = H/2 - S up.(p - c)    z = forward.(p - c) - least over the corners     (eq 14)
+//! ```
+//!
+//! W and H are the size of the picture, S is pixels per world unit, and c is the world point in the middle of the
+//! picture. Pixel (a, b) has its centre at (a + 1/2, b + 1/2). Depths are at least 0: they count from the nearest
+//! corner of the grid.
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -55,7 +75,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// The pixel position (x, y) and the depth z of a world position; z >= 0 in world units behind the nearest corner.
+    /// The pixel position (x, y) and the depth z of a world position (eq 14); z is in world units behind the nearest corner.
     pub fn project(&self, position: [f64; 3]) -> [f64; 3] {
         let q = minus(position, self.center);
         [

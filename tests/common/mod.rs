@@ -29,10 +29,10 @@ use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord,
 /// Plenty for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
 
-/// Every basis; those beyond the paper's come with a pyramid.
+/// Every basis; those that [Dobashi](wavesplat::bibliography) does not have come with a pyramid.
 pub(crate) const BASES: [Basis; 4] = [Basis::Haar, Basis::Multi, Basis::Samples, Basis::Learned];
 
-/// The paper's bases, and a window's length of `n`, or of one more where the basis asks for it, for every basis.
+/// The bases of [Dobashi](wavesplat::bibliography), and a window's length of `n`, or of one more where the basis asks for it, for every basis.
 pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
     BASES.map(|basis| (basis, n + usize::from(basis == Basis::Multi)))
 }

@@ -1,5 +1,5 @@
-//! Colour and opacity along the ray, by brute force: slab by slab as method.md section 7 has it, and the integral that this
-//! tends to as slabs become thinner.
+//! Colour and opacity along the ray, by brute force: slab by slab (eq 29-31), and the integral of
+//! [Max](wavesplat::bibliography) that this tends to as slabs become thinner.
 //!
 //! ```text
 //! C = sum over slabs of  T (1 - exp(-kappa(g) l)) c(g)        T = product over the slabs before of  exp(-kappa(g) l)

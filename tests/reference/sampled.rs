@@ -1,4 +1,4 @@
-//! The bound of the paper's section 3.4 (method.md section 5, `sampled`), voxel by voxel.
+//! The bound of [Dobashi](wavesplat::bibliography), section 3.4 (eq 11-13), voxel by voxel.
 
 use super::camera::Lattice;
 
@@ -9,7 +9,7 @@ pub(crate) struct Line {
     pub(crate) at: [f64; 3],
 }
 
-/// g of one frame on a line: the mean of the samples that are not missing, with the Gaussian weights of eq (9), tau = 0.
+/// g of one frame on a line: the mean of the samples that are not missing, with the Gaussian weights of eq 3, tau = 0.
 /// None if all that have any weight are missing. No voxel is too far away to count.
 pub(crate) fn mean(lattice: &Lattice, sigma: f64, line: &Line, values: &[f64], missing: &[bool]) -> Option<f64> {
     let (mut sum, mut weights) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! The fewest coefficients of method.md section 4, by trying every subset of them. For tiny series.
+//! The fewest coefficients that keep a series within a bound (eq 7), by trying every subset of them. For tiny series.
 //!
 //! Kept coefficients have their exact values: nothing is quantised, and none is adjusted to make up for dropped ones.
 
@@ -7,9 +7,9 @@ use super::transform::{Matrix, apply};
 /// What is compared with the bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Measure {
-    /// The largest |error| over the samples (section 5, `pointwise`).
+    /// The largest |error| over the samples (eq 21).
     Largest,
-    /// The square root of the mean over the samples of the squared error (section 5, `rms`).
+    /// The square root of the mean over the samples of the squared error (eq 23).
     Rms,
 }
 

@@ -1,4 +1,6 @@
-//! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
+//! Rendering from coefficients, the method of [Dobashi](crate::bibliography): the coefficients of a file are splatted
+//! once for all frames of a window (eq 9), and each pixel is inverted (eq 8). Decoded samples can be splatted instead
+//! (eq 4).
 
 use super::coded::CodedBlock;
 use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};

@@ -1,4 +1,4 @@
-//! The conventional method: the frames of an archive, each splatted as it is.
+//! The conventional method: every frame of an archive is splatted by itself (eq 4).
 
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};

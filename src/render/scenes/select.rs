@@ -1,4 +1,9 @@
-//! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
+//! Which level parts of a block are read under a looser tolerance, and how far its samples may then be off.
+//!
+//! A certified limit leaves out the finest parts of a block for as long as none of its samples is further off. A limit
+//! on the expected error (eq 27) leaves out parts by their expected error per byte, up to the same price for all
+//! blocks: no other choice of these steps reads fewer bytes for the same expected error
+//! ([Shoham](crate::bibliography)).
 
 use crate::base::grid::Grid;
 use crate::base::sample::magnitude;

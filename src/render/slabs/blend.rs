@@ -1,4 +1,5 @@
-//! What becomes of the slabs along a ray, front to back.
+//! How the slabs along a ray are combined, front to back: composited (eq 31; the operator "over" of
+//! [PorterDuff](crate::bibliography)), or the largest of them.
 
 use super::medium::Medium;
 

@@ -1,4 +1,4 @@
-//! A transfer function as what light meets: tables of colours and extinctions.
+//! A transfer function ([Levoy](crate::bibliography)) as a medium: tables of colours and extinctions kappa (eq 30).
 
 use crate::colour::TransferFunction;
 

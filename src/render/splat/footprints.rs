@@ -1,4 +1,5 @@
-//! The footprint backend: terms of voxels times footprints into the planes of tiles (eq 4 and 9).
+//! The splat: the terms of voxels times footprints, added to the planes of one tile of the picture (eq 9; eq 4 where
+//! the terms are samples). This is the splatting of [Westover](crate::bibliography).
 //!
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.

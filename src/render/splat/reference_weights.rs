@@ -1,4 +1,7 @@
-//! The sum of all weights at one place of the picture, by uncut footprints: what background is judged by, whatever splats.
+//! The sum of all weights at one place of the picture, by uncut footprints: the background is judged by it (eq 16).
+//!
+//! It also bounds what voxels beyond a depth add, since weights fall as exp(-tau z) (eq 3): the deepest can be left
+//! out.
 
 use super::lattice::Shear;
 use super::view_setup::ViewSetup;

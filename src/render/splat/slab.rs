@@ -1,4 +1,4 @@
-//! A slab across the view direction: how much of each voxel's kernel lies in it.
+//! A slab across the view direction: how much of each voxel's kernel lies in it (eq 29).
 
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;

@@ -1,4 +1,5 @@
-//! The demo: the paper's experiment in small (sections 4.1 and 4.2), from a solver's frames to figure 5 and table 1.
+//! The demo: the experiment of [Dobashi](wavesplat::bibliography), sections 4.1 and 4.2, in small, from a solver's frames to
+//! figure 5 and table 1.
 //!
 //! As in the paper, every sample is turned into red, green and blue before anything else, and all methods splat three
 //! channels. What the same methods take for one channel, which is coloured after it was projected, is printed below.

@@ -1,4 +1,4 @@
-//! Planes of sums over the cells of a band of a picture.
+//! Planes of sums over the cells (eq 35) of a band of a picture.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! The pixels of a tile from its cells.
+//! The pixels of a tile from its cells: sums of cells times the kernel of eq 36.
 
 use super::cells::Cells;
 use super::kernel::Weights;

@@ -1,13 +1,27 @@
-//! From cells to pixels: the kernel g that gives the Gaussian footprint once amounts are spread by B-splines.
+//! From cells to pixels: the kernel G that gives the Gaussian footprint once amounts are spread by B-splines.
 //!
-//! On the lattice the footprint is a Gaussian F of covariance S, in cells, and a B-spline of degree n has the spectrum
-//! B(w) = prod over both axes of exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)). So F / B is
+//! On the lattice the footprint is a Gaussian F of covariance S, in cells. A B-spline of degree n has the spectrum B(w)
+//! = exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)) along each axis. So the kernel of spectrum F / B is, to
+//! first order in the terms of fourth and sixth degree,
 //!
 //! ```text
-//! g = (1 + (n + 1) (d^4 / 2880 - d^6 / 181440)) Gaussian of covariance S - (n + 1) / 12        d along u, and along v
+//! G = (1 + (n+1) (D^4/2880 - D^6/181440)) Gaussian of covariance S - (n+1)/12                             (eq 36)
 //! ```
 //!
-//! What is left is how B repeats itself beyond half a cell's frequency, where F is small; [`Kernel::error`] measures it.
+//! with D a derivative along u, and the same along v. The spectrum of a spline repeats beyond half a cell's frequency,
+//! where F is small. That, and the terms left out, is the error of the lattice. `Kernel::error` states it so that for
+//! any voxels and any pixel
+//!
+//! ```text
+//! sum of |w~_i - w_i| <= stated error * largest sum of w_i                                                (eq 37)
+//! ```
+//!
+//! with w~ the weights reached. If |w~ - w| at a distance d is at most the sum over j of c_j w(d - t_j), for some
+//! shifts t_j, then all voxels together are off by the c_j times what they weigh at places moved by t_j: at most the
+//! sum of the c_j times the largest sum.
+//!
+//! The weights of a pixel's cells take three exponentials, since the Gaussian factors over whole cells: the fast
+//! Gaussian gridding of [Greengard](crate::bibliography).
 
 use super::shear::Shear;
 use super::spline::spread;

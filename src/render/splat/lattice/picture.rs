@@ -1,4 +1,5 @@
-//! The lattice of one view as a way of splatting: when it is used, the sums of blocks, and from sums to pixels.
+//! The lattice of one view as a way of splatting: when it is used (its stated error, eq 37, is small enough and it is
+//! less work than footprints), the sums of blocks, and from sums to pixels.
 
 use super::cells::{Cells, LINE, Rectangle};
 use super::gather::side_by_side;

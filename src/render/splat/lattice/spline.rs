@@ -1,4 +1,5 @@
-//! The B-splines that spread an amount over the cells around it.
+//! The B-splines that spread an amount over the cells around it ([Unser](crate::bibliography)), by the recurrence of
+//! [DeBoor](crate::bibliography).
 
 /// The highest degree.
 pub(super) const MOST_DEGREE: usize = 7;

@@ -1,6 +1,6 @@
-//! The amounts of a block's voxels to the cells around them.
+//! The amounts of a block's voxels to the cells around them, by B-splines at the places of eq 35.
 //!
-//! All voxels of a slice across the principal axis are spread by the same weights, so that a row of them is convolved with
+//! All voxels of a slice across the principal axis are spread by the same weights. So a row of them is convolved with
 //! the weights along u, once for each phase, and rows of cells are sums of such rows times the weights along v.
 
 use super::Spreading;
