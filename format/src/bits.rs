@@ -1,6 +1,6 @@
 //! Numbers of any width in bits, and numbers whose length depends on their size.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 
 /// Appends numbers bit by bit, the lowest bit first into the lowest free bit.
 pub(crate) struct BitWriter<'a> {
@@ -54,7 +54,7 @@ impl<'a> BitReader<'a> {
     }
 
     /// The bytes after the one that the last number ends in, whose bits left over must be zero.
-    pub(crate) fn end(self) -> Check<&'a [u8]> {
+    pub(crate) fn end(self) -> ParseResult<&'a [u8]> {
         let (used, rest) = self.bytes.split_at_checked(self.at.div_ceil(8)).ok_or("ends within its bits")?;
         let padding = if self.at.is_multiple_of(8) { 0 } else { used.last().map_or(0, |last| last >> (self.at % 8)) };
         ensure(padding == 0, || "padding bits are not zero".into())?;
@@ -77,7 +77,7 @@ pub(crate) fn put_varint(mut value: usize, out: &mut Vec<u8>) {
 }
 
 /// Takes a number of at most 5 bytes, as few as hold it.
-pub(crate) fn take_varint(bytes: &mut &[u8]) -> Check<usize> {
+pub(crate) fn take_varint(bytes: &mut &[u8]) -> ParseResult<usize> {
     let mut value = 0u64;
     for shift in 0..5 {
         let (&byte, rest) = bytes.split_first().ok_or("ends within a number")?;
@@ -92,7 +92,7 @@ pub(crate) fn take_varint(bytes: &mut &[u8]) -> Check<usize> {
 }
 
 /// Takes `count` bytes.
-pub(crate) fn take_bytes<'a>(bytes: &mut &'a [u8], count: usize) -> Check<&'a [u8]> {
+pub(crate) fn take_bytes<'a>(bytes: &mut &'a [u8], count: usize) -> ParseResult<&'a [u8]> {
     let short = || format!("{} bytes are left where {count} should be", bytes.len());
     let (head, rest) = bytes.split_at_checked(count).ok_or_else(short)?;
     *bytes = rest;

@@ -1,10 +1,10 @@
 //! The directory's entries of blocks and parts: their bytes, and what must be true of them.
 
 use crate::block::{BlockId, BlockStats, PartKind, PartStats};
-use crate::bytes::{Check, Fields, Put, ensure};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::header::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
-use crate::section::{FRAME, Owner, read};
+use crate::section::{FRAME, SectionId, read};
 use crate::{Result, Storage};
 
 /// Bytes of a block's entry without its parts.
@@ -89,7 +89,7 @@ impl BlockEntry {
         out
     }
 
-    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
         let count = usize::from(fields.u16()?);
         let lost = fields.u32()?;
@@ -103,12 +103,12 @@ impl BlockEntry {
             dropped: fields.f64()?,
         };
         ensure(count <= MAX_PARTS && count * PART_ENTRY <= fields.remaining(), || format!("{count} parts"))?;
-        let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<Check<_>>()?;
+        let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<ParseResult<_>>()?;
         Ok(Self { id, stats, parts, lost: lost == 1 })
     }
 
     /// What must be true of any block, whatever the metadata.
-    pub(crate) fn check(&self) -> Check {
+    pub(crate) fn check(&self) -> ParseResult {
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
         ensure(finite_amount(step) && finite_amount(reached), || "a step or an error out of range".into())?;
         ensure(is_amount(squared_error) && is_amount(dropped), || "an energy out of range".into())?;
@@ -125,7 +125,7 @@ impl BlockEntry {
     }
 
     /// Whether the block starts at `start` and its parts follow its header without a gap; its aligned end.
-    pub(crate) fn check_place(&self, start: u64) -> Check<u64> {
+    pub(crate) fn check_place(&self, start: u64) -> ParseResult<u64> {
         let mut at = start.saturating_add(self.header_len());
         for part in &self.parts {
             ensure(part.offset == at, || format!("{} at byte {} instead of {at}", part.kind, part.offset))?;
@@ -138,10 +138,10 @@ impl BlockEntry {
 impl PartEntry {
     /// Its stored bytes, if they are all there and their checksum is right.
     pub(crate) fn read(&self, storage: &impl Storage, file: FileId, block: BlockId) -> Result<Vec<u8>> {
-        let owner = Owner::Part(block, self.kind);
-        let stored = read(storage, owner, self.offset, self.stored_len.into())?;
-        if owner.checksum(file, &stored) != self.checksum {
-            return Err(owner.corrupt(self.offset, "the checksum does not match"));
+        let section = SectionId::Part(block, self.kind);
+        let stored = read(storage, section, self.offset, self.stored_len.into())?;
+        if section.checksum(file, &stored) != self.checksum {
+            return Err(section.corrupt(self.offset, "the checksum does not match"));
         }
         Ok(stored)
     }
@@ -159,7 +159,7 @@ impl PartEntry {
         out.put_f64(self.stats.largest);
     }
 
-    fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         let code = fields.array()?;
         let kind = PartKind::from_code(code).ok_or_else(|| format!("an unknown kind of part, {code:?}"))?;
         fields.reserved::<2>()?;
@@ -170,7 +170,7 @@ impl PartEntry {
         Ok(Self { kind, stats, offset, stored_len, raw_len, checksum })
     }
 
-    fn check(&self) -> Check {
+    fn check(&self) -> ParseResult {
         let PartStats { count, energy, largest } = self.stats;
         let sane = count > 0 && is_amount(energy) && finite_amount(largest);
         ensure(sane, || format!("{}: count, energy or largest coefficient out of range", self.kind))?;

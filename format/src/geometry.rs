@@ -1,7 +1,7 @@
 //! The sizes that a block's parts can have, from the metadata.
 
 use crate::block::PartKind;
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::cells::max_packed;
 use crate::directory::PartEntry;
 use crate::planes::bitmap_len;
@@ -76,7 +76,7 @@ impl BlockGeometry<'_> {
     }
 
     /// Whether a part can have its count and its length here.
-    pub(crate) fn check(&self, part: &PartEntry) -> Check {
+    pub(crate) fn check(&self, part: &PartEntry) -> ParseResult {
         let (kind, count, raw_len) = (part.kind, part.stats.count, u64::from(part.raw_len));
         if let PartKind::Level(level) = kind {
             ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.window.parts()))?;

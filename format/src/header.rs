@@ -1,6 +1,6 @@
 //! The fixed header: what the file is, which version and features it needs, and whose parts belong to it.
 
-use crate::bytes::{Check, Fields, Put};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult};
 use crate::metadata::Metadata;
 use crate::{Error, Result};
 use std::fmt;
@@ -87,12 +87,12 @@ impl Header {
         Ok(header)
     }
 
-    fn parse(bytes: &[u8; HEADER]) -> Check<(Self, Check)> {
+    fn parse(bytes: &[u8; HEADER]) -> ParseResult<(Self, ParseResult)> {
         let (fields, checksum) = bytes.split_at(HEADER - 8);
-        if Fields::new(checksum).u64()? != xxh3_64(fields) {
+        if FieldReader::new(checksum).u64()? != xxh3_64(fields) {
             return Err("the checksum does not match".into());
         }
-        let mut fields = Fields::new(fields);
+        let mut fields = FieldReader::new(fields);
         fields.array::<8>()?;
         let version = (fields.u16()?, fields.u16()?);
         let first = fields.reserved::<4>();
@@ -109,19 +109,19 @@ impl Header {
         if major != VERSION.0 {
             return Err(Error::Unsupported(format!(
                 "format version {major}.{minor}{}; this reader knows 1.x",
-                self.words()
+                self.quoted_needs()
             )));
         }
         match (0..64).find(|bit| self.required >> bit & 1 == 1 && REQUIRED.get(*bit).is_none()) {
             Some(bit) => {
-                let what = format!("required feature bit {bit}{}, unknown to this reader", self.words());
+                let what = format!("required feature bit {bit}{}, unknown to this reader", self.quoted_needs());
                 Err(Error::Unsupported(what))
             }
             None => Ok(()),
         }
     }
 
-    fn words(&self) -> String {
+    fn quoted_needs(&self) -> String {
         if self.needs.is_empty() { String::new() } else { format!(" ({})", self.needs) }
     }
 }

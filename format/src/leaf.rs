@@ -1,11 +1,11 @@
 //! The directory's two levels: leaves of up to 512 blocks, and the root that lists the leaves.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, Put, ensure};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, finite_amount, is_amount, is_range};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::section::{Extent, section_end};
+use crate::section::{SectionExtent, section_end};
 use crate::window::WINDOW_END;
 
 /// Bytes of a leaf's entry in the root.
@@ -83,9 +83,9 @@ impl LeafEntry {
     /// Adds a block's numbers. Sums run in the order of the blocks, so writer and reader get the same bits.
     pub(crate) fn add(&mut self, block: &BlockEntry) {
         self.count = self.count.saturating_add(1);
-        self.min = least(self.min, block.stats.min);
-        self.max = -least(-self.max, -block.stats.max);
-        self.reached = -least(-self.reached, -block.stats.reached);
+        self.min = lesser(self.min, block.stats.min);
+        self.max = -lesser(-self.max, -block.stats.max);
+        self.reached = -lesser(-self.reached, -block.stats.reached);
         self.squared_error += block.stats.squared_error;
         self.dropped += block.stats.dropped;
         self.exact += u32::from(block.is_exact());
@@ -109,13 +109,13 @@ impl LeafEntry {
     }
 
     /// Bytes that its blocks' entries take at most.
-    pub(crate) fn most_raw(&self) -> usize {
+    pub(crate) fn max_raw_len(&self) -> usize {
         usize::from(self.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)
     }
 
     /// The entries of its blocks, in order, from its decompressed bytes; their places and contents are not yet checked.
-    pub(crate) fn parse(&self, raw: &[u8]) -> Check<Vec<BlockEntry>> {
-        let mut fields = Fields::new(raw);
+    pub(crate) fn parse(&self, raw: &[u8]) -> ParseResult<Vec<BlockEntry>> {
+        let mut fields = FieldReader::new(raw);
         let mut entries = Vec::with_capacity(usize::from(self.count).min(raw.len() / BLOCK_ENTRY));
         for id in self.ids() {
             let entry = BlockEntry::decode(&mut fields)?;
@@ -126,12 +126,12 @@ impl LeafEntry {
         Ok(entries)
     }
 
-    pub(crate) fn extent(&self) -> Extent {
+    pub(crate) fn extent(&self) -> SectionExtent {
         let Self { offset, stored_len, raw_len, checksum, .. } = *self;
-        Extent { offset, stored_len, raw_len, checksum }
+        SectionExtent { offset, stored_len, raw_len, checksum }
     }
 
-    pub(crate) fn set_extent(&mut self, extent: &Extent) {
+    pub(crate) fn set_extent(&mut self, extent: &SectionExtent) {
         (self.offset, self.checksum) = (extent.offset, extent.checksum);
         (self.stored_len, self.raw_len) = (extent.stored_len, extent.raw_len);
     }
@@ -159,7 +159,7 @@ impl LeafEntry {
         out
     }
 
-    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         Ok(Self {
             window: fields.u32()?,
             first_block: fields.u32()?,
@@ -185,7 +185,7 @@ impl LeafEntry {
     }
 
     /// What must be true of any leaf that follows the byte `end`; the first byte after it.
-    fn check(&self, end: u64) -> Check<u64> {
+    fn check(&self, end: u64) -> ParseResult<u64> {
         let first = self.first();
         let place = |what: &str| format!("leaf of {first}: {what}");
         ensure(self.data_offset == align(end), || place("its blocks do not follow what is before"))?;
@@ -200,7 +200,7 @@ impl LeafEntry {
 }
 
 /// The smaller one, of 0 and -0 the latter: `min` may give either.
-fn least(a: f64, b: f64) -> f64 {
+fn lesser(a: f64, b: f64) -> f64 {
     if b.total_cmp(&a).is_lt() { b } else { a }
 }
 
@@ -215,7 +215,7 @@ pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item 
 
 /// Whether these are all leaves of the metadata, window after window from where the start section ends on; where the last
 /// window ends.
-pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u64> {
+pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> ParseResult<u64> {
     let per_window = metadata.leaves_per_window() as usize;
     let count = per_window as u64 * metadata.windows.len() as u64;
     ensure(leaves.len() as u64 == count, || format!("{} leaves instead of {count}", leaves.len()))?;
@@ -226,9 +226,9 @@ pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u
 }
 
 /// Whether these are all leaves of a window that begins after the byte `end`; where it ends.
-pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> Check<u64> {
+pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> ParseResult<u64> {
     let window = metadata.windows.get(number as usize).ok_or("no such window")?;
-    end = section_end(align(end), metadata.record(number).encode()?.len());
+    end = section_end(align(end), metadata.window_record(number).encode()?.len());
     for ((id, count), leaf) in leaves_of(metadata, number).zip(leaves) {
         let same = leaf.first() == id && u32::from(leaf.count) == count;
         ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;

@@ -3,7 +3,7 @@
 //! bincode 2.0.1 needs the limit and the check for leftovers: without them it aborts on nine hostile bytes and ignores
 //! what follows a value.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::directory::finite_amount;
 use crate::header::HEADER;
 use crate::limits::*;
@@ -49,7 +49,7 @@ impl Bound {
         }
     }
 
-    fn check(self) -> Check {
+    fn check(self) -> ParseResult {
         match self {
             Self::Relative { floor } => ensure(finite_amount(floor), || format!("a floor of {floor}")),
             Self::Sampled { samples, .. } => ensure(samples > 0, || "a bound sampled nowhere".into()),
@@ -94,7 +94,7 @@ pub struct Metadata {
 }
 
 /// The record that is exactly `bytes`.
-pub(crate) fn whole<T: Decode<()>>(bytes: &[u8], what: &str) -> Check<T> {
+pub(crate) fn decode_exact<T: Decode<()>>(bytes: &[u8], what: &str) -> ParseResult<T> {
     let decoded = bincode::decode_from_slice::<T, _>(bytes, CONFIG);
     let (record, used) = decoded.map_err(|e| format!("not a {what}: {e}"))?;
     ensure(used == bytes.len(), || format!("{} bytes after the record", bytes.len() - used))?;
@@ -110,7 +110,7 @@ impl Metadata {
         if size > limit {
             return Err(Error::TooLarge { what: "bytes of metadata".into(), size, limit });
         }
-        whole::<Self>(&bytes, "metadata").map_err(Error::Invalid)?; // near the limit it must also fit in memory under it
+        decode_exact::<Self>(&bytes, "metadata").map_err(Error::Invalid)?; // near the limit it must also fit in memory under it
         Ok(bytes)
     }
 
@@ -119,16 +119,16 @@ impl Metadata {
         Self::parse(bytes).map_err(Error::Invalid)
     }
 
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        let metadata: Self = whole(bytes, "metadata record")?;
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        let metadata: Self = decode_exact(bytes, "metadata record")?;
         ensure(metadata.frames > 0, || "no frames".into())?;
         metadata.check()?;
         Ok(metadata)
     }
 
     /// As [`Self::parse`], of the record in the start section.
-    pub(crate) fn parse_start(bytes: &[u8]) -> Check<Self> {
-        let start: Self = whole(bytes, "metadata record")?;
+    pub(crate) fn parse_start(bytes: &[u8]) -> ParseResult<Self> {
+        let start: Self = decode_exact(bytes, "metadata record")?;
         ensure(start.frames == 0, || "a start with frames".into())?;
         start.check()?;
         Ok(start)
@@ -148,30 +148,30 @@ impl Metadata {
     }
 
     /// Where the start section ends.
-    pub(crate) fn start_end(&self) -> Check<u64> {
+    pub(crate) fn start_end(&self) -> ParseResult<u64> {
         let record = self.start().encode().map_err(|e| e.to_string())?;
         Ok(section_end(HEADER as u64, record.len()))
     }
 
     /// How a window that there is begins.
-    pub(crate) fn record(&self, number: u32) -> WindowRecord {
-        let window = self.windows[number as usize].begun();
+    pub(crate) fn window_record(&self, number: u32) -> WindowRecord {
+        let window = self.windows[number as usize].without_totals();
         let first = window.first_frame as usize;
         let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
         WindowRecord { number, window, times }
     }
 
     /// How it ends.
-    pub(crate) fn end(&self, number: u32) -> WindowEnd {
+    pub(crate) fn window_end(&self, number: u32) -> WindowEnd {
         WindowEnd::of(number, &self.windows[number as usize])
     }
 
     /// Adds a window; the reason if it cannot be the next one.
-    pub(crate) fn push(&mut self, record: WindowRecord, end: &WindowEnd) -> Check {
+    pub(crate) fn push(&mut self, record: WindowRecord, end: &WindowEnd) -> ParseResult {
         let WindowRecord { number, window, times } = record;
         let next = self.windows.len();
         ensure([number, end.number] == [next as u32; 2], || format!("window {number} where {next} belongs"))?;
-        let window = window.with(end);
+        let window = window.with_totals(end);
         self.check_window(next, &window, self.frames)?;
         let timed = times.is_empty() && self.times.is_empty()
             || times.len() == window.frames as usize && self.times.len() as u64 == self.frames;
@@ -200,7 +200,7 @@ impl Metadata {
         self.check().map_err(|what| Error::Invalid(format!("metadata: {what}")))
     }
 
-    fn check(&self) -> Check {
+    fn check(&self) -> ParseResult {
         self.check_grid()?;
         self.check_times()?;
         ensure(finite_amount(self.tolerance), || format!("a tolerance of {}", self.tolerance))?;
@@ -208,7 +208,7 @@ impl Metadata {
         self.check_windows()
     }
 
-    fn check_grid(&self) -> Check {
+    fn check_grid(&self) -> ParseResult {
         let sized = self.dims.iter().all(|d| (1..=MAX_DIM).contains(d));
         ensure(sized, || format!("dimensions {:?}, each 1 to {MAX_DIM}", self.dims))?;
         let spaced = self.spacing.iter().all(|s| s.is_finite() && *s > 0.0);
@@ -218,14 +218,14 @@ impl Metadata {
         ensure(blocks.is_some(), || "too many blocks in a window".into())
     }
 
-    fn check_times(&self) -> Check {
+    fn check_times(&self) -> ParseResult {
         ensure(self.frames <= MAX_FRAMES, || format!("{} frames, at most {MAX_FRAMES}", self.frames))?;
         let timed = self.times.is_empty() || self.times.len() as u64 == self.frames;
         ensure(timed, || format!("{} times for {} frames", self.times.len(), self.frames))?;
         ensure(self.times.iter().all(|t| t.is_finite()), || "a time that is not finite".into())
     }
 
-    fn check_windows(&self) -> Check {
+    fn check_windows(&self) -> ParseResult {
         let mut next = 0u64;
         for (number, window) in self.windows.iter().enumerate() {
             self.check_window(number, window, next)?;
@@ -235,7 +235,7 @@ impl Metadata {
     }
 
     /// Whether this can be the window of this number, from the frame `next` on.
-    fn check_window(&self, number: usize, window: &Window, next: u64) -> Check {
+    fn check_window(&self, number: usize, window: &Window, next: u64) -> ParseResult {
         let place = |what: String| format!("window {number}: {what}");
         ensure(window.first_frame == next, || place(format!("starts at {} not {next}", window.first_frame)))?;
         let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));

@@ -3,7 +3,7 @@
 //! Unpacking accepts exactly what packing writes and says in words what else it met; it allocates no more than the
 //! caller's totals call for.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::planes::{bitmap_len, pack_bits, pack_planes, unpack_bits, unpack_planes};
 
 /// Packs quantised coefficients, coefficient-major: `codes[k * voxels + voxel]`.
@@ -108,7 +108,7 @@ pub fn unpack_outliers(raw: &[u8], sample_size: usize, total: usize) -> Result<O
 }
 
 /// Positions from little-endian gaps, all below `total`.
-fn ascend(gaps: &[u8], total: usize) -> Check<Vec<u32>> {
+fn ascend(gaps: &[u8], total: usize) -> ParseResult<Vec<u32>> {
     let mut next = 0u64;
     let position = |gap: &[u8; 4]| {
         let position = next + u64::from(u32::from_le_bytes(*gap));
@@ -147,7 +147,7 @@ pub fn unpack_exact(raw: &[u8], sample_size: usize, total: usize) -> Result<Vec<
 }
 
 /// The bitmap of `total` bits, whose padding bits must be zero, and what follows.
-fn split_bitmap(raw: &[u8], total: usize) -> Check<(&[u8], &[u8])> {
+fn split_bitmap(raw: &[u8], total: usize) -> ParseResult<(&[u8], &[u8])> {
     let short = || format!("{} bytes are too few for a bitmap of {total}", raw.len());
     let (bitmap, rest) = raw.split_at_checked(bitmap_len(total)).ok_or_else(short)?;
     let padding = if total.is_multiple_of(8) { 0 } else { bitmap.last().map_or(0, |last| last >> (total % 8)) };

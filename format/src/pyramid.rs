@@ -4,7 +4,7 @@
 //! node along the refined axes: one node. A pass halves the stride along one axis; the nodes that it adds, at odd
 //! multiples of the new stride, are predicted from those on both sides, and a code says what is missing.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use bincode::{Decode, Encode};
 
 /// An axis of a block; new ones are appended.
@@ -122,7 +122,7 @@ impl Pyramid {
         step / grown
     }
 
-    pub(crate) fn check(&self, basis_is_samples: bool) -> Check {
+    pub(crate) fn check(&self, basis_is_samples: bool) -> ParseResult {
         let mut seen = [false; 4];
         for axis in &self.order {
             let again = std::mem::replace(&mut seen[axis.index()], true);

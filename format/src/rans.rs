@@ -3,7 +3,7 @@
 //! A state holds 16 to 32 bits; long strings take turns in several states, so that a processor works on them at once.
 
 use crate::bits::{BitReader, BitWriter, take_bytes, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 
 /// How often each byte occurs, out of a power of two.
 pub(crate) type Frequencies = [u16; 256];
@@ -76,7 +76,7 @@ fn take_length(previous: u32, reader: &mut BitReader) -> u32 {
 }
 
 /// Takes frequencies out of `1 << bits`.
-pub(crate) fn take_frequencies(bytes: &mut &[u8], bits: u32) -> Check<Frequencies> {
+pub(crate) fn take_frequencies(bytes: &mut &[u8], bits: u32) -> ParseResult<Frequencies> {
     let mut reader = BitReader::new(bytes);
     let mut frequencies = [0; 256];
     let (mut previous, mut sum) = (bits, 0);
@@ -158,7 +158,7 @@ fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
 }
 
 /// Takes what [`encode`] appended and fills `symbols`.
-pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, symbols: &mut [u8]) -> Check {
+pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, symbols: &mut [u8]) -> ParseResult {
     let count = take_varint(bytes)?;
     let lanes = if symbols.len() < LONG { 1 } else { LANES };
     let (states, words) = take_bytes(bytes, count.saturating_mul(2).saturating_add(4 * lanes))?.split_at(4 * lanes);
@@ -171,7 +171,7 @@ pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, sy
     }
 }
 
-fn first<const N: usize>(states: &[[u8; 4]]) -> Check<&[[u8; 4]; N]> {
+fn first<const N: usize>(states: &[[u8; 4]]) -> ParseResult<&[[u8; 4]; N]> {
     states.first_chunk().ok_or_else(|| "states are missing".into())
 }
 
@@ -200,7 +200,7 @@ fn decode_lanes<const N: usize, const S: usize>(
     states: &[[u8; 4]; N],
     words: &[[u8; 2]],
     symbols: &mut [u8],
-) -> Check {
+) -> ParseResult {
     let mut states = states.map(u32::from_le_bytes);
     ensure(states.iter().all(|&state| state >= LOWEST), || "a state is too low".into())?;
     let mut next = 0;

@@ -2,7 +2,7 @@
 //! length, bounds, checksum, parse, decompress into the declared and capped size, exact length, meaning.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, ensure};
+use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::cells::unpack_cells;
 use crate::directory::{BlockEntry, PartEntry};
 use crate::footer::{FOOTER, Footer};
@@ -12,7 +12,7 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
-use crate::section::{FRAME, Owner, decompress, read_section};
+use crate::section::{FRAME, SectionId, decompress, read_section};
 use crate::{Error, Result, Storage};
 
 /// An open file. Every method works from `&self`; threads may share it if the storage allows.
@@ -58,16 +58,16 @@ impl<S: Storage> Reader<S> {
 
     /// The entries of a leaf's blocks, in order.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
-        let owner = Owner::Leaf(leaf.first());
-        if leaf.raw_len as usize > leaf.most_raw() {
-            return Err(owner.corrupt(leaf.offset, format!("{} bytes, at most {}", leaf.raw_len, leaf.most_raw())));
+        let section = SectionId::Leaf(leaf.first());
+        if leaf.raw_len as usize > leaf.max_raw_len() {
+            return Err(section.corrupt(leaf.offset, format!("{} bytes, at most {}", leaf.raw_len, leaf.max_raw_len())));
         }
-        let stored = read_section(&self.storage, self.id(), owner, &leaf.extent())?;
+        let stored = read_section(&self.storage, self.id(), section, &leaf.extent())?;
         let entries = decompress(&stored, leaf.raw_len).and_then(|raw| self.parse_leaf(leaf, &raw));
-        entries.map_err(|what| owner.corrupt(leaf.offset, what))
+        entries.map_err(|what| section.corrupt(leaf.offset, what))
     }
 
-    fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> Check<Vec<BlockEntry>> {
+    fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> ParseResult<Vec<BlockEntry>> {
         let entries = leaf.parse(raw)?;
         let (mut sums, mut at) = (LeafEntry::new(leaf.first(), leaf.data_offset), leaf.data_offset);
         for entry in &entries {
@@ -83,7 +83,7 @@ impl<S: Storage> Reader<S> {
         Ok(entries)
     }
 
-    fn check_entry(&self, entry: &BlockEntry) -> Check {
+    fn check_entry(&self, entry: &BlockEntry) -> ParseResult {
         let geometry = self.metadata.geometry(entry.id).ok_or("no such block")?;
         entry.check()?;
         entry.parts.iter().try_for_each(|part| geometry.check(part))
@@ -107,10 +107,10 @@ impl<S: Storage> Reader<S> {
     /// The payload of a block's part: copied out, its checksum checked, then decompressed to exactly the length that
     /// the entry declares and the geometry allows.
     pub fn part(&self, block: &BlockEntry, part: &PartEntry) -> Result<Vec<u8>> {
-        let owner = Owner::Part(block.id, part.kind);
-        self.geometry(block.id)?.check(part).map_err(|what| owner.corrupt(part.offset, what))?;
+        let section = SectionId::Part(block.id, part.kind);
+        self.geometry(block.id)?.check(part).map_err(|what| section.corrupt(part.offset, what))?;
         let stored = part.read(&self.storage, self.id(), block.id)?;
-        decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
+        decompress(&stored, part.raw_len).map_err(|what| section.corrupt(part.offset, what))
     }
 
     /// [`Error::Lost`] for a block of which nothing is known.
@@ -175,13 +175,13 @@ impl<S: Storage> Reader<S> {
         let geometry = self.geometry(block.id)?;
         block.parts.iter().try_for_each(|part| {
             let checked = check_payload(&geometry, part, &self.part(block, part)?);
-            checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+            checked.map_err(|what| SectionId::Part(block.id, part.kind).corrupt(part.offset, what))
         })
     }
 }
 
 /// Unpacks the payload of a part; how many things it holds.
-fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> Check<usize> {
+fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResult<usize> {
     let (size, samples) = (geometry.sample_size, geometry.samples());
     match kind {
         PartKind::Level(level) => {
@@ -194,7 +194,7 @@ fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> Check<usi
     }
 }
 
-fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> Check<usize> {
+fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> ParseResult<usize> {
     match &geometry.window.pyramid {
         Some(_) => unpack_cells(raw, &geometry.boxes(level), codes),
         None => unpack_codes(raw, codes),
@@ -202,19 +202,24 @@ fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut
 }
 
 /// Whether the payload of a part can be unpacked and holds as many things as the entry says.
-pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> Check {
+pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> ParseResult {
     unpack(geometry, part.kind, raw).and_then(|held| check_count(held, part))
 }
 
-fn check_count(held: usize, part: &PartEntry) -> Check {
+fn check_count(held: usize, part: &PartEntry) -> ParseResult {
     let (held, said) = (held as u64, part.stats.count);
     ensure(held == said, || format!("holds {held}, its entry says {said}"))
 }
 
 /// What a payload held, if it could be unpacked and holds as many things as its entry says.
-fn unpacked<T>(block: &BlockEntry, part: &PartEntry, payload: Check<T>, count: impl Fn(&T) -> usize) -> Result<T> {
+fn unpacked<T>(
+    block: &BlockEntry,
+    part: &PartEntry,
+    payload: ParseResult<T>,
+    count: impl Fn(&T) -> usize,
+) -> Result<T> {
     let checked = payload.and_then(|payload| check_count(count(&payload), part).map(|()| payload));
-    checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+    checked.map_err(|what| SectionId::Part(block.id, part.kind).corrupt(part.offset, what))
 }
 
 fn no_block(id: BlockId) -> Error {
@@ -248,7 +253,7 @@ pub(crate) fn read_footer(storage: &impl Storage, id: FileId) -> Result<Footer> 
     Ok(footer)
 }
 
-fn footer_at(storage: &impl Storage, offset: u64) -> Result<Check<Footer>> {
+fn footer_at(storage: &impl Storage, offset: u64) -> Result<ParseResult<Footer>> {
     let mut bytes = [0; FOOTER];
     storage.read_at(offset, &mut bytes)?;
     Ok(Footer::decode(&bytes))
@@ -269,30 +274,30 @@ fn explain(storage: &impl Storage, what: String) -> String {
 }
 
 fn read_metadata(storage: &impl Storage, footer: &Footer) -> Result<Metadata> {
-    let (extent, owner) = (footer.metadata, Owner::Metadata);
-    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let (extent, section) = (footer.metadata, SectionId::Metadata);
+    let corrupt = |what: String| section.corrupt(extent.offset, what);
     let sized = extent.stored_len == extent.raw_len && extent.raw_len as usize <= MAX_METADATA;
     ensure(sized, || format!("{} bytes, at most {MAX_METADATA}", extent.raw_len)).map_err(corrupt)?;
     let placed = align(extent.end()) == footer.root.offset
         && align(footer.root.end()).checked_add(FOOTER as u64) == Some(footer.total);
     ensure(placed, || "metadata, root and footer do not follow each other".into()).map_err(corrupt)?;
-    let record = read_section(storage, footer.id, owner, &extent)?;
-    Metadata::parse(&record).map_err(|what| owner.corrupt(extent.offset + FRAME as u64, what))
+    let record = read_section(storage, footer.id, section, &extent)?;
+    Metadata::parse(&record).map_err(|what| section.corrupt(extent.offset + FRAME as u64, what))
 }
 
 fn read_root(storage: &impl Storage, footer: &Footer, metadata: &Metadata) -> Result<Vec<LeafEntry>> {
-    let (extent, owner) = (footer.root, Owner::Root);
-    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let (extent, section) = (footer.root, SectionId::Root);
+    let corrupt = |what: String| section.corrupt(extent.offset, what);
     let blocks = metadata.blocks();
     let counted = footer.blocks == blocks && blocks.checked_mul(MIN_BLOCK).is_some_and(|bytes| bytes <= footer.total);
     ensure(counted, || format!("{blocks} blocks by the metadata, {} in the footer", footer.blocks)).map_err(corrupt)?;
     let size = footer.leaves.checked_mul(LEAF_ENTRY as u64).filter(|&size| size <= MAX_ROOT_RAW);
     let sized = size == Some(extent.raw_len.into()) && footer.leaves <= blocks;
     ensure(sized, || format!("{} bytes for {} leaves", extent.raw_len, footer.leaves)).map_err(corrupt)?;
-    let stored = read_section(storage, footer.id, owner, &extent)?;
+    let stored = read_section(storage, footer.id, section, &extent)?;
     let raw = decompress(&stored, extent.raw_len).map_err(corrupt)?;
-    let leaves: Check<Vec<_>> =
-        raw.chunks(LEAF_ENTRY).map(|entry| LeafEntry::decode(&mut Fields::new(entry))).collect();
+    let leaves: ParseResult<Vec<_>> =
+        raw.chunks(LEAF_ENTRY).map(|entry| LeafEntry::decode(&mut FieldReader::new(entry))).collect();
     let leaves = leaves.map_err(corrupt)?;
     let end = check_leaves(metadata, &leaves).map_err(corrupt)?;
     let follows = align(end) == footer.metadata.offset;

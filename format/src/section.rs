@@ -1,7 +1,7 @@
 //! Framed sections and checksums: every structure but the parts' payloads is a frame of 24 bytes and its content.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, Put, ensure};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::header::FileId;
 use crate::{Error, Result, Storage};
 use std::fmt;
@@ -16,7 +16,7 @@ const DIRECTORY_LEVEL: i32 = 3;
 
 /// Where a section is and what its stored bytes must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Extent {
+pub(crate) struct SectionExtent {
     /// Of the frame, absolute.
     pub(crate) offset: u64,
     /// Bytes after the frame.
@@ -27,7 +27,7 @@ pub(crate) struct Extent {
     pub(crate) checksum: u64,
 }
 
-impl Extent {
+impl SectionExtent {
     /// The first byte after the section, or the largest number where it would be beyond.
     pub(crate) fn end(&self) -> u64 {
         self.offset.saturating_add(FRAME as u64 + u64::from(self.stored_len))
@@ -39,9 +39,9 @@ pub(crate) fn section_end(offset: u64, len: usize) -> u64 {
     offset.saturating_add((FRAME + len) as u64)
 }
 
-/// Whose bytes are checksummed: seeds the checksum, so that bytes of another owner fail.
+/// Whose bytes are checksummed: seeds the checksum, so that bytes of another section fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Owner {
+pub(crate) enum SectionId {
     Part(BlockId, PartKind),
     Block(BlockId),
     Leaf(BlockId),
@@ -52,7 +52,7 @@ pub(crate) enum Owner {
     WindowEnd(u32),
 }
 
-impl Owner {
+impl SectionId {
     /// Block, kind and level in the seed.
     fn identity(self) -> (BlockId, [u8; 2]) {
         let none = BlockId { window: 0, block: 0, channel: 0 };
@@ -82,7 +82,7 @@ impl Owner {
         }
     }
 
-    /// The checksum of this owner's stored bytes in the file `file`.
+    /// The checksum of this section's stored bytes in the file `file`.
     pub(crate) fn checksum(self, file: FileId, stored: &[u8]) -> u64 {
         let (id, kind) = self.identity();
         let mut seed = Vec::with_capacity(28);
@@ -94,13 +94,13 @@ impl Owner {
         xxh3_64_with_seed(stored, xxh3_64(&seed))
     }
 
-    /// An error at `offset` in this owner's bytes.
+    /// An error at `offset` in this section's bytes.
     pub(crate) fn corrupt(self, offset: u64, what: impl Into<String>) -> Error {
         Error::Corrupt { offset, place: self.to_string(), what: what.into() }
     }
 }
 
-impl fmt::Display for Owner {
+impl fmt::Display for SectionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Part(id, kind) => write!(f, "{id} {kind}"),
@@ -115,10 +115,10 @@ impl fmt::Display for Owner {
     }
 }
 
-/// The frame of `owner`'s section.
-pub(crate) fn frame(owner: Owner, extent: &Extent) -> Vec<u8> {
+/// The frame of `section`'s section.
+pub(crate) fn frame(section: SectionId, extent: &SectionExtent) -> Vec<u8> {
     let mut out = Vec::with_capacity(FRAME);
-    out.put(&owner.tag());
+    out.put(&section.tag());
     out.put_u32(extent.stored_len);
     out.put_u32(extent.raw_len);
     out.put_u32(0);
@@ -127,11 +127,11 @@ pub(crate) fn frame(owner: Owner, extent: &Extent) -> Vec<u8> {
 }
 
 /// Copies out `len` bytes at `offset`, after checking that they are there.
-pub(crate) fn read(storage: &impl Storage, owner: Owner, offset: u64, len: u64) -> Result<Vec<u8>> {
+pub(crate) fn read(storage: &impl Storage, section: SectionId, offset: u64, len: u64) -> Result<Vec<u8>> {
     let inside = offset.checked_add(len).is_some_and(|end| end <= storage.len());
     let size = usize::try_from(len).ok().filter(|_| inside);
     let Some(size) = size else {
-        return Err(owner.corrupt(offset, format!("{len} bytes reach beyond the file's {}", storage.len())));
+        return Err(section.corrupt(offset, format!("{len} bytes reach beyond the file's {}", storage.len())));
     };
     let mut out = vec![0; size];
     storage.read_at(offset, &mut out)?;
@@ -139,42 +139,47 @@ pub(crate) fn read(storage: &impl Storage, owner: Owner, offset: u64, len: u64) 
 }
 
 /// The stored bytes of a section whose frame and checksum are right.
-pub(crate) fn read_section(storage: &impl Storage, file: FileId, owner: Owner, extent: &Extent) -> Result<Vec<u8>> {
-    let mut bytes = read(storage, owner, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
-    if !bytes.starts_with(&frame(owner, extent)) {
-        return Err(owner.corrupt(extent.offset, "the section's frame differs from what points to it"));
+pub(crate) fn read_section(
+    storage: &impl Storage,
+    file: FileId,
+    section: SectionId,
+    extent: &SectionExtent,
+) -> Result<Vec<u8>> {
+    let mut bytes = read(storage, section, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
+    if !bytes.starts_with(&frame(section, extent)) {
+        return Err(section.corrupt(extent.offset, "the section's frame differs from what points to it"));
     }
     bytes.drain(..FRAME);
-    if owner.checksum(file, &bytes) != extent.checksum {
-        return Err(owner.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
+    if section.checksum(file, &bytes) != extent.checksum {
+        return Err(section.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
     }
     Ok(bytes)
 }
 
-/// The section of `owner` at `offset`, of at most `most` stored bytes, whose frame says no more than it must and whose
+/// The section of `section` at `offset`, of at most `most` stored bytes, whose frame says no more than it must and whose
 /// checksum is right.
 pub(crate) fn section_at(
     storage: &impl Storage,
     file: FileId,
-    owner: Owner,
+    section: SectionId,
     offset: u64,
     most: usize,
-) -> Result<(Extent, Vec<u8>)> {
-    let bytes = read(storage, owner, offset, FRAME as u64)?;
-    let extent = parse_frame(owner, offset, &bytes).map_err(|what| owner.corrupt(offset, what))?;
+) -> Result<(SectionExtent, Vec<u8>)> {
+    let bytes = read(storage, section, offset, FRAME as u64)?;
+    let extent = parse_frame(section, offset, &bytes).map_err(|what| section.corrupt(offset, what))?;
     if extent.stored_len as usize > most {
-        return Err(owner.corrupt(offset, format!("{} bytes, at most {most}", extent.stored_len)));
+        return Err(section.corrupt(offset, format!("{} bytes, at most {most}", extent.stored_len)));
     }
-    let stored = read_section(storage, file, owner, &extent)?;
+    let stored = read_section(storage, file, section, &extent)?;
     Ok((extent, stored))
 }
 
-fn parse_frame(owner: Owner, offset: u64, bytes: &[u8]) -> Check<Extent> {
-    let mut fields = Fields::new(bytes);
-    ensure(fields.array()? == owner.tag(), || "no such section".into())?;
+fn parse_frame(section: SectionId, offset: u64, bytes: &[u8]) -> ParseResult<SectionExtent> {
+    let mut fields = FieldReader::new(bytes);
+    ensure(fields.array()? == section.tag(), || "no such section".into())?;
     let (stored_len, raw_len) = (fields.u32()?, fields.u32()?);
     fields.reserved::<4>()?;
-    Ok(Extent { offset, stored_len, raw_len, checksum: fields.u64()? })
+    Ok(SectionExtent { offset, stored_len, raw_len, checksum: fields.u64()? })
 }
 
 /// One zstd frame of the directory's `raw` bytes.
@@ -185,7 +190,7 @@ pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
 }
 
 /// Exactly `raw_len` bytes from exactly one zstd frame that declares them. The caller has capped `raw_len`.
-pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> Check<Vec<u8>> {
+pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> ParseResult<Vec<u8>> {
     let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
     ensure(whole, || "not one whole zstd frame".into())?;
     ensure(stored.get(4).is_some_and(|descriptor| descriptor & 4 != 0), || "the zstd frame has no checksum".into())?;

@@ -1,7 +1,7 @@
 //! A string of bytes cut in segments, each packed in the way that makes it shortest.
 
 use crate::bits::{put_varint, take_bytes, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::rans::{decode, encode, normalise, put_frequencies, take_frequencies};
 
 /// Symbols after which a stream may change its frequencies.
@@ -42,7 +42,7 @@ pub(crate) fn estimate_segments(symbols: &[u8], lengths: &[usize]) -> usize {
 }
 
 /// Fills `symbols` from the segments at the front of `bytes` and takes those off.
-pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
+pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> ParseResult {
     let mut rest = symbols;
     while !rest.is_empty() {
         let head = take_varint(bytes)?;
@@ -55,7 +55,7 @@ pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
     Ok(())
 }
 
-fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> Check {
+fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> ParseResult {
     match kind {
         RAW => symbols.copy_from_slice(take_bytes(bytes, symbols.len())?),
         CONSTANT => symbols.fill(take_bytes(bytes, 1)?[0]),

@@ -5,7 +5,7 @@ use crate::header::HEADER;
 use crate::leaf::LeafEntry;
 use crate::limits::{ALIGN, align};
 use crate::reader::Reader;
-use crate::section::{Extent, FRAME, Owner, frame, read};
+use crate::section::{FRAME, SectionExtent, SectionId, frame, read};
 use crate::{Error, Result, Storage};
 
 impl<S: Storage> Reader<S> {
@@ -15,14 +15,14 @@ impl<S: Storage> Reader<S> {
     pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
         let metadata = self.metadata();
         let start = metadata.start().encode()?;
-        note(self.check_section(Owner::Start, HEADER as u64, &start), found)?;
+        note(self.check_section(SectionId::Start, HEADER as u64, &start), found)?;
         for window in 0..metadata.windows.len() as u32 {
-            let (begin, end) = (metadata.record(window).encode(), metadata.end(window).encode());
+            let (begin, end) = (metadata.window_record(window).encode(), metadata.window_end(window).encode());
             let (begin, end) = begin.and_then(|begin| Ok((begin, end?))).map_err(Error::Invalid)?;
             let [Some(first), Some(last)] = [self.leaves(window).first(), self.leaves(window).last()] else { continue };
             let at = first.data_offset - align((FRAME + begin.len()) as u64);
-            note(self.check_section(Owner::Window(window), at, &begin), found)?;
-            note(self.check_section(Owner::WindowEnd(window), align(last.extent().end()), &end), found)?;
+            note(self.check_section(SectionId::Window(window), at, &begin), found)?;
+            note(self.check_section(SectionId::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
         note(check_padding(self.storage(), self.footer.metadata.end()), found)?;
         note(check_padding(self.storage(), self.footer.root.end()), found)
@@ -34,8 +34,8 @@ impl<S: Storage> Reader<S> {
         for block in blocks {
             let mut entry = Vec::new();
             block.encode(&mut entry);
-            let owner = Owner::Block(block.id);
-            note(self.check_content(owner, at, &entry), found)?;
+            let section = SectionId::Block(block.id);
+            note(self.check_content(section, at, &entry), found)?;
             let end = at + block.header_len() + block.stored_len();
             note(check_padding(self.storage(), end), found)?;
             at = align(end);
@@ -44,18 +44,18 @@ impl<S: Storage> Reader<S> {
     }
 
     /// Whether a section holds this content, and zeros follow.
-    fn check_section(&self, owner: Owner, offset: u64, content: &[u8]) -> Result<()> {
-        let end = self.check_content(owner, offset, content)?;
+    fn check_section(&self, section: SectionId, offset: u64, content: &[u8]) -> Result<()> {
+        let end = self.check_content(section, offset, content)?;
         check_padding(self.storage(), end)
     }
 
     /// Whether a section holds this content, uncompressed; its end.
-    fn check_content(&self, owner: Owner, offset: u64, content: &[u8]) -> Result<u64> {
-        let (len, checksum) = (content.len() as u32, owner.checksum(self.id(), content));
-        let extent = Extent { offset, stored_len: len, raw_len: len, checksum };
-        let expected = [&frame(owner, &extent), content].concat();
-        if read(self.storage(), owner, offset, expected.len() as u64)? != expected {
-            return Err(owner.corrupt(offset, "differs from metadata and directory"));
+    fn check_content(&self, section: SectionId, offset: u64, content: &[u8]) -> Result<u64> {
+        let (len, checksum) = (content.len() as u32, section.checksum(self.id(), content));
+        let extent = SectionExtent { offset, stored_len: len, raw_len: len, checksum };
+        let expected = [&frame(section, &extent), content].concat();
+        if read(self.storage(), section, offset, expected.len() as u64)? != expected {
+            return Err(section.corrupt(offset, "differs from metadata and directory"));
         }
         Ok(extent.end())
     }

@@ -196,16 +196,16 @@ pub(crate) fn write_but<'a>(
     lost: Option<BlockId>,
 ) -> Result<(Vec<u8>, Summary)> {
     let mut writer = Writer::new(Vec::new(), id, metadata)?;
-    writer.begin_window(metadata.record(0))?;
+    writer.begin_window(metadata.window_record(0))?;
     for block in blocks {
         let ended = writer.metadata().windows.len() as u32;
         if block.id.window > ended {
-            writer.end_window(&metadata.end(ended))?;
-            writer.begin_window(metadata.record(ended + 1))?;
+            writer.end_window(&metadata.window_end(ended))?;
+            writer.begin_window(metadata.window_record(ended + 1))?;
         }
         if lost == Some(block.id) { writer.append_lost(block.id)? } else { writer.append(block)? }
     }
-    writer.end_window(&metadata.end(metadata.windows.len() as u32 - 1))?;
+    writer.end_window(&metadata.window_end(metadata.windows.len() as u32 - 1))?;
     writer.finish()
 }
 

@@ -1,14 +1,14 @@
 //! What a file that was never finished, or is to be appended to, holds for certain: its whole windows from the first on.
 
 use crate::block::BlockId;
-use crate::bytes::{Fields, ensure};
+use crate::bytes::{FieldReader, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
 use crate::header::{FileId, HEADER};
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::reader::read_header;
-use crate::section::{Extent, Owner, decompress, section_at};
+use crate::section::{SectionExtent, SectionId, decompress, section_at};
 use crate::structure::check_padding;
 use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
 use crate::{Result, Storage};
@@ -28,7 +28,7 @@ pub struct Unfinished {
 
 /// What a window adds.
 #[derive(Default)]
-struct Found {
+struct WindowScan {
     at: u64,
     leaves: Vec<LeafEntry>,
     stored: u64,
@@ -42,14 +42,14 @@ impl Unfinished {
     /// A header or start that is not whole: nothing can be gone on with. Or the storage's.
     pub fn read(storage: &impl Storage) -> Result<Self> {
         let id = read_header(storage)?.id;
-        let (extent, record) = plain_at(storage, id, Owner::Start, HEADER as u64, MAX_METADATA)?;
-        let metadata = Metadata::parse_start(&record).map_err(|what| Owner::Start.corrupt(HEADER as u64, what))?;
-        let mut found = Self { id, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
+        let (extent, record) = plain_at(storage, id, SectionId::Start, HEADER as u64, MAX_METADATA)?;
+        let metadata = Metadata::parse_start(&record).map_err(|what| SectionId::Start.corrupt(HEADER as u64, what))?;
+        let mut prefix = Self { id, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
         loop {
-            match found.window(storage) {
+            match prefix.read_window(storage) {
                 Ok(()) => {}
                 Err(failed) if failed.is_of_storage() => return Err(failed),
-                Err(_) => return Ok(found),
+                Err(_) => return Ok(prefix),
             }
         }
     }
@@ -70,49 +70,49 @@ impl Unfinished {
     }
 
     /// Takes in the next window, if it is whole.
-    fn window(&mut self, storage: &impl Storage) -> Result<()> {
+    fn read_window(&mut self, storage: &impl Storage) -> Result<()> {
         let number = self.metadata.windows.len() as u32;
-        let mut found = Found { at: self.end, ..Found::default() };
-        let at = found.pad(storage)?;
-        let (begun, record) = plain_at(storage, self.id, Owner::Window(number), at, MAX_METADATA)?;
-        found.at = begun.end();
+        let mut scan = WindowScan { at: self.end, ..WindowScan::default() };
+        let at = scan.pad(storage)?;
+        let (begin, record) = plain_at(storage, self.id, SectionId::Window(number), at, MAX_METADATA)?;
+        scan.at = begin.end();
         for (first, count) in leaves_of(&self.metadata, number) {
-            found.leaf(storage, self.id, first, count)?;
+            scan.read_leaf(storage, self.id, first, count)?;
         }
-        let (owner, at) = (Owner::WindowEnd(number), found.pad(storage)?);
-        let (extent, end) = plain_at(storage, self.id, owner, at, WINDOW_END)?;
+        let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
+        let (extent, end) = plain_at(storage, self.id, section, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
-            .and_then(|()| check_window(&self.metadata, number, &found.leaves, self.end))
+            .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not where it belongs".into()));
         if let Err(what) = checked {
             self.metadata.truncate(number as usize);
-            return Err(owner.corrupt(at, what));
+            return Err(section.corrupt(at, what));
         }
-        (self.end, self.stored) = (extent.end(), self.stored + found.stored);
-        self.leaves.append(&mut found.leaves);
+        (self.end, self.stored) = (extent.end(), self.stored + scan.stored);
+        self.leaves.append(&mut scan.leaves);
         Ok(())
     }
 }
 
-impl Found {
+impl WindowScan {
     /// Where the next section begins, after zeros.
     fn pad(&self, storage: &impl Storage) -> Result<u64> {
         check_padding(storage, self.at).map(|()| align(self.at))
     }
 
     /// Takes in the next leaf and its blocks.
-    fn leaf(&mut self, storage: &impl Storage, id: FileId, first: BlockId, count: u32) -> Result<()> {
+    fn read_leaf(&mut self, storage: &impl Storage, id: FileId, first: BlockId, count: u32) -> Result<()> {
         let mut leaf = LeafEntry::new(first, align(self.at));
         let mut entries = Vec::new();
         for block in (first.block..).take(count as usize) {
-            let entry = self.block(storage, id, BlockId { block, ..first })?;
+            let entry = self.read_block(storage, id, BlockId { block, ..first })?;
             leaf.add(&entry);
             entries.push(entry);
         }
-        let (owner, at) = (Owner::Leaf(first), self.pad(storage)?);
-        let (extent, stored) = section_at(storage, id, owner, at, leaf.most_raw())?;
-        let most = extent.raw_len as usize <= leaf.most_raw();
+        let (section, at) = (SectionId::Leaf(first), self.pad(storage)?);
+        let (extent, stored) = section_at(storage, id, section, at, leaf.max_raw_len())?;
+        let most = extent.raw_len as usize <= leaf.max_raw_len();
         let same = ensure(most, || "too long".into())
             .and_then(|()| decompress(&stored, extent.raw_len))
             .and_then(|raw| leaf.parse(&raw))
@@ -121,7 +121,7 @@ impl Found {
                     "differs from its blocks".into()
                 })
             });
-        same.map_err(|what| owner.corrupt(at, what))?;
+        same.map_err(|what| section.corrupt(at, what))?;
         leaf.set_extent(&extent);
         self.leaves.push(leaf);
         self.at = extent.end();
@@ -129,7 +129,7 @@ impl Found {
     }
 
     /// Takes in the next block.
-    fn block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
+    fn read_block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
         let (entry, end) = block_at(storage, id, block, self.pad(storage)?)?;
         for part in &entry.parts {
             part.read(storage, id, block)?;
@@ -141,17 +141,23 @@ impl Found {
 }
 
 /// As [`section_at`], of a section that is not compressed.
-fn plain_at(storage: &impl Storage, file: FileId, owner: Owner, offset: u64, most: usize) -> Result<(Extent, Vec<u8>)> {
-    let (extent, content) = section_at(storage, file, owner, offset, most)?;
+fn plain_at(
+    storage: &impl Storage,
+    file: FileId,
+    section: SectionId,
+    offset: u64,
+    most: usize,
+) -> Result<(SectionExtent, Vec<u8>)> {
+    let (extent, content) = section_at(storage, file, section, offset, most)?;
     let same = ensure(extent.raw_len == extent.stored_len, || format!("{} bytes in its frame", extent.raw_len));
-    same.map_err(|what| owner.corrupt(offset, what)).map(|()| (extent, content))
+    same.map_err(|what| section.corrupt(offset, what)).map(|()| (extent, content))
 }
 
 /// The entry in a block's own header at `offset`, and where its parts end; the parts themselves are not read.
 pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
-    let owner = Owner::Block(id);
-    let (_, bytes) = plain_at(storage, file, owner, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
-    let mut fields = Fields::new(&bytes);
+    let section = SectionId::Block(id);
+    let (_, bytes) = plain_at(storage, file, section, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let mut fields = FieldReader::new(&bytes);
     let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
         fields.end()?;
         ensure(entry.id == id, || format!("says that it is {}", entry.id))?;
@@ -159,7 +165,7 @@ pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset
         entry.check_place(offset)?;
         Ok(entry)
     });
-    let entry = entry.map_err(|what| owner.corrupt(offset, what))?;
+    let entry = entry.map_err(|what| section.corrupt(offset, what))?;
     let end = offset + entry.header_len() + entry.stored_len();
     Ok((entry, end))
 }

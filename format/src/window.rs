@@ -1,9 +1,9 @@
 //! A window of frames: how its blocks are coded, and what they promised and reached.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::directory::{finite_amount, is_amount, is_range};
 use crate::limits::*;
-use crate::metadata::{CONFIG, whole};
+use crate::metadata::{CONFIG, decode_exact};
 use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
@@ -114,14 +114,14 @@ pub struct WindowEnd {
 pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
 impl WindowRecord {
-    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
+    pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
         bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
     }
 
     /// The record that is exactly `bytes`; the rest of the metadata says whether it can be.
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        let record: Self = whole(bytes, "window record")?;
-        let begun = Self { window: record.window.begun(), ..record.clone() };
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        let record: Self = decode_exact(bytes, "window record")?;
+        let begun = Self { window: record.window.without_totals(), ..record.clone() };
         ensure(begun.encode()? == bytes, || "a window that begins with blocks".into())?; // to the bit
         Ok(record)
     }
@@ -157,23 +157,23 @@ impl WindowEnd {
         }
     }
 
-    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
+    pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
         bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
     }
 
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        whole(bytes, "record of a window's end")
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        decode_exact(bytes, "record of a window's end")
     }
 }
 
 impl Window {
     /// As it is before its first block.
-    pub(crate) fn begun(&self) -> Self {
-        self.with(&WindowEnd::of_nothing(0))
+    pub(crate) fn without_totals(&self) -> Self {
+        self.with_totals(&WindowEnd::of_nothing(0))
     }
 
     /// As it is with what its blocks add up to.
-    pub fn with(&self, end: &WindowEnd) -> Self {
+    pub fn with_totals(&self, end: &WindowEnd) -> Self {
         let WindowEnd { reached, share, squared_error, min, max, missing, coded, outliers, .. } = *end;
         Self { reached, share, squared_error, min, max, missing, coded, outliers, ..self.clone() }
     }
@@ -184,7 +184,7 @@ impl Window {
     }
 
     /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
-    pub(crate) fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
+    pub(crate) fn check(&self, voxels: u64, voxels_in_all: u64) -> ParseResult {
         let Self { frames, coefficients, .. } = *self;
         ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames"))?;
         ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
@@ -202,7 +202,7 @@ impl Window {
         ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
     }
 
-    fn check_coding(&self) -> Check {
+    fn check_coding(&self) -> ParseResult {
         let Self { frames, coefficients, .. } = *self;
         let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
         let levels = match self.pyramid {

@@ -8,7 +8,7 @@ use crate::header::{FileId, Header};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
-use crate::section::{Extent, Owner, compress_directory, frame};
+use crate::section::{SectionExtent, SectionId, compress_directory, frame};
 use crate::unfinished::Unfinished;
 use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
@@ -33,9 +33,9 @@ pub struct Writer<W: Write> {
     out: W,
     id: FileId,
     /// Bytes written.
-    at: u64,
+    position: u64,
     /// Whether the last call succeeded.
-    sound: bool,
+    intact: bool,
     /// Of the windows that were ended.
     metadata: Metadata,
     /// Bytes that the record of these and the one that was begun takes at most, once it was counted.
@@ -57,26 +57,26 @@ impl<W: Write> Writer<W> {
     pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
         let (start, leaves) = (metadata.start(), Vec::new());
         let record = start.encode()?;
-        let mut writer = Self::at(out, Unfinished { id, metadata: start, end: 0, leaves, stored: 0 });
+        let mut writer = Self::continue_from(out, Unfinished { id, metadata: start, end: 0, leaves, stored: 0 });
         writer.write(&Header::new(id).encode())?;
-        writer.section(Owner::Start, &record, record.len())?;
-        writer.ended = writer.at;
+        writer.write_section(SectionId::Start, &record, record.len())?;
+        writer.ended = writer.position;
         Ok(writer)
     }
 
     /// Goes on after the whole windows of a file that was not finished; `out` is where they end.
     pub fn resume(out: W, unfinished: Unfinished) -> Self {
-        Self::at(out, unfinished)
+        Self::continue_from(out, unfinished)
     }
 
-    fn at(out: W, begun: Unfinished) -> Self {
+    fn continue_from(out: W, begun: Unfinished) -> Self {
         let Unfinished { id, metadata, end, leaves, stored } = begun;
-        let (sound, window, last, leaf, entries) = (true, None, None, None, Vec::new());
+        let (intact, window, last, leaf, entries) = (true, None, None, None, Vec::new());
         Self {
             out,
             id,
-            at: end,
-            sound,
+            position: end,
+            intact,
             metadata,
             record: None,
             ended: end,
@@ -101,7 +101,7 @@ impl<W: Write> Writer<W> {
 
     /// Begins the next window. With this, every block of it can be decoded whatever becomes of the rest.
     pub fn begin_window(&mut self, record: WindowRecord) -> Result<()> {
-        self.begin()?;
+        self.begin_call()?;
         let bytes = record.encode().map_err(Error::Invalid)?;
         let next = WindowRecord::parse(&bytes).and_then(|record| {
             let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
@@ -109,8 +109,8 @@ impl<W: Write> Writer<W> {
         });
         next.map_err(Error::Invalid)?;
         self.count_record(bytes.len())?;
-        self.section(Owner::Window(record.number), &bytes, bytes.len())?;
-        (self.window, self.sound) = (Some(record), true);
+        self.write_section(SectionId::Window(record.number), &bytes, bytes.len())?;
+        (self.window, self.intact) = (Some(record), true);
         Ok(())
     }
 
@@ -129,30 +129,30 @@ impl<W: Write> Writer<W> {
     /// Appends a block of the window that was begun. Blocks come ordered by window, channel and block, none left out; [`Error::Invalid`] otherwise
     /// and for statistics that no block can have.
     pub fn append(&mut self, block: &EncodedBlock) -> Result<()> {
-        self.put(block, false)
+        self.write_block(block, false)
     }
 
     /// Appends a block of which nothing is known, in its place.
     pub fn append_lost(&mut self, id: BlockId) -> Result<()> {
         let stats = BlockEntry::of_lost(id).stats;
-        self.put(&EncodedBlock { id, stats, parts: Vec::new() }, true)
+        self.write_block(&EncodedBlock { id, stats, parts: Vec::new() }, true)
     }
 
-    fn put(&mut self, block: &EncodedBlock, lost: bool) -> Result<()> {
-        self.begin()?;
+    fn write_block(&mut self, block: &EncodedBlock, lost: bool) -> Result<()> {
+        self.begin_call()?;
         self.check_follows(block.id)?;
-        self.make_room(block.id)?;
+        self.start_leaf_for(block.id)?;
         self.pad()?;
-        let entry = self.place(block, lost)?;
+        let entry = self.entry_here(block, lost)?;
         entry.check().map_err(|what| Error::Invalid(format!("{}: {what}", block.id)))?;
         let mut bytes = Vec::new();
         entry.encode(&mut bytes);
-        let leaf = self.leaf.get_or_insert_with(|| LeafEntry::new(block.id, self.at));
+        let leaf = self.leaf.get_or_insert_with(|| LeafEntry::new(block.id, self.position));
         leaf.add(&entry);
         self.entries.extend_from_slice(&bytes);
-        self.section(Owner::Block(block.id), &bytes, bytes.len())?;
+        self.write_section(SectionId::Block(block.id), &bytes, bytes.len())?;
         block.parts.iter().try_for_each(|part| self.write(&part.stored))?;
-        (self.last, self.sound) = (Some(block.id), true);
+        (self.last, self.intact) = (Some(block.id), true);
         self.stored += entry.stored_len();
         Ok(())
     }
@@ -160,7 +160,7 @@ impl<W: Write> Writer<W> {
     /// Ends the window, all of whose blocks were appended: writes the end of its directory and what they add up to.
     /// [`Error::Invalid`] if they do not.
     pub fn end_window(&mut self, end: &WindowEnd) -> Result<()> {
-        self.begin()?;
+        self.begin_call()?;
         self.flush_leaf()?;
         let number = self.metadata.windows.len() as u32;
         let bytes = end.encode().map_err(Error::Invalid)?;
@@ -172,22 +172,22 @@ impl<W: Write> Writer<W> {
         let checked = ensure(whole, || format!("window {number}: blocks are missing"))
             .and_then(|()| check_window(&self.metadata, number, leaves, self.ended));
         checked.map_err(Error::Invalid)?;
-        self.section(Owner::WindowEnd(number), &bytes, bytes.len())?;
-        (self.ended, self.last, self.sound) = (self.at, None, true);
+        self.write_section(SectionId::WindowEnd(number), &bytes, bytes.len())?;
+        (self.ended, self.last, self.intact) = (self.position, None, true);
         Ok(())
     }
 
     /// Ends the file: writes metadata, directory and footer, and flushes. [`Error::Invalid`] without a window, or after
     /// blocks whose window was not ended.
     pub fn finish(mut self) -> Result<(W, Summary)> {
-        self.begin()?;
+        self.begin_call()?;
         let record = self.metadata.encode()?;
         let ended = self.window.is_none() && self.metadata.frames > 0;
         ensure(ended, || "a file without windows, or within one".into()).map_err(Error::Invalid)?;
-        let metadata = self.section(Owner::Metadata, &record, record.len())?;
+        let metadata = self.write_section(SectionId::Metadata, &record, record.len())?;
         let root = self.write_root()?;
         self.pad()?;
-        let (total, blocks) = (self.at + FOOTER as u64, self.metadata.blocks());
+        let (total, blocks) = (self.position + FOOTER as u64, self.metadata.blocks());
         let leaves = self.leaves.len() as u64;
         self.write(&Footer { id: self.id, total, metadata, root, blocks, leaves }.encode())?;
         self.out.flush()?;
@@ -195,8 +195,8 @@ impl<W: Write> Writer<W> {
     }
 
     /// Refuses after an error; assumes one until the caller says otherwise.
-    fn begin(&mut self) -> Result<()> {
-        if !std::mem::replace(&mut self.sound, false) {
+    fn begin_call(&mut self) -> Result<()> {
+        if !std::mem::replace(&mut self.intact, false) {
             return Err(Error::Invalid("the file: an earlier error left it incomplete".into()));
         }
         Ok(())
@@ -217,23 +217,23 @@ impl<W: Write> Writer<W> {
     }
 
     /// Ends the current leaf if `id` does not belong to it.
-    fn make_room(&mut self, id: BlockId) -> Result<()> {
+    fn start_leaf_for(&mut self, id: BlockId) -> Result<()> {
         let other = |leaf: LeafEntry| leaf.channel != id.channel;
         let full = |leaf: LeafEntry| u32::from(leaf.count) == BLOCKS_PER_LEAF;
         if self.leaf.is_some_and(|leaf| other(leaf) || full(leaf)) { self.flush_leaf() } else { Ok(()) }
     }
 
     /// The entry of a block that starts here.
-    fn place(&self, block: &EncodedBlock, lost: bool) -> Result<BlockEntry> {
+    fn entry_here(&self, block: &EncodedBlock, lost: bool) -> Result<BlockEntry> {
         let (id, stats, parts) = (block.id, block.stats, Vec::with_capacity(block.parts.len()));
         let mut entry = BlockEntry { id, stats, parts, lost };
         for part in &block.parts {
             let (kind, stats, raw_len) = (part.kind, part.stats, part.raw_len);
-            let stored_len = length(&part.stored)?;
-            let checksum = Owner::Part(block.id, kind).checksum(self.id, &part.stored);
+            let stored_len = stored_length(&part.stored)?;
+            let checksum = SectionId::Part(block.id, kind).checksum(self.id, &part.stored);
             entry.parts.push(PartEntry { kind, stats, offset: 0, stored_len, raw_len, checksum });
         }
-        let mut offset = self.at + entry.header_len();
+        let mut offset = self.position + entry.header_len();
         for part in &mut entry.parts {
             part.offset = offset;
             offset += u64::from(part.stored_len);
@@ -245,48 +245,48 @@ impl<W: Write> Writer<W> {
     fn flush_leaf(&mut self) -> Result<()> {
         let Some(mut leaf) = self.leaf.take() else { return Ok(()) };
         let raw = std::mem::take(&mut self.entries);
-        let extent = self.section(Owner::Leaf(leaf.first()), &compress_directory(&raw)?, raw.len())?;
+        let extent = self.write_section(SectionId::Leaf(leaf.first()), &compress_directory(&raw)?, raw.len())?;
         leaf.set_extent(&extent);
         self.leaves.push(leaf);
         Ok(())
     }
 
-    fn write_root(&mut self) -> Result<Extent> {
+    fn write_root(&mut self) -> Result<SectionExtent> {
         let size = (self.leaves.len() * LEAF_ENTRY) as u64;
         if size > MAX_ROOT_RAW {
             return Err(Error::TooLarge { what: "bytes of the directory's root".into(), size, limit: MAX_ROOT_RAW });
         }
         let mut raw = Vec::with_capacity(self.leaves.len() * LEAF_ENTRY);
         self.leaves.iter().for_each(|leaf| leaf.encode(&mut raw));
-        self.section(Owner::Root, &compress_directory(&raw)?, raw.len())
+        self.write_section(SectionId::Root, &compress_directory(&raw)?, raw.len())
     }
 
     /// Writes a section at the next aligned place.
-    fn section(&mut self, owner: Owner, stored: &[u8], raw_len: usize) -> Result<Extent> {
+    fn write_section(&mut self, section: SectionId, stored: &[u8], raw_len: usize) -> Result<SectionExtent> {
         self.pad()?;
-        let checksum = owner.checksum(self.id, stored);
+        let checksum = section.checksum(self.id, stored);
         let raw_len = u32::try_from(raw_len).unwrap_or(u32::MAX);
-        let extent = Extent { offset: self.at, stored_len: length(stored)?, raw_len, checksum };
-        self.write(&frame(owner, &extent))?;
+        let extent = SectionExtent { offset: self.position, stored_len: stored_length(stored)?, raw_len, checksum };
+        self.write(&frame(section, &extent))?;
         self.write(stored)?;
         Ok(extent)
     }
 
     fn pad(&mut self) -> Result<()> {
         let zeros = [0; ALIGN as usize];
-        let missing = align(self.at) - self.at;
+        let missing = align(self.position) - self.position;
         self.write(&zeros[..missing as usize])
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.out.write_all(bytes)?;
-        self.at += bytes.len() as u64;
+        self.position += bytes.len() as u64;
         Ok(())
     }
 }
 
 /// A length as it is in a file.
-fn length(bytes: &[u8]) -> Result<u32> {
+fn stored_length(bytes: &[u8]) -> Result<u32> {
     let (size, limit) = (bytes.len() as u64, u64::from(u32::MAX));
     u32::try_from(size).map_err(|_| Error::TooLarge { what: "stored bytes".into(), size, limit })
 }

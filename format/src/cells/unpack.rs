@@ -2,7 +2,7 @@
 
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, SYMBOLS, cells, volume};
 use crate::bits::{BitReader, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::segments::unpack_segments;
 
 /// Fills `codes` with those of all boxes; returns how many are not zero.
@@ -64,7 +64,7 @@ struct Streams<'a> {
 }
 
 impl<'a> Streams<'a> {
-    fn parse(raw: &'a [u8], cells: usize, codes: usize) -> Check<Self> {
+    fn parse(raw: &'a [u8], cells: usize, codes: usize) -> ParseResult<Self> {
         let mut rest = raw;
         let (mut ends, mut sum) = ([0; CLASSES + SCALES], 0usize);
         for end in &mut ends {
@@ -83,7 +83,7 @@ impl<'a> Streams<'a> {
     }
 
     /// Every stream and the bits must have come to their end.
-    fn finish(self) -> Check<usize> {
+    fn finish(self) -> ParseResult<usize> {
         let next = self.classes[..CLASSES].iter().chain(&self.scales);
         ensure(next.eq(&self.ends), || "streams do not have the lengths that their cells call for".into())?;
         ensure(!self.wrong, || "a code out of range".into())?;
@@ -93,7 +93,7 @@ impl<'a> Streams<'a> {
     }
 
     /// A box.
-    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> Check {
+    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> ParseResult {
         let (mut grid, plane) = (Grid::new(extents), extents[0] * extents[1]);
         let mut significant = vec![0; grid.cells[0]];
         let ahead = |bit: usize| bit % 2 + extents[0] * (bit / 2 % 2 + extents[1] * (bit / 4));

@@ -3,7 +3,7 @@
 use crate::footer::{FOOTER, Footer};
 use crate::header::{HEADER, Header};
 use crate::leaf::LEAF_ENTRY;
-use crate::section::{Extent, FRAME, Owner, frame};
+use crate::section::{FRAME, SectionExtent, SectionId, frame};
 use crate::testing::*;
 use crate::*;
 use std::fmt::Write;
@@ -54,7 +54,8 @@ fn the_header_is_as_specified() {
 
 #[test]
 fn the_footer_is_as_specified() {
-    let extent = |n: u32| Extent { offset: n.into(), stored_len: n + 1, raw_len: n + 2, checksum: u64::from(n) + 3 };
+    let extent =
+        |n: u32| SectionExtent { offset: n.into(), stored_len: n + 1, raw_len: n + 2, checksum: u64::from(n) + 3 };
     let footer = Footer { id: ID, total: 7, metadata: extent(10), root: extent(20), blocks: 8, leaves: 9 };
     let record = footer.encode();
     assert_eq!(record.len(), FOOTER);
@@ -72,7 +73,7 @@ fn the_footer_is_as_specified() {
 #[test]
 fn frames_and_entries_are_as_specified() {
     let (n8, n4, f8) = (|n: u64| n.to_le_bytes(), |n: u32| n.to_le_bytes(), |n: f64| n.to_le_bytes());
-    let record = frame(Owner::Metadata, &Extent { offset: 9, stored_len: 1, raw_len: 2, checksum: 3 });
+    let record = frame(SectionId::Metadata, &SectionExtent { offset: 9, stored_len: 1, raw_len: 2, checksum: 3 });
     assert_eq!(record.len(), FRAME);
     #[rustfmt::skip]
     check("Section frame", &record, &[("tag", b"META"), ("stored", &n4(1)), ("raw", &n4(2)), ("checksum", &n8(3))]);

@@ -1,4 +1,4 @@
-//! Fields of extreme values; checksums fit.
+//! FieldReader of extreme values; checksums fit.
 
 use super::fat::*;
 use super::forge::*;

@@ -13,7 +13,7 @@ mod splices;
 
 use crate::footer::{FOOTER, Footer};
 use crate::header::HEADER;
-use crate::section::{Extent, FRAME, Owner, compress_directory, decompress, frame};
+use crate::section::{FRAME, SectionExtent, SectionId, compress_directory, decompress, frame};
 use crate::testing::*;
 use crate::*;
 
@@ -70,8 +70,8 @@ fn swapped_and_foreign_parts_are_found() {
     let (block, part, other) = pair.expect("two parts of one size");
     let forged = PartEntry { offset: other.offset, checksum: other.checksum, ..*part };
     assert!(matches!(reader.part(block, &forged), Err(Error::Corrupt { what, .. }) if what.contains("checksum")));
-    assert_ne!(Owner::Root.checksum(ID, b"x"), Owner::Root.checksum(FileId([1; 16]), b"x"));
-    assert_ne!(Owner::Root.checksum(ID, b"x"), Owner::Metadata.checksum(ID, b"x"));
+    assert_ne!(SectionId::Root.checksum(ID, b"x"), SectionId::Root.checksum(FileId([1; 16]), b"x"));
+    assert_ne!(SectionId::Root.checksum(ID, b"x"), SectionId::Metadata.checksum(ID, b"x"));
 }
 
 /// The file's pieces, to be changed and put together again with checksums that fit.
@@ -86,7 +86,7 @@ impl Pieces {
         Self { file: file.to_vec(), footer }
     }
 
-    fn stored(&self, extent: Extent) -> &[u8] {
+    fn stored(&self, extent: SectionExtent) -> &[u8] {
         &self.file[extent.offset as usize + FRAME..extent.end() as usize]
     }
 
@@ -97,17 +97,17 @@ impl Pieces {
     /// The file with other metadata and root, all checksums right.
     fn forge(&self, record: &[u8], root: &[u8]) -> Vec<u8> {
         let mut out = self.file[..self.footer.metadata.offset as usize].to_vec();
-        let mut section = |owner: Owner, stored: &[u8], raw_len: usize| {
+        let mut section = |owner: SectionId, stored: &[u8], raw_len: usize| {
             let (stored_len, raw_len) = (stored.len() as u32, raw_len as u32);
             let checksum = owner.checksum(ID, stored);
-            let extent = Extent { offset: out.len() as u64, stored_len, raw_len, checksum };
+            let extent = SectionExtent { offset: out.len() as u64, stored_len, raw_len, checksum };
             out.extend(frame(owner, &extent));
             out.extend(stored);
             out.resize(out.len().next_multiple_of(64), 0);
             extent
         };
-        let metadata = section(Owner::Metadata, record, record.len());
-        let root = section(Owner::Root, &compress_directory(root).expect("memory"), root.len());
+        let metadata = section(SectionId::Metadata, record, record.len());
+        let root = section(SectionId::Root, &compress_directory(root).expect("memory"), root.len());
         let total = (out.len() + FOOTER) as u64;
         out.extend(Footer { total, metadata, root, ..self.footer }.encode());
         out
@@ -149,9 +149,9 @@ fn forged_leaves_are_refused() {
     let raw = decompress(pieces.stored(leaf.extent()), leaf.raw_len).expect("whole");
     for changed in extremes(&raw).filter(|changed| *changed != raw) {
         let stored = compress_directory(&changed).expect("memory");
-        let owner = Owner::Leaf(leaf.first());
+        let owner = SectionId::Leaf(leaf.first());
         let (stored_len, checksum) = (stored.len() as u32, owner.checksum(ID, &stored));
-        let extent = Extent { offset: leaf.offset, stored_len, raw_len: changed.len() as u32, checksum };
+        let extent = SectionExtent { offset: leaf.offset, stored_len, raw_len: changed.len() as u32, checksum };
         let mut forged = file[..leaf.offset as usize].to_vec();
         forged.extend(frame(owner, &extent));
         forged.extend(stored);
@@ -160,7 +160,7 @@ fn forged_leaves_are_refused() {
         entry.set_extent(&extent);
         entry.encode(&mut encoded);
         let offset = forged.len() as u64;
-        let footer = Footer { metadata: Extent { offset, ..pieces.footer.metadata }, ..pieces.footer };
+        let footer = Footer { metadata: SectionExtent { offset, ..pieces.footer.metadata }, ..pieces.footer };
         let changed = Pieces { file: forged, footer };
         assert!(verify(&changed.forge(&record, &[&encoded[..], &root[encoded.len()..]].concat())).is_err());
     }
