@@ -16,7 +16,7 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
 use wavesplat::file::verify::verify;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::{Metadata, Unfinished};
+use wavesplat_format::{CompletePrefix, Metadata};
 use xxhash_rust::xxh3::xxh3_64;
 
 fn folder() -> PathBuf {
@@ -102,7 +102,7 @@ fn golden_files_are_continued_under_their_own_id() {
         let config = ConvertConfig { block: Some(6), ..config };
         let golden = fs::read(folder().join(format!("{name}.wspl"))).unwrap();
         let cut = &golden[..golden.len() * 2 / 3];
-        let unfinished = Unfinished::read(&cut).unwrap();
+        let unfinished = CompletePrefix::read(&cut).unwrap();
         assert!(!unfinished.metadata().windows.is_empty(), "{name}: whole windows are left");
         let (id, mut bytes) = (unfinished.id(), golden[..unfinished.bytes() as usize].to_vec());
         let begun = Some(PartialFile { unfinished, before: 0 });

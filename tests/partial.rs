@@ -114,7 +114,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
     let small = file().open().metadata().clone();
     let mut metadata = small.start();
     (metadata.dims, metadata.block_edge) = ([2000, 1000, 1000], 10);
-    let (mut window, number) = (small.windows[0].with(&WindowEnd::of_nothing(0)), 0);
+    let (mut window, number) = (small.windows[0].with_totals(&WindowEnd::empty(0)), 0);
     (window.frames, window.coefficients, window.levels) = (2, 2, vec![2]);
     let mut writer = Writer::new(Vec::new(), FileId([6; 16]), &metadata).unwrap();
     writer.begin_window(WindowRecord { number, window, times: Vec::new() }).unwrap();
@@ -126,7 +126,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
         let parts = vec![part.clone()];
         writer.append(&EncodedBlock { id: BlockId { window: 0, block, channel: 0 }, stats, parts }).unwrap();
     }
-    writer.end_window(&WindowEnd { missing: 2_000_000, ..WindowEnd::of_nothing(0) }).unwrap();
+    writer.end_window(&WindowEnd { missing: 2_000_000, ..WindowEnd::empty(0) }).unwrap();
     let (file, summary) = writer.finish().unwrap();
     let counted = Counted::of(file);
     let reader = Reader::open(&counted).unwrap();

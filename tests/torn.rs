@@ -9,7 +9,7 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::Unfinished;
+use wavesplat_format::CompletePrefix;
 
 const DISKS: usize = 20_000;
 
@@ -39,14 +39,14 @@ fn after_a_power_failure_whole_windows_alone_are_gone_on_with() {
     let data = volume(Kind::Wave, SampleType::F32, Mask::Special, dims.iter().product(), 40, 3);
     let config = ConvertConfig { block: Some(5), ..settings(Basis::Samples, 8, 0.05) };
     let file = stored(&mut Memory::new(Grid::unit(dims), SampleType::F32, data), &config).bytes();
-    let whole = Unfinished::read(&file).unwrap();
+    let whole = CompletePrefix::read(&file).unwrap();
     let (mut random, mut kept) = (Random(11), [0; 6]);
-    let start = Unfinished::read(&file[..700].to_vec()).unwrap().bytes() as usize;
+    let start = CompletePrefix::read(&file[..700].to_vec()).unwrap().bytes() as usize;
     for _ in 0..DISKS * times() {
         let synced = start + random.below(file.len() - start);
-        let before = Unfinished::read(&file[..synced].to_vec()).unwrap();
+        let before = CompletePrefix::read(&file[..synced].to_vec()).unwrap();
         let left = failed(&file, synced, &mut random);
-        let found = Unfinished::read(&left).unwrap();
+        let found = CompletePrefix::read(&left).unwrap();
         let (bytes, windows) = (found.bytes() as usize, found.metadata().windows.len());
         assert!(windows >= before.metadata().windows.len(), "what was on the disk is not lost");
         assert_eq!(found.metadata().windows, whole.metadata().windows[..windows]);

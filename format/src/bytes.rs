@@ -1,14 +1,14 @@
-//! Little-endian fields, read with bounds and written in order.
+//! Reads and writes little-endian fields; reads are bounds-checked.
 
-/// What a check or a parser of bytes says: the reason in words; the caller adds the place.
+/// The result of a check or parser. The error is the reason; the caller adds the place in the file.
 pub(crate) type ParseResult<T = ()> = std::result::Result<T, String>;
 
-/// Fails with `what()` unless `ok`.
+/// Returns the error `what()` unless `ok`.
 pub(crate) fn ensure(ok: bool, what: impl FnOnce() -> String) -> ParseResult {
     if ok { Ok(()) } else { Err(what()) }
 }
 
-/// The fields of a record, taken one after another.
+/// Reads the fields of a record in order.
 pub(crate) struct FieldReader<'a>(&'a [u8]);
 
 impl<'a> FieldReader<'a> {
@@ -44,13 +44,13 @@ impl<'a> FieldReader<'a> {
         Ok(f64::from_le_bytes(self.array()?))
     }
 
-    /// `N` bytes that must be zero.
+    /// Skips `N` reserved bytes; fails unless they are zero.
     pub(crate) fn reserved<const N: usize>(&mut self) -> ParseResult {
         let bytes = self.array::<N>()?;
         ensure(bytes.iter().all(|&b| b == 0), || "reserved bytes are not zero".into())
     }
 
-    /// Fails if anything is left.
+    /// Fails if bytes remain.
     pub(crate) fn end(&self) -> ParseResult {
         ensure(self.0.is_empty(), || format!("{} bytes too many", self.0.len()))
     }

@@ -1,4 +1,4 @@
-//! The fixed footer: where the metadata and the directory are, and how long the file is.
+//! The fixed-size footer: the offsets of metadata and directory, and the length of the file.
 
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::header::FileId;
@@ -42,9 +42,11 @@ impl Footer {
         out
     }
 
-    /// End magic, checksum, reserved bytes, in this order.
+    /// Checks end magic, checksum and reserved bytes, in this order.
     pub(crate) fn decode(bytes: &[u8; FOOTER]) -> ParseResult<Self> {
-        ensure(bytes.ends_with(&END_MAGIC), || "the end magic is missing: cut short, or never finished".into())?;
+        ensure(bytes.ends_with(&END_MAGIC), || {
+            "the end magic is missing: the file is truncated or was never finished".into()
+        })?;
         let (fields, tail) = bytes.split_at(FOOTER - 16);
         let matches = FieldReader::new(tail).u64()? == xxh3_64(fields);
         ensure(matches, || "the checksum does not match".into())?;

@@ -1,4 +1,4 @@
-//! Framed sections and checksums: every structure but the parts' payloads is a frame of 24 bytes and its content.
+//! Sections and checksums. Every structure except the payloads of parts is a section: a frame of 24 bytes and its content.
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
@@ -11,35 +11,35 @@ use zstd::zstd_safe;
 /// Bytes of a section's frame.
 pub(crate) const FRAME: usize = 24;
 
-/// The zstd level of the directory: fast, and the directory is small.
+/// The zstd level of the directory: a fast one, because the directory is small.
 const DIRECTORY_LEVEL: i32 = 3;
 
-/// Where a section is and what its stored bytes must be.
+/// Position, length and checksum of a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct SectionExtent {
-    /// Of the frame, absolute.
+    /// Offset of the frame in the file.
     pub(crate) offset: u64,
     /// Bytes after the frame.
     pub(crate) stored_len: u32,
-    /// Bytes of the content once decompressed.
+    /// Bytes of the content after decompression.
     pub(crate) raw_len: u32,
-    /// Over the stored bytes.
+    /// Checksum of the stored bytes.
     pub(crate) checksum: u64,
 }
 
 impl SectionExtent {
-    /// The first byte after the section, or the largest number where it would be beyond.
+    /// Offset of the first byte after the section, or `u64::MAX` on overflow.
     pub(crate) fn end(&self) -> u64 {
         self.offset.saturating_add(FRAME as u64 + u64::from(self.stored_len))
     }
 }
 
-/// Where a section at `offset` of `len` stored bytes ends.
+/// The end of a section of `len` stored bytes at `offset`.
 pub(crate) fn section_end(offset: u64, len: usize) -> u64 {
     offset.saturating_add((FRAME + len) as u64)
 }
 
-/// Whose bytes are checksummed: seeds the checksum, so that bytes of another section fail.
+/// Identifies a section or part. It seeds the checksum, so that bytes of another section or part fail the check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SectionId {
     Part(BlockId, PartKind),
@@ -53,7 +53,7 @@ pub(crate) enum SectionId {
 }
 
 impl SectionId {
-    /// Block, kind and level in the seed.
+    /// The block, and kind and level, in the seed.
     fn identity(self) -> (BlockId, [u8; 2]) {
         let none = BlockId { window: 0, block: 0, channel: 0 };
         match self {
@@ -68,7 +68,7 @@ impl SectionId {
         }
     }
 
-    /// The first bytes of the section; a part has none.
+    /// The tag that starts the section; parts have none.
     fn tag(self) -> [u8; 4] {
         match self {
             Self::Part(..) => [0; 4],
@@ -82,7 +82,7 @@ impl SectionId {
         }
     }
 
-    /// The checksum of this section's stored bytes in the file `file`.
+    /// The checksum of the stored bytes in the file `file`.
     pub(crate) fn checksum(self, file: FileId, stored: &[u8]) -> u64 {
         let (id, kind) = self.identity();
         let mut seed = Vec::with_capacity(28);
@@ -94,7 +94,7 @@ impl SectionId {
         xxh3_64_with_seed(stored, xxh3_64(&seed))
     }
 
-    /// An error at `offset` in this section's bytes.
+    /// An error at `offset` in this section.
     pub(crate) fn corrupt(self, offset: u64, what: impl Into<String>) -> Error {
         Error::Corrupt { offset, place: self.to_string(), what: what.into() }
     }
@@ -115,7 +115,7 @@ impl fmt::Display for SectionId {
     }
 }
 
-/// The frame of `section`'s section.
+/// The bytes of a section's frame.
 pub(crate) fn frame(section: SectionId, extent: &SectionExtent) -> Vec<u8> {
     let mut out = Vec::with_capacity(FRAME);
     out.put(&section.tag());
@@ -126,19 +126,21 @@ pub(crate) fn frame(section: SectionId, extent: &SectionExtent) -> Vec<u8> {
     out
 }
 
-/// Copies out `len` bytes at `offset`, after checking that they are there.
+/// Reads `len` bytes at `offset`. Checks the bounds before it allocates.
 pub(crate) fn read(storage: &impl Storage, section: SectionId, offset: u64, len: u64) -> Result<Vec<u8>> {
     let inside = offset.checked_add(len).is_some_and(|end| end <= storage.len());
     let size = usize::try_from(len).ok().filter(|_| inside);
     let Some(size) = size else {
-        return Err(section.corrupt(offset, format!("{len} bytes reach beyond the file's {}", storage.len())));
+        return Err(
+            section.corrupt(offset, format!("{len} bytes extend past the end of the file at {}", storage.len()))
+        );
     };
     let mut out = vec![0; size];
     storage.read_at(offset, &mut out)?;
     Ok(out)
 }
 
-/// The stored bytes of a section whose frame and checksum are right.
+/// Reads the stored bytes of a section; checks its frame and checksum.
 pub(crate) fn read_section(
     storage: &impl Storage,
     file: FileId,
@@ -147,7 +149,7 @@ pub(crate) fn read_section(
 ) -> Result<Vec<u8>> {
     let mut bytes = read(storage, section, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
     if !bytes.starts_with(&frame(section, extent)) {
-        return Err(section.corrupt(extent.offset, "the section's frame differs from what points to it"));
+        return Err(section.corrupt(extent.offset, "the section's frame differs from the reference to it"));
     }
     bytes.drain(..FRAME);
     if section.checksum(file, &bytes) != extent.checksum {
@@ -156,8 +158,7 @@ pub(crate) fn read_section(
     Ok(bytes)
 }
 
-/// The section of `section` at `offset`, of at most `most` stored bytes, whose frame says no more than it must and whose
-/// checksum is right.
+/// Reads the section at `offset`, of at most `most` stored bytes; checks its frame and checksum.
 pub(crate) fn section_at(
     storage: &impl Storage,
     file: FileId,
@@ -176,20 +177,20 @@ pub(crate) fn section_at(
 
 fn parse_frame(section: SectionId, offset: u64, bytes: &[u8]) -> ParseResult<SectionExtent> {
     let mut fields = FieldReader::new(bytes);
-    ensure(fields.array()? == section.tag(), || "no such section".into())?;
+    ensure(fields.array()? == section.tag(), || "another section's tag".into())?;
     let (stored_len, raw_len) = (fields.u32()?, fields.u32()?);
     fields.reserved::<4>()?;
     Ok(SectionExtent { offset, stored_len, raw_len, checksum: fields.u64()? })
 }
 
-/// One zstd frame of the directory's `raw` bytes.
+/// Compresses `raw` bytes of the directory to one zstd frame.
 pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
     let mut compressor = zstd::bulk::Compressor::new(DIRECTORY_LEVEL)?;
     compressor.include_checksum(true)?;
     Ok(compressor.compress(raw)?)
 }
 
-/// Exactly `raw_len` bytes from exactly one zstd frame that declares them. The caller has capped `raw_len`.
+/// Decompresses exactly one zstd frame, which must declare and hold exactly `raw_len` bytes. The caller limits `raw_len`.
 pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> ParseResult<Vec<u8>> {
     let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
     ensure(whole, || "not one whole zstd frame".into())?;

@@ -1,4 +1,4 @@
-//! Writes a file from front to back, without a seek.
+//! Writes a file from front to back, without seeking.
 
 use crate::block::{BlockId, EncodedBlock};
 use crate::bytes::ensure;
@@ -8,41 +8,41 @@ use crate::header::{FileId, Header};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
+use crate::prefix::CompletePrefix;
 use crate::section::{SectionExtent, SectionId, compress_directory, frame};
-use crate::unfinished::Unfinished;
 use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
 use std::io::Write;
 
-/// What was written.
+/// The sizes of a written file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     /// Bytes of the whole file.
     pub bytes: u64,
-    /// Blocks.
+    /// Number of blocks.
     pub blocks: u64,
-    /// Leaves of the directory.
+    /// Number of leaves in the directory.
     pub leaves: u64,
     /// Bytes of all parts, without headers, padding and directory.
     pub stored: u64,
 }
 
-/// A file being written. After an error it refuses to go on: what was written is incomplete.
+/// Writes a file. After an error every call fails, because the file is incomplete.
 #[derive(Debug)]
 pub struct Writer<W: Write> {
     out: W,
     id: FileId,
-    /// Bytes written.
+    /// Bytes written so far.
     position: u64,
     /// Whether the last call succeeded.
     intact: bool,
-    /// Of the windows that were ended.
+    /// Metadata of the ended windows.
     metadata: Metadata,
-    /// Bytes that the record of these and the one that was begun takes at most, once it was counted.
+    /// Upper bound on the bytes of the metadata record, with the window being written; `None` until first counted.
     record: Option<usize>,
-    /// Where the last of them ends.
+    /// Offset at which the last ended window ends.
     ended: u64,
-    /// The window that is being written, and its last block.
+    /// The window being written, and its last block.
     window: Option<WindowRecord>,
     last: Option<BlockId>,
     stored: u64,
@@ -53,24 +53,27 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Starts a file: writes its header and its start, which is all of the metadata that does not depend on frames.
+    /// Starts a file: writes its header and its start, which is the metadata that does not depend on frames.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] or [`Error::TooLarge`] if the metadata cannot be encoded, [`Error::Io`] if writing fails.
     pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
         let (start, leaves) = (metadata.start(), Vec::new());
         let record = start.encode()?;
-        let mut writer = Self::continue_from(out, Unfinished { id, metadata: start, end: 0, leaves, stored: 0 });
+        let mut writer = Self::continue_from(out, CompletePrefix { id, metadata: start, end: 0, leaves, stored: 0 });
         writer.write(&Header::new(id).encode())?;
         writer.write_section(SectionId::Start, &record, record.len())?;
         writer.ended = writer.position;
         Ok(writer)
     }
 
-    /// Goes on after the whole windows of a file that was not finished; `out` is where they end.
-    pub fn resume(out: W, unfinished: Unfinished) -> Self {
-        Self::continue_from(out, unfinished)
+    /// Continues a file after its complete windows. `out` must be positioned at their end.
+    pub fn resume(out: W, prefix: CompletePrefix) -> Self {
+        Self::continue_from(out, prefix)
     }
 
-    fn continue_from(out: W, begun: Unfinished) -> Self {
-        let Unfinished { id, metadata, end, leaves, stored } = begun;
+    fn continue_from(out: W, begun: CompletePrefix) -> Self {
+        let CompletePrefix { id, metadata, end, leaves, stored } = begun;
         let (intact, window, last, leaf, entries) = (true, None, None, None, Vec::new());
         Self {
             out,
@@ -89,17 +92,22 @@ impl<W: Write> Writer<W> {
         }
     }
 
-    /// Where the bytes go.
+    /// The output.
     pub fn out(&mut self) -> &mut W {
         &mut self.out
     }
 
-    /// The metadata of the windows that were ended.
+    /// The metadata of the ended windows.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// Begins the next window. With this, every block of it can be decoded whatever becomes of the rest.
+    /// Begins the next window. Its section and the start are enough to decode its blocks, even if the rest of the file is
+    /// never written.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if this cannot be the next window, [`Error::TooLarge`] if the metadata would exceed its limit,
+    /// [`Error::Io`] if writing fails.
     pub fn begin_window(&mut self, record: WindowRecord) -> Result<()> {
         self.begin_call()?;
         let bytes = record.encode().map_err(Error::Invalid)?;
@@ -114,27 +122,33 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// [`Error::TooLarge`] if the metadata could not hold a further window: now, and not when all is done.
+    /// Fails with [`Error::TooLarge`] if the metadata cannot hold another window. Checking here reports this before the
+    /// window is written and not at the end.
     fn count_record(&mut self, more: usize) -> Result<()> {
         let so_far = self.record.map_or_else(|| self.metadata.encode().map(|record| record.len()), Ok)?;
         let (size, limit) = ((so_far + more) as u64, MAX_METADATA as u64);
         if size > limit {
-            let what = "bytes of metadata, with so many windows or times; longer windows take less".into();
+            let what = "bytes of metadata for so many windows or times (longer windows take less)".into();
             return Err(Error::TooLarge { what, size, limit });
         }
         self.record = Some(so_far + more);
         Ok(())
     }
 
-    /// Appends a block of the window that was begun. Blocks come ordered by window, channel and block, none left out; [`Error::Invalid`] otherwise
-    /// and for statistics that no block can have.
+    /// Appends a block to the current window. Blocks must come in the order of channel and block, without omissions.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the block is out of order or its statistics are impossible, [`Error::Io`] if writing fails.
     pub fn append(&mut self, block: &EncodedBlock) -> Result<()> {
         self.write_block(block, false)
     }
 
-    /// Appends a block of which nothing is known, in its place.
+    /// Appends a lost block in place of one whose data are missing.
+    ///
+    /// # Errors
+    /// As [`Self::append`].
     pub fn append_lost(&mut self, id: BlockId) -> Result<()> {
-        let stats = BlockEntry::of_lost(id).stats;
+        let stats = BlockEntry::lost(id).stats;
         self.write_block(&EncodedBlock { id, stats, parts: Vec::new() }, true)
     }
 
@@ -157,8 +171,10 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Ends the window, all of whose blocks were appended: writes the end of its directory and what they add up to.
-    /// [`Error::Invalid`] if they do not.
+    /// Ends the current window after its last block: writes its last leaf and its totals.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if blocks are missing or the totals do not match them, [`Error::Io`] if writing fails.
     pub fn end_window(&mut self, end: &WindowEnd) -> Result<()> {
         self.begin_call()?;
         self.flush_leaf()?;
@@ -177,13 +193,16 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Ends the file: writes metadata, directory and footer, and flushes. [`Error::Invalid`] without a window, or after
-    /// blocks whose window was not ended.
+    /// Finishes the file: writes metadata, root and footer, and flushes the output.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there is no window or the last one was not ended, [`Error::TooLarge`] if the root exceeds its
+    /// limit, [`Error::Io`] if writing fails.
     pub fn finish(mut self) -> Result<(W, Summary)> {
         self.begin_call()?;
         let record = self.metadata.encode()?;
         let ended = self.window.is_none() && self.metadata.frames > 0;
-        ensure(ended, || "a file without windows, or within one".into()).map_err(Error::Invalid)?;
+        ensure(ended, || "the file has no windows, or its last window was not ended".into()).map_err(Error::Invalid)?;
         let metadata = self.write_section(SectionId::Metadata, &record, record.len())?;
         let root = self.write_root()?;
         self.pad()?;
@@ -194,15 +213,15 @@ impl<W: Write> Writer<W> {
         Ok((self.out, Summary { bytes: total, blocks, leaves, stored: self.stored }))
     }
 
-    /// Refuses after an error; assumes one until the caller says otherwise.
+    /// Fails if an earlier call failed. Marks the file as incomplete until the caller sets `intact` again.
     fn begin_call(&mut self) -> Result<()> {
         if !std::mem::replace(&mut self.intact, false) {
-            return Err(Error::Invalid("the file: an earlier error left it incomplete".into()));
+            return Err(Error::Invalid("an earlier error left the file incomplete".into()));
         }
         Ok(())
     }
 
-    /// Whether `id` is the next block, or begins the next channel; [`Self::end_window`] sees to the rest.
+    /// Checks that `id` is the next block or starts the next channel. [`Self::end_window`] checks that none is missing.
     fn check_follows(&self, id: BlockId) -> Result<()> {
         let window = self.metadata.windows.len() as u32;
         let follows = match self.last {
@@ -223,7 +242,7 @@ impl<W: Write> Writer<W> {
         if self.leaf.is_some_and(|leaf| other(leaf) || full(leaf)) { self.flush_leaf() } else { Ok(()) }
     }
 
-    /// The entry of a block that starts here.
+    /// The entry of a block that starts at the current position.
     fn entry_here(&self, block: &EncodedBlock, lost: bool) -> Result<BlockEntry> {
         let (id, stats, parts) = (block.id, block.stats, Vec::with_capacity(block.parts.len()));
         let mut entry = BlockEntry { id, stats, parts, lost };
@@ -241,7 +260,7 @@ impl<W: Write> Writer<W> {
         Ok(entry)
     }
 
-    /// Ends the current leaf, if there is one, right after its blocks.
+    /// Writes the current leaf, if there is one, directly after its blocks.
     fn flush_leaf(&mut self) -> Result<()> {
         let Some(mut leaf) = self.leaf.take() else { return Ok(()) };
         let raw = std::mem::take(&mut self.entries);
@@ -261,7 +280,7 @@ impl<W: Write> Writer<W> {
         self.write_section(SectionId::Root, &compress_directory(&raw)?, raw.len())
     }
 
-    /// Writes a section at the next aligned place.
+    /// Writes a section at the next multiple of [`ALIGN`].
     fn write_section(&mut self, section: SectionId, stored: &[u8], raw_len: usize) -> Result<SectionExtent> {
         self.pad()?;
         let checksum = section.checksum(self.id, stored);
@@ -285,7 +304,7 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// A length as it is in a file.
+/// The length of stored bytes as a field of a file.
 fn stored_length(bytes: &[u8]) -> Result<u32> {
     let (size, limit) = (bytes.len() as u64, u64::from(u32::MAX));
     u32::try_from(size).map_err(|_| Error::TooLarge { what: "stored bytes".into(), size, limit })

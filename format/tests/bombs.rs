@@ -27,7 +27,7 @@ type Bomb = (&'static str, Box<dyn Fn(Piece, usize, &mut Vec<u8>)>);
 type Content = Vec<(BlockId, BlockStats, Vec<(PartKind, Vec<u8>)>)>;
 
 fn metadata() -> Metadata {
-    let empty = WindowEnd::of_nothing(0);
+    let empty = WindowEnd::empty(0);
     let window = |first_frame| Window {
         first_frame,
         frames: 4,
@@ -93,9 +93,9 @@ fn file() -> Vec<u8> {
     let mut writer = Writer::new(Vec::new(), FileId([0xA5; 16]), &metadata).expect("memory");
     for (number, window) in (0..).zip(&metadata.windows) {
         let times = metadata.times[4 * number as usize..][..4].to_vec();
-        let begun = window.with(&WindowEnd::of_nothing(number));
+        let begun = window.with_totals(&WindowEnd::empty(number));
         writer.begin_window(WindowRecord { number, window: begun, times }).expect("next");
-        let mut end = WindowEnd::of_nothing(number);
+        let mut end = WindowEnd::empty(number);
         for block in 0..2 {
             let block = self::block(BlockId { window: number, block, channel: 0 }, &mut compressor);
             end.add(&block);
@@ -128,9 +128,9 @@ fn set_off(name: &str, file: &[u8], expected: &Content) -> bool {
     let baseline = HEAP.current_usage();
     let content = read(file);
     assert!(content.as_ref().map_or(true, |content| content == expected), "{name}: other content");
-    let _ = Unfinished::read(&file);
-    let salvage = Salvage::search(&file, &mut |_| {});
-    let _ = salvage.and_then(|salvage| salvage.write(&file, io::sink(), &mut || {}));
+    let _ = CompletePrefix::read(&file);
+    let recovery = Recovery::search(&file, &mut |_| {});
+    let _ = recovery.and_then(|recovery| recovery.write(&file, io::sink(), &mut || {}));
     let taken = HEAP.peak_usage() - baseline;
     assert!((1..MOST).contains(&taken), "{name}: {taken} bytes");
     content.is_err()

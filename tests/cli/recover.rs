@@ -114,9 +114,9 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
 fn what_no_one_can_save_is_said() {
     let (work, file) = work();
     work.write("text.wspl", "hello\n".repeat(1000));
-    work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be saved"]);
+    work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be recovered"]);
     work.write("start.wspl", &file[..700]);
-    work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be saved"]);
+    work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be recovered"]);
     let mut newer = file.clone();
     newer[16] = 1; // a feature of a later version
     let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();

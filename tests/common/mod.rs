@@ -84,8 +84,9 @@ pub(crate) fn stored_with_a_lie(
     let mut writer = Writer::new(Vec::new(), file.id(), &metadata).unwrap();
     for window in 0..file.metadata().windows.len() as u32 {
         let times = metadata.times.get(file.window_range(window)).unwrap_or_default().to_vec();
-        let begun = WindowEnd::of_nothing(window);
-        let record = WindowRecord { number: window, window: metadata.windows[window as usize].with(&begun), times };
+        let begun = WindowEnd::empty(window);
+        let record =
+            WindowRecord { number: window, window: metadata.windows[window as usize].with_totals(&begun), times };
         writer.begin_window(record).unwrap();
         let (codec, frames) = (file.codec(window).unwrap(), file.window_range(window));
         let samples = memory.clone().window(frames.start, frames.len()).unwrap();
@@ -99,7 +100,7 @@ pub(crate) fn stored_with_a_lie(
             }
             writer.append(&encoded).unwrap();
         }
-        writer.end_window(&WindowEnd::of(window, &metadata.windows[window as usize])).unwrap();
+        writer.end_window(&WindowEnd::from_window(window, &metadata.windows[window as usize])).unwrap();
     }
     writer.finish().unwrap().0
 }

@@ -10,7 +10,7 @@ fn check(original: &Original, len: usize) {
         Error::Corrupt { place, .. } => assert!(["header", "footer"].contains(&&*place), "{place}"),
         error => assert!(matches!(error, Error::Foreign(_)) && len < 8, "{error}"),
     }
-    original.check_unfinished(cut);
+    original.check_prefix(cut);
 }
 
 #[test]
@@ -25,8 +25,8 @@ fn files_cut_anywhere_are_saved_up_to_there() {
     for (original, step, name) in [(lean(), 1, "lean"), (fat(), 5, "fat")] {
         let (began, len) = (Instant::now(), original.file.len());
         let saved: Vec<bool> =
-            (0..len).step_by(step).map(|len| original.check_salvage(&original.file[..len])).collect();
+            (0..len).step_by(step).map(|len| original.check_recovery(&original.file[..len])).collect();
         assert!(saved.is_sorted() && saved.contains(&true), "more is not less");
-        tell(&format!("cut and salvaged, {name}"), saved.len() as u64, (len / step) as u64, began);
+        tell(&format!("cut and recovered, {name}"), saved.len() as u64, (len / step) as u64, began);
     }
 }

@@ -29,9 +29,9 @@ fn storage_that_fails_is_no_damage() {
         let failing = Failing(file.clone(), from);
         let io = |error: Error| matches!(&error, Error::Io(e) if e.to_string() == "a bad sector");
         assert!(io(Reader::open(&failing).expect_err("fails")), "{from}");
-        let resumed = Unfinished::read(&failing);
+        let resumed = CompletePrefix::read(&failing);
         assert!(resumed.map_or_else(io, |found| found.bytes() <= from), "{from}");
-        assert!(Salvage::search(&failing, &mut |_| {}).is_err_and(io), "{from}");
+        assert!(Recovery::search(&failing, &mut |_| {}).is_err_and(io), "{from}");
     }
 }
 
@@ -39,7 +39,7 @@ fn storage_that_fails_is_no_damage() {
 fn other_files_are_foreign() {
     for bytes in [&b""[..], b"\x89PNG\r\n\x1a\n", &[0; 4096], b"\x1f\x8b"] {
         assert!(matches!(Reader::open(bytes), Err(Error::Foreign(_))), "{bytes:?}");
-        assert!(matches!(Unfinished::read(&bytes), Err(Error::Foreign(_))));
+        assert!(matches!(CompletePrefix::read(&bytes), Err(Error::Foreign(_))));
     }
 }
 
@@ -66,8 +66,8 @@ fn newer_files_are_unsupported_to_all() {
             }
         });
         assert!(matches!(Reader::open(&file), Err(Error::Unsupported(_))), "{at}");
-        assert!(matches!(Unfinished::read(&file), Err(Error::Unsupported(_))), "{at}");
-        assert!(matches!(Salvage::search(&file, &mut |_| {}), Err(Error::Unsupported(_))), "{at}");
+        assert!(matches!(CompletePrefix::read(&file), Err(Error::Unsupported(_))), "{at}");
+        assert!(matches!(Recovery::search(&file, &mut |_| {}), Err(Error::Unsupported(_))), "{at}");
     }
 }
 

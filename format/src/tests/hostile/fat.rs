@@ -12,7 +12,7 @@ pub(super) struct Original {
     pub(super) file: Vec<u8>,
     pub(super) metadata: Metadata,
     pub(super) blocks: BTreeMap<BlockId, (BlockEntry, Option<Content>)>,
-    /// Digests of salvaged files that were checked: many are the same.
+    /// Digests of recovered files that were checked: many are the same.
     checked: RefCell<HashSet<u128>>,
 }
 
@@ -63,8 +63,8 @@ fn windows() -> Vec<Window> {
 }
 
 impl Original {
-    /// Whether a salvaged file is sound, and every block in it what it was.
-    fn check_salvaged(&self, file: &[u8], salvaged: &Salvaged) {
+    /// Whether a recovered file is sound, and every block in it what it was.
+    fn check_recovered(&self, file: &[u8], recovered: &Recovered) {
         let (reader, mut lost) = (Reader::open(file).expect("whole"), Vec::new());
         assert_eq!(reader.metadata().start(), self.metadata.start());
         for (entry, content) in read_all(file).expect("whole") {
@@ -76,12 +76,12 @@ impl Original {
             assert_eq!((Some(&content), entry.stats), (expected.as_ref(), original.stats), "{}", entry.id);
             assert!(same_coding(reader.metadata(), &self.metadata, entry.id.window));
         }
-        assert_eq!(lost, salvaged.lost);
+        assert_eq!(lost, recovered.lost);
     }
 
     /// Whether what is whole of a changed file is what it was.
-    pub(super) fn check_unfinished(&self, file: &[u8]) {
-        let Ok(found) = Unfinished::read(&file) else { return };
+    pub(super) fn check_prefix(&self, file: &[u8]) {
+        let Ok(found) = CompletePrefix::read(&file) else { return };
         let kept = found.bytes() as usize;
         assert!(file[..kept] == self.file[..kept], "{kept} bytes kept");
         let windows = found.metadata().windows.len();
@@ -89,19 +89,19 @@ impl Original {
         assert_eq!(found.metadata().times[..], self.metadata.times[..found.metadata().frames as usize]);
     }
 
-    /// Salvages a changed file and checks it; whether anything could be saved.
-    pub(super) fn check_salvage(&self, file: &[u8]) -> bool {
-        let Ok((out, salvaged)) = salvage(file) else { return false };
+    /// Recovers a changed file and checks it; whether anything could be saved.
+    pub(super) fn check_recovery(&self, file: &[u8]) -> bool {
+        let Ok((out, recovered)) = recover(file) else { return false };
         if self.checked.borrow_mut().insert(xxh3_128(&out)) {
-            self.check_salvaged(&out, &salvaged);
+            self.check_recovered(&out, &recovered);
         }
         true
     }
 }
 
-/// The salvaged file of a damaged one.
-pub(super) fn salvage(file: &[u8]) -> Result<(Vec<u8>, Salvaged)> {
-    Salvage::search(&file, &mut |_| {})?.write(&file, Vec::new(), &mut || {})
+/// The recovered file of a damaged one.
+pub(super) fn recover(file: &[u8]) -> Result<(Vec<u8>, Recovered)> {
+    Recovery::search(&file, &mut |_| {})?.write(&file, Vec::new(), &mut || {})
 }
 
 /// Whether samples of a window are decoded alike by both.
@@ -118,7 +118,7 @@ fn same_coding(a: &Metadata, b: &Metadata, window: u32) -> bool {
 /// Everything that a program does with a file, whatever comes of it.
 pub(super) fn use_all(file: &[u8]) {
     let _ = read_through(file);
-    let _ = Unfinished::read(&file);
+    let _ = CompletePrefix::read(&file);
 }
 
 /// As [`read_all`], but unpacks every part only once.
@@ -159,5 +159,5 @@ fn fat_files_have_every_feature() {
     }
     assert!(blocks.values().any(|(entry, _)| entry.part(PartKind::Level(3)).is_some()));
     assert_eq!(blocks.values().filter(|(entry, _)| entry.lost).count(), 1);
-    assert_eq!(salvage(&file).expect("whole").0, file);
+    assert_eq!(recover(&file).expect("whole").0, file);
 }

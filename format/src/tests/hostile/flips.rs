@@ -44,12 +44,12 @@ fn every_flipped_bit_costs_no_more_than_its_block_and_resumes_before_it() {
     let (mut file, mut tries) = (original.file.clone(), 0);
     for bit in (0..8 * file.len()).step_by(37) {
         flip(&mut file, bit);
-        assert!(original.check_salvage(&file), "bit {bit}");
-        original.check_unfinished(&file);
+        assert!(original.check_recovery(&file), "bit {bit}");
+        original.check_prefix(&file);
         flip(&mut file, bit);
         tries += 1;
     }
-    tell("bits flipped, salvaged and resumed", tries, 8 * file.len() as u64 / 37, began);
+    tell("bits flipped, recovered and resumed", tries, 8 * file.len() as u64 / 37, began);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn flipped_bits_with_forged_checksums_are_safe() {
                 let file = pieces.forge(change);
                 use_all(&file);
                 if bit % 16 == 0 {
-                    let _ = salvage(&file);
+                    let _ = recover(&file);
                 }
                 slowest = slowest.max(start.elapsed().as_secs_f64());
                 tries += 1;

@@ -37,7 +37,7 @@ fn every_truncation_is_found() {
 fn wrong_lengths_are_named() {
     let (_, file) = small();
     let message = |bytes: &[u8]| Reader::open(bytes).expect_err("wrong length").to_string();
-    assert!(message(&file[..60]).contains("68 bytes of it are missing"));
+    assert!(message(&file[..60]).contains("68 bytes of it and everything after it are missing"));
     assert!(message(&[&file[..], &[7; 100]].concat()).contains("100 bytes too long"));
     assert!(message(&[&file[..HEADER], &file[HEADER + 64..]].concat()).contains("64 bytes too short"));
     assert!(message(&file[..file.len() - 200]).contains("end magic"));
@@ -195,7 +195,7 @@ fn windows_that_are_said_to_have_been_lost_take_no_memory() {
         }
         _ => {}
     });
-    let _ = Salvage::search(&bomb, &mut |_| {});
+    let _ = Recovery::search(&bomb, &mut |_| {});
     let many = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
         (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
         (forge::Piece::Window, 3) => {
@@ -205,11 +205,11 @@ fn windows_that_are_said_to_have_been_lost_take_no_memory() {
         (forge::Piece::End, 3) => bytes[..4].copy_from_slice(&2000u32.to_le_bytes()),
         _ => {}
     });
-    assert!(matches!(Salvage::search(&many, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
+    assert!(matches!(Recovery::search(&many, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
     let large = forge::Pieces::new(&file).forge(&mut |piece, _, bytes| {
         if matches!(piece, forge::Piece::Metadata | forge::Piece::Start) {
             bytes[..24].copy_from_slice(&[1u64 << 31, 1, 1].map(u64::to_le_bytes).concat());
         }
     });
-    assert!(matches!(Salvage::search(&large, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
+    assert!(matches!(Recovery::search(&large, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
 }

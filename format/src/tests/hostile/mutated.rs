@@ -102,17 +102,17 @@ fn mutated_files_are_safe_and_damage_is_found() {
         let (case, start) = (Case(number), Instant::now());
         let mut random = case.random();
         let seed = &seeds[usize::from(random.below(16) == 0)];
-        let (forged, salvaged) = (random.below(2) == 0, random.below(50) == 0);
+        let (forged, recovered) = (random.below(2) == 0, random.below(50) == 0);
         let file = if forged { seed.forged(&mut random) } else { seed.damaged(&mut random) };
         if forged {
             use_all(&file);
         } else {
             assert!(file == seed.original.file || read_all(&file).is_err(), "read as if it were whole");
-            seed.original.check_unfinished(&file);
+            seed.original.check_prefix(&file);
         }
-        match (salvaged, forged) {
-            (true, true) => drop(salvage(&file)),
-            (true, false) => drop(seed.original.check_salvage(&file)),
+        match (recovered, forged) {
+            (true, true) => drop(recover(&file)),
+            (true, false) => drop(seed.original.check_recovery(&file)),
             _ => {}
         }
         slowest = slowest.max(start.elapsed().as_secs_f64());

@@ -46,7 +46,7 @@ fn parts_that_overlap_or_are_elsewhere_are_refused() {
                 let sum = checksum(&ID.0, &block, part.kind.code(), at(&original.file, *place, part.stored_len));
                 let file = moved(&pieces, (Piece::Entry, number), field + 16, *place, Some((field + 24, sum)));
                 assert!(read_all(&file).is_err(), "{} {} at {place}", entry.id, part.kind);
-                let _ = (Unfinished::read(&file), salvage(&file));
+                let _ = (CompletePrefix::read(&file), recover(&file));
                 tries += 1;
             }
         }
@@ -99,5 +99,5 @@ fn files_before_or_after_a_file_are_refused() {
     let sum = xxhash_rust::xxh3::xxh3_64(&told[footer..footer + 112]);
     put(&mut told, footer + 112, &sum.to_le_bytes());
     assert!(Reader::open(&told).is_err());
-    assert_eq!(salvage(&both).expect("whole").0, file);
+    assert_eq!(recover(&both).expect("whole").0, file);
 }

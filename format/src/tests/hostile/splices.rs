@@ -28,15 +28,15 @@ fn resized(mut file: Vec<u8>) -> Vec<u8> {
 }
 
 #[test]
-fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
+fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_recovered() {
     let (original, other, began) = (fat(), strange(FileId([3; 16])), Instant::now());
     let mut tries = 0;
     let mut check = |file: Vec<u8>| {
         if file != original.file {
             let file = resized(file);
             assert!(read_all(&file).is_err());
-            original.check_unfinished(&file);
-            assert!(original.check_salvage(&file));
+            original.check_prefix(&file);
+            assert!(original.check_recovery(&file));
             tries += 1;
         }
     };
@@ -61,7 +61,7 @@ fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
     tell("sections swapped, doubled, dropped, moved, spliced", tries, 800, began);
 }
 
-/// Nothing but what points to them tells such sections from the file's own: whoever resumes or salvages cannot know.
+/// Nothing but what points to them tells such sections from the file's own: whoever resumes or recovers cannot know.
 #[test]
 fn sections_of_another_file_that_claims_the_same_identity_are_refused() {
     let (Original { file, .. }, other, began) = (fat(), strange(ID), Instant::now());

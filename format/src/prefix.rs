@@ -1,4 +1,4 @@
-//! What a file that was never finished, or is to be appended to, holds for certain: its whole windows from the first on.
+//! Reads the complete windows at the start of a file that is unfinished or is to be appended to.
 
 use crate::block::BlockId;
 use crate::bytes::{FieldReader, ensure};
@@ -13,20 +13,20 @@ use crate::structure::check_padding;
 use crate::window::{WINDOW_END, WindowEnd, WindowRecord};
 use crate::{Result, Storage};
 
-/// Whole windows at the beginning of a file, from which [`crate::Writer::resume`] goes on.
+/// The complete windows at the start of a file, after which [`crate::Writer::resume`] continues.
 #[derive(Debug, Clone)]
-pub struct Unfinished {
+pub struct CompletePrefix {
     pub(crate) id: FileId,
-    /// Of the windows that are whole, and without frames if none is.
+    /// Metadata of the complete windows; without frames if there are none.
     pub(crate) metadata: Metadata,
-    /// Where the last whole window ends.
+    /// The offset at which the last complete window ends.
     pub(crate) end: u64,
     pub(crate) leaves: Vec<LeafEntry>,
-    /// Bytes of all parts.
+    /// Bytes of all their parts.
     pub(crate) stored: u64,
 }
 
-/// What a window adds.
+/// What reading a window adds to the prefix.
 #[derive(Default)]
 struct WindowScan {
     at: u64,
@@ -34,12 +34,12 @@ struct WindowScan {
     stored: u64,
 }
 
-impl Unfinished {
-    /// Reads a file from its first byte up to where its windows stop being whole, checksums and all; whether metadata,
-    /// directory and footer follow there is not looked at.
+impl CompletePrefix {
+    /// Reads a file from its first byte and checks every checksum, up to the first window that is not complete. Does not
+    /// look for metadata, root and footer.
     ///
     /// # Errors
-    /// A header or start that is not whole: nothing can be gone on with. Or the storage's.
+    /// The header or the start is not intact, so that nothing can be continued; or the storage fails.
     pub fn read(storage: &impl Storage) -> Result<Self> {
         let id = read_header(storage)?.id;
         let (extent, record) = plain_at(storage, id, SectionId::Start, HEADER as u64, MAX_METADATA)?;
@@ -48,7 +48,7 @@ impl Unfinished {
         loop {
             match prefix.read_window(storage) {
                 Ok(()) => {}
-                Err(failed) if failed.is_of_storage() => return Err(failed),
+                Err(failed) if failed.is_io() => return Err(failed),
                 Err(_) => return Ok(prefix),
             }
         }
@@ -59,17 +59,17 @@ impl Unfinished {
         self.id
     }
 
-    /// The metadata of what is whole; without frames if no window is.
+    /// The metadata of the complete windows; without frames if there are none.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// Bytes to keep: what is beyond them is not whole, or metadata and directory.
+    /// The number of bytes to keep. After them come incomplete windows, or metadata and root.
     pub fn bytes(&self) -> u64 {
         self.end
     }
 
-    /// Takes in the next window, if it is whole.
+    /// Reads the next window; fails if it is not complete.
     fn read_window(&mut self, storage: &impl Storage) -> Result<()> {
         let number = self.metadata.windows.len() as u32;
         let mut scan = WindowScan { at: self.end, ..WindowScan::default() };
@@ -84,7 +84,7 @@ impl Unfinished {
         let checked = WindowRecord::parse(&record)
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
-            .and_then(|end| ensure(end == extent.end(), || "not where it belongs".into()));
+            .and_then(|end| ensure(end == extent.end(), || "not at the end of its window".into()));
         if let Err(what) = checked {
             self.metadata.truncate(number as usize);
             return Err(section.corrupt(at, what));
@@ -96,12 +96,12 @@ impl Unfinished {
 }
 
 impl WindowScan {
-    /// Where the next section begins, after zeros.
+    /// The offset of the next section; checks that the padding before it is zero.
     fn pad(&self, storage: &impl Storage) -> Result<u64> {
         check_padding(storage, self.at).map(|()| align(self.at))
     }
 
-    /// Takes in the next leaf and its blocks.
+    /// Reads the next leaf and its blocks.
     fn read_leaf(&mut self, storage: &impl Storage, id: FileId, first: BlockId, count: u32) -> Result<()> {
         let mut leaf = LeafEntry::new(first, align(self.at));
         let mut entries = Vec::new();
@@ -128,7 +128,7 @@ impl WindowScan {
         Ok(())
     }
 
-    /// Takes in the next block.
+    /// Reads the next block.
     fn read_block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
         let (entry, end) = block_at(storage, id, block, self.pad(storage)?)?;
         for part in &entry.parts {
@@ -140,7 +140,7 @@ impl WindowScan {
     }
 }
 
-/// As [`section_at`], of a section that is not compressed.
+/// Like [`section_at`], for a section that is not compressed.
 fn plain_at(
     storage: &impl Storage,
     file: FileId,
@@ -153,7 +153,7 @@ fn plain_at(
     same.map_err(|what| section.corrupt(offset, what)).map(|()| (extent, content))
 }
 
-/// The entry in a block's own header at `offset`, and where its parts end; the parts themselves are not read.
+/// Reads the entry in a block's own header at `offset`; returns it and the end of the block's parts. Does not read the parts.
 pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
     let section = SectionId::Block(id);
     let (_, bytes) = plain_at(storage, file, section, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
