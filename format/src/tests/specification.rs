@@ -1,4 +1,4 @@
-//! `FORMAT.md` says what the code does: its tables of fields, its limits, its dump of a file.
+//! Checks `FORMAT.md` against the code: its tables of fields, its limits and its dump of a file.
 
 use crate::footer::{FOOTER, Footer};
 use crate::header::{HEADER, Header};
@@ -11,14 +11,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const TEXT: &str = include_str!("../../FORMAT.md");
 
-/// The rows of the first table after a heading, without its two first lines.
+/// The rows of the first table after a heading, without the table's head.
 fn table(heading: &str) -> Vec<Vec<&'static str>> {
     let after = TEXT.split_once(&format!("# {heading}\n")).expect("the heading").1;
     let lines = after.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
     lines.skip(2).map(|line| line.trim_matches('|').split('|').map(str::trim).collect()).collect()
 }
 
-/// Whether the table gives the record's layout: fields touch, fill it, and hold what they are said to.
+/// Checks that the table describes the record: fields are contiguous, fill the record and hold the expected values.
 fn check(heading: &str, record: &[u8], values: &[(&str, &[u8])]) {
     let mut at = 0;
     let mut values = values.iter();
@@ -128,11 +128,11 @@ fn limits_are_as_specified() {
         ("MAX_DIM", MAX_DIM), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
         ("MAX_ROOT_RAW", MAX_ROOT_RAW),
     ];
-    let said: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
-    assert_eq!(said, limits);
+    let stated: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
+    assert_eq!(stated, limits);
 }
 
-/// 16 bytes a line, without the lines that are all zero.
+/// A hex dump with 16 bytes per line, without lines of zeros.
 fn dump(file: &[u8]) -> String {
     let mut text = String::new();
     for (line, bytes) in file.chunks(16).enumerate().filter(|(_, bytes)| bytes.iter().any(|&byte| byte != 0)) {
@@ -154,6 +154,6 @@ fn the_dump_is_a_file() {
     (metadata.windows[0].coded, metadata.windows[0].outliers) = (3, 1);
     let file = file(&metadata, &[(block, content.clone())]);
     assert_eq!(verify(&file).expect("whole"), [(id, content)]);
-    let said = TEXT.split_once("```dump\n").and_then(|(_, rest)| rest.split_once("```")).expect("a dump").0;
-    assert_eq!(dump(&file), said);
+    let stated = TEXT.split_once("```dump\n").and_then(|(_, rest)| rest.split_once("```")).expect("a dump").0;
+    assert_eq!(dump(&file), stated);
 }

@@ -1,4 +1,4 @@
-//! What only a few bits tell: signs of zeros, numbers that nobody reads, payloads that no checksum vouches for.
+//! Errors in a few bits: signs of zeros, fields that readers do not use, payloads with forged checksums.
 
 use super::fat::*;
 use super::forge::*;
@@ -98,7 +98,7 @@ fn files_of_sections_that_overlap_are_searched_in_linear_time() {
     }
 }
 
-/// Checksums fit, so nothing else tells.
+/// The checksums are valid, so only unpacking finds the damage.
 #[test]
 fn blocks_whose_payloads_cannot_be_unpacked_are_lost() {
     let original = fat();

@@ -1,4 +1,4 @@
-//! A file of a few KiB that has every feature, and what must be right about whatever is read of changed ones.
+//! A file of a few KiB that uses every feature, and the checks for whatever is read from changed copies of it.
 
 use crate::testing::*;
 use crate::*;
@@ -7,22 +7,22 @@ use std::collections::{BTreeMap, HashSet};
 use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// A whole file and what is in it.
+/// A complete file and its content.
 pub(super) struct Original {
     pub(super) file: Vec<u8>,
     pub(super) metadata: Metadata,
     pub(super) blocks: BTreeMap<BlockId, (BlockEntry, Option<Content>)>,
-    /// Digests of recovered files that were checked: many are the same.
+    /// Digests of recovered files that were checked; many are equal.
     checked: RefCell<HashSet<u128>>,
 }
 
-/// Windows of all bases, with and without a pyramid; two channels, times, outliers, missing and exact samples, a lost
+/// Has windows of all bases, with and without a pyramid, two channels, times, outliers, missing and exact samples, and a lost
 /// block.
 pub(super) fn fat() -> Original {
     original([5, 3, 2], 2, 7)
 }
 
-/// The same of fewer voxels and one channel.
+/// Like [`fat`], with fewer voxels and one channel.
 pub(super) fn lean() -> Original {
     original([2, 1, 1], 1, 3)
 }
@@ -63,7 +63,7 @@ fn windows() -> Vec<Window> {
 }
 
 impl Original {
-    /// Whether a recovered file is sound, and every block in it what it was.
+    /// Checks that a recovered file is valid and that every block in it equals the original.
     fn check_recovered(&self, file: &[u8], recovered: &Recovered) {
         let (reader, mut lost) = (Reader::open(file).expect("whole"), Vec::new());
         assert_eq!(reader.metadata().start(), self.metadata.start());
@@ -79,7 +79,7 @@ impl Original {
         assert_eq!(lost, recovered.lost);
     }
 
-    /// Whether what is whole of a changed file is what it was.
+    /// Checks that the complete windows of a changed file equal the original.
     pub(super) fn check_prefix(&self, file: &[u8]) {
         let Ok(found) = CompletePrefix::read(&file) else { return };
         let kept = found.bytes() as usize;
@@ -89,7 +89,7 @@ impl Original {
         assert_eq!(found.metadata().times[..], self.metadata.times[..found.metadata().frames as usize]);
     }
 
-    /// Recovers a changed file and checks it; whether anything could be saved.
+    /// Recovers a changed file and checks the result. Returns whether anything could be recovered.
     pub(super) fn check_recovery(&self, file: &[u8]) -> bool {
         let Ok((out, recovered)) = recover(file) else { return false };
         if self.checked.borrow_mut().insert(xxh3_128(&out)) {
@@ -99,12 +99,12 @@ impl Original {
     }
 }
 
-/// The recovered file of a damaged one.
+/// Recovers a damaged file.
 pub(super) fn recover(file: &[u8]) -> Result<(Vec<u8>, Recovered)> {
     Recovery::search(&file, &mut |_| {})?.write(&file, Vec::new(), &mut || {})
 }
 
-/// Whether samples of a window are decoded alike by both.
+/// Whether both metadata decode a window in the same way.
 fn same_coding(a: &Metadata, b: &Metadata, window: u32) -> bool {
     let coding = |m: &Metadata| {
         let Window { first_frame, frames, basis, coefficients, levels, functions, pyramid, .. } =
@@ -115,13 +115,13 @@ fn same_coding(a: &Metadata, b: &Metadata, window: u32) -> bool {
     coding(a) == coding(b)
 }
 
-/// Everything that a program does with a file, whatever comes of it.
+/// Does everything that a program does with a file and ignores the results.
 pub(super) fn use_all(file: &[u8]) {
     let _ = read_through(file);
     let _ = CompletePrefix::read(&file);
 }
 
-/// As [`read_all`], but unpacks every part only once.
+/// Like [`read_all`], but unpacks every part only once.
 fn read_through(file: &[u8]) -> Result<()> {
     let reader = Reader::open(file)?;
     reader.check_structure(&mut drop)?;
@@ -133,7 +133,7 @@ fn read_through(file: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Says what a test tried, and sees to it that this was enough.
+/// Prints how many cases a test tried, and fails if there were too few.
 #[allow(clippy::print_stderr, reason = "a table of what was tried is made of these")]
 pub(super) fn tell(suite: &str, tries: u64, intended: u64, began: Instant) {
     eprintln!("{suite} | {tries} | {:.1}", began.elapsed().as_secs_f64());

@@ -1,4 +1,4 @@
-//! Whatever the bytes, there is an error or the right answer: no panic, and no read beyond the file.
+//! Any bytes give an error or the right content, without panics and without reads beyond the file.
 
 mod bits;
 mod cuts;
@@ -74,7 +74,7 @@ fn swapped_and_foreign_parts_are_found() {
     assert_ne!(SectionId::Root.checksum(ID, b"x"), SectionId::Metadata.checksum(ID, b"x"));
 }
 
-/// The file's pieces, to be changed and put together again with checksums that fit.
+/// The pieces of a file, to be changed and reassembled with valid checksums.
 struct Pieces {
     file: Vec<u8>,
     footer: Footer,
@@ -94,7 +94,7 @@ impl Pieces {
         decompress(self.stored(self.footer.root), self.footer.root.raw_len).expect("whole")
     }
 
-    /// The file with other metadata and root, all checksums right.
+    /// The file with changed metadata and root and valid checksums.
     fn forge(&self, record: &[u8], root: &[u8]) -> Vec<u8> {
         let mut out = self.file[..self.footer.metadata.offset as usize].to_vec();
         let mut section = |owner: SectionId, stored: &[u8], raw_len: usize| {
@@ -114,7 +114,7 @@ impl Pieces {
     }
 }
 
-/// Replaces 1, 2, 4 or 8 bytes at every place by extremes.
+/// Replaces 1, 2, 4 or 8 bytes at every offset with extreme values.
 fn extremes(record: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     let values: [&[u8]; 7] = [&[0], &[0xFF], &[0xFF; 2], &[0xFF; 4], &[0, 0, 0, 0x80], &[0xFF; 8], &[0; 8]];
     (0..record.len()).flat_map(move |at| {
@@ -185,7 +185,7 @@ fn forged_headers_and_footers_are_safe() {
 }
 
 #[test]
-fn windows_that_are_said_to_have_been_lost_take_no_memory() {
+fn windows_claimed_to_be_lost_take_no_memory() {
     let fat::Original { file, .. } = fat::lean();
     let bomb = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
         (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
