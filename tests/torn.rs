@@ -1,5 +1,5 @@
-//! What a power failure leaves of an unfinished file: pages that were not yet on the disk are old, zero or torn. Whatever is
-//! left, only what is whole is gone on with.
+//! Power failures during writing: pages that had not reached the disk are old, zero or torn. Resuming uses only
+//! complete windows, whatever is left.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -13,10 +13,10 @@ use wavesplat_format::CompletePrefix;
 
 const DISKS: usize = 20_000;
 
-/// What a disk writes at once.
+/// Number of bytes that a disk writes at once.
 const PAGE: usize = 512;
 
-/// The file after a failure, when all after `synced` was still on its way.
+/// The file after a power failure, when everything after `synced` had not reached the disk.
 fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
     let mut left = file[..synced + random.below(file.len() - synced + 1)].to_vec();
     let torn = random.below(4);
@@ -24,7 +24,7 @@ fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
         let (start, end) = ((page * PAGE).max(synced), ((page + 1) * PAGE).min(left.len()));
         match random.below(8) {
             0 => left[start..end].fill(0),
-            1 => left[start..end].fill_with(|| random.bits() as u8), // what was there before
+            1 => left[start..end].fill_with(|| random.bits() as u8), // the disk's earlier content
             2 => left[start..start + random.below(end - start)].fill(0),
             3 if page > synced / PAGE => left.copy_within(start - PAGE..end - PAGE, start),
             _ => {}

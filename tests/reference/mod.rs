@@ -1,7 +1,7 @@
-//! The slow, obvious truth against which the library is tested.
+//! A slow and obvious reference implementation against which the library is tested.
 //!
-//! Written from `shared/method.md` alone, and `decode` from `format/FORMAT.md`: nothing here calls the library, and only
-//! `std` arithmetic is used.
+//! It is written from the description of the method alone (method.md), and `decode` from `format/FORMAT.md` alone.
+//! Nothing here calls the library, and only `std` arithmetic is used.
 
 pub(crate) mod camera;
 pub(crate) mod colour;

@@ -1,8 +1,8 @@
-//! Images by brute force: method.md section 2, every pixel times every voxel times every frame, kernel never cut.
+//! Images by brute force: method.md section 2 for every pixel, voxel and frame, with an uncut kernel.
 
 use super::camera::{Lattice, View, project};
 
-/// Where the sum of weights is below this part of the view's largest, the weighted mean is background (eq 12).
+/// Where the sum of weights is below this share of the view's largest, the weighted mean is background (eq 12).
 pub(crate) const BACKGROUND: f64 = 0.01;
 
 /// The images of all frames, each [t][y][x] with y from the top of the image.
@@ -185,8 +185,8 @@ mod tests {
         assert!((seen - held).abs() < 1e-9, "{seen} {held}");
     }
 
-    /// Eq (1) as it stands: the integral over the whole ray through a pixel of exp(-tau z) times the field of
-    /// three-dimensional kernels, by the midpoint rule on points in the world. The projection of voxels is not used.
+    /// Eq (1) literally: the integral over the whole ray through a pixel of exp(-tau z) times the field of
+    /// three-dimensional kernels, by the midpoint rule on points in the world. Does not use the projection of voxels.
     fn integral_along_the_ray(lattice: &Lattice, view: &View, values: &[f64], a: usize, b: usize) -> f64 {
         let Directions { d, r, u } = directions(view.azimuth, view.elevation, view.roll);
         let c = lattice.middle();

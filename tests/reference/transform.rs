@@ -26,12 +26,12 @@
 //! all coefficients: the scaling functions [node, middle, node] of the one coarsest interval, then the wavelets of the
 //! level 2 -> 1, of 4 -> 2, ..., of N -> N/2. N = 1 (T = 3) has no level, only the prefilter.
 //!
-//! What method.md leaves to the reader, and what settled it. A coarse node's seven numbers stand on
-//! [mid, node, mid, NODE, mid, node, mid]: centred on the node, the coarse middles (54 - 48 - 6 = 0) and the neighbouring
-//! nodes (-9 + 18 - 9 = 0) are orthogonal to it. "Inward" mirrors the four numbers of the last end, because they are half
-//! of the symmetric seven. Orthonormality cannot settle SIGNS: they are as printed, the odd wavelet's read in order of
-//! increasing time, and both end wavelets have -10 on their end node. The coefficients are the prefilter's own: the factor
-//! sqrt 2 with which section 3 compares dropped energy and sample error is NOT applied.
+//! Details that method.md leaves open, and how they were settled. A coarse node's seven numbers stand on [mid, node,
+//! mid, NODE, mid, node, mid]: centred on the node, the coarse middles (54 - 48 - 6 = 0) and the neighbouring nodes
+//! (-9 + 18 - 9 = 0) are orthogonal to it. "Inward" mirrors the four numbers of the last end, because they are half of
+//! the symmetric seven. Orthonormality cannot settle SIGNS: they are as printed, the odd wavelet's read in order of
+//! increasing time, and both end wavelets have -10 on their end node. The coefficients are the prefilter's own: the
+//! factor sqrt 2 with which section 3 compares dropped energy and sample error is NOT applied.
 
 /// A matrix as a list of rows.
 pub(crate) type Matrix = Vec<Vec<f64>>;
