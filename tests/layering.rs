@@ -1,9 +1,9 @@
-//! The house rules of `src/lib.rs`, held by reading the sources.
+//! Checks the layering rules of `src/lib.rs` by reading the sources.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The library's rooms from the lowest to the highest; a room may use those on lower floors only.
+/// The library's modules from the lowest to the highest layer. A module may only use lower ones.
 const FLOORS: [&[&str]; 7] = [
     &["base"],
     &["colour", "wavelet", "view"],
@@ -14,7 +14,7 @@ const FLOORS: [&[&str]; 7] = [
     &["cli"],
 ];
 
-/// Where each third-party crate is at home: `src/` and then one of these.
+/// The files below `src/` in which each third-party crate may be used.
 const HOMES: [(&str, &[&str]); 22] = [
     ("memmap2::", &["base/mapped.rs"]),
     ("libc::", &["base/mapped.rs"]),

@@ -1,4 +1,4 @@
-//! Tests.
+//! The integration tests, by topic.
 #![allow(missing_docs, reason = "tests are read through their names")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]

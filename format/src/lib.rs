@@ -1,7 +1,7 @@
 //! The bytes of a wavesplat coefficient file (`.wspl`).
 //!
-//! `FORMAT.md` beside this package specifies them. This package knows bytes only: it starts no thread, opens no path
-//! and maps no memory; it reads through [`Storage`] and writes to any `std::io::Write` without a seek.
+//! `FORMAT.md` beside this package specifies the format. This package handles bytes only: it starts no threads, opens
+//! no paths and maps no memory. It reads through [`Storage`] and writes to any `std::io::Write` without seeking.
 #![forbid(unsafe_code)]
 
 mod bits;
@@ -21,7 +21,7 @@ mod planes;
 mod pyramid;
 mod rans;
 mod reader;
-mod salvage;
+mod recovery;
 mod sample;
 mod section;
 mod segments;
@@ -30,7 +30,7 @@ mod structure;
 mod testing;
 #[cfg(test)]
 mod tests;
-mod unfinished;
+mod prefix;
 mod window;
 mod writer;
 
@@ -46,17 +46,17 @@ pub use payload::{
     Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,
     unpack_outliers,
 };
+pub use prefix::CompletePrefix;
 pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
-pub use salvage::{Salvage, Salvaged};
+pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
-pub use unfinished::Unfinished;
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};
 
 use std::io;
 
-/// Where a file's bytes are: something of known length from which bytes are copied out.
+/// The bytes of a file: a source of known length that can be read at any offset.
 pub trait Storage {
     /// Length in bytes.
     fn len(&self) -> u64;
@@ -66,7 +66,10 @@ pub trait Storage {
         self.len() == 0
     }
 
-    /// Copies `out.len()` bytes from `offset`; an error if they are not all there.
+    /// Copies `out.len()` bytes starting at `offset`.
+    ///
+    /// # Errors
+    /// The bytes end before `offset + out.len()`, or the storage fails.
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
 }
 

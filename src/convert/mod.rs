@@ -47,7 +47,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
-use wavesplat_format::{Basis, BlockId, FileId, Metadata, Unfinished, Window};
+use wavesplat_format::{Basis, BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,7 +156,7 @@ pub struct ConvertReport {
 #[derive(Debug)]
 pub struct PartialFile {
     /// Its whole windows.
-    pub unfinished: Unfinished,
+    pub unfinished: CompletePrefix,
     /// The first of these windows whose frames the source still holds, from its first frame on; those before it are not
     /// compared with anything.
     pub before: usize,

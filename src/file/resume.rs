@@ -12,7 +12,7 @@ use crate::source::{Archive, FrameSource};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
-use wavesplat_format::{Error as FormatError, Unfinished, Window};
+use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
 
 /// What becomes of the whole windows that an earlier run left unfinished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl Earlier {
     }
 
     /// What is gone on with of what there is.
-    fn of(self, held: Option<Unfinished>, part: &Path) -> Result<Option<Unfinished>> {
+    fn of(self, held: Option<CompletePrefix>, part: &Path) -> Result<Option<CompletePrefix>> {
         match (self, held) {
             (Self::Resume, held) => Ok(held),
             (Self::Refuse, Some(held)) => {
@@ -51,7 +51,7 @@ impl Earlier {
 
 /// Opens the output of a conversion, and finds what there is to go on with. With `replace` a file of that name is replaced in
 /// the end.
-pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<Unfinished>)> {
+pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<CompletePrefix>)> {
     let mut out = Output::resumable(path, replace)?;
     let Some(part) = out.part() else {
         return match earlier {
@@ -60,13 +60,13 @@ pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Opt
         };
     };
     let held = if earlier == Earlier::Discard { None } else { earlier.of(whole_windows(part)?, part)? };
-    out.begin_at(held.as_ref().map_or(0, Unfinished::bytes))?;
+    out.begin_at(held.as_ref().map_or(0, CompletePrefix::bytes))?;
     Ok((out, held))
 }
 
 /// Opens the successor of a finished file that begins with all of its windows, and finds these, or more where there are more
 /// to go on with.
-pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, Unfinished)> {
+pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, CompletePrefix)> {
     let (path, own) = (of.path(), of.whole_windows()?);
     let mut out = Output::resumable(path, true)?;
     of.check_unchanged()?; // before it was locked it may have been replaced
@@ -93,13 +93,13 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
 }
 
 /// Whether the first windows of one are those of the other.
-fn goes_on(all: &Unfinished, first: &Unfinished) -> bool {
+fn goes_on(all: &CompletePrefix, first: &CompletePrefix) -> bool {
     all.id() == first.id() && all.metadata().windows.starts_with(&first.metadata().windows)
 }
 
 /// The whole windows at the beginning of a file; none if there is not even one.
-fn whole_windows(part: &Path) -> Result<Option<Unfinished>> {
-    match Unfinished::read(&FileBytes::open(part, Access::Read)?) {
+fn whole_windows(part: &Path) -> Result<Option<CompletePrefix>> {
+    match CompletePrefix::read(&FileBytes::open(part, Access::Read)?) {
         Ok(held) => Ok(Some(held).filter(|held| held.metadata().frames > 0)),
         Err(FormatError::Io(e)) => Err(Error::io(part, "reading", e)),
         Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => Err(Error::usage(format!(

@@ -50,7 +50,7 @@ impl VerifyReport {
     fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(read) => Ok(Some(read)),
-            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_of_storage()) => {
+            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_io()) => {
                 self.damage(&wrong);
                 Ok(None)
             }

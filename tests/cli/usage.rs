@@ -1,4 +1,4 @@
-//! Requests that make no sense: code 2, a message that names the option, nothing written.
+//! Invalid requests: exit code 2, a message that names the option, and no output.
 
 use super::{Work, small};
 

@@ -2,7 +2,7 @@
 
 use super::camera::Lattice;
 
-/// A line of sight along `axis` (0, 1, 2) through a place in voxels; its own axis does not count.
+/// A line of sight along `axis` (0, 1, 2) through a place in voxels; the coordinate along that axis is ignored.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line {
     pub(crate) axis: usize,
