@@ -82,3 +82,18 @@ impl FieldWriter for Vec<u8> {
         self.extend_from_slice(bytes);
     }
 }
+
+/// Whether the value is a possible sum of squares, which may overflow: not negative and not NaN.
+pub(crate) fn is_amount(value: f64) -> bool {
+    value >= 0.0
+}
+
+/// Whether the value is finite and not negative.
+pub(crate) fn finite_amount(value: f64) -> bool {
+    value >= 0.0 && value.is_finite()
+}
+
+/// Whether the range is finite and in order, or the empty range: infinity to minus infinity.
+pub(crate) fn is_range(min: f64, max: f64) -> bool {
+    min.is_finite() && max.is_finite() && min <= max || min == f64::INFINITY && max == f64::NEG_INFINITY
+}

@@ -1,8 +1,8 @@
 //! The directory's entries of blocks and parts: their bytes and checks.
 
 use crate::block::{BlockId, BlockStats, PartKind, PartStats};
-use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
-use crate::header::FileId;
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
+use crate::file_id::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
 use crate::section::{FRAME, SectionId, read};
 use crate::{Result, Storage};
@@ -181,19 +181,4 @@ impl PartEntry {
         let sized = self.stored_len > 0 && self.raw_len > 0 && u64::from(self.raw_len) <= MAX_PART_RAW;
         ensure(sized, || format!("{}: a length out of range", self.kind))
     }
-}
-
-/// Whether the value is a possible sum of squares, which may overflow: not negative and not NaN.
-pub(crate) fn is_amount(value: f64) -> bool {
-    value >= 0.0
-}
-
-/// Whether the value is finite and not negative.
-pub(crate) fn finite_amount(value: f64) -> bool {
-    value >= 0.0 && value.is_finite()
-}
-
-/// Whether the range is finite and in order, or the empty range: infinity to minus infinity.
-pub(crate) fn is_range(min: f64, max: f64) -> bool {
-    min.is_finite() && max.is_finite() && min <= max || min == f64::INFINITY && max == f64::NEG_INFINITY
 }

@@ -1,7 +1,7 @@
 //! The fixed-size footer: the offsets of metadata and directory, and the length of the file.
 
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
-use crate::header::FileId;
+use crate::file_id::FileId;
 use crate::section::SectionExtent;
 use xxhash_rust::xxh3::xxh3_64;
 

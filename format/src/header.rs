@@ -1,10 +1,9 @@
 //! The fixed-size header: magic, version, required features and file id.
 
 use crate::bytes::{FieldReader, FieldWriter, ParseResult};
-use crate::metadata::Metadata;
+use crate::file_id::FileId;
 use crate::{Error, Result};
-use std::fmt;
-use xxhash_rust::xxh3::{xxh3_64, xxh3_128};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Bytes of the header.
 pub(crate) const HEADER: usize = 128;
@@ -17,29 +16,6 @@ pub(crate) const VERSION: (u16, u16) = (1, 0);
 
 /// The required features that this reader supports, by bit; none are defined yet.
 const REQUIRED: [&str; 0] = [];
-
-/// A file's identity, which the writer derives from settings and data. It is part of every checksum's seed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct FileId(pub [u8; 16]);
-
-impl FileId {
-    /// The id of a conversion: XXH3-128 of the start record's bytes followed by the digest of the first window
-    /// (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
-    ///
-    /// # Errors
-    /// [`crate::Error::Invalid`] if `metadata` cannot be encoded.
-    pub fn derive(metadata: &Metadata, first_digest: u64) -> Result<Self> {
-        let mut bytes = metadata.start().encode()?;
-        bytes.put_u64(first_digest);
-        Ok(Self(xxh3_128(&bytes).to_le_bytes()))
-    }
-}
-
-impl fmt::Display for FileId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
-}
 
 /// The fields of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]

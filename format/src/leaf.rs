@@ -1,8 +1,8 @@
 //! The two levels of the directory: leaves of up to 512 blocks, and the root that lists the leaves.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, finite_amount, is_amount, is_range};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::section::{SectionExtent, section_end};

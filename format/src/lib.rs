@@ -10,6 +10,7 @@ mod bytes;
 mod cells;
 mod directory;
 mod error;
+mod file_id;
 mod footer;
 mod geometry;
 mod header;
@@ -21,6 +22,7 @@ mod planes;
 mod pyramid;
 mod rans;
 mod reader;
+mod record;
 mod recovery;
 mod sample;
 mod section;
@@ -38,8 +40,8 @@ pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Part
 pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
+pub use file_id::FileId;
 pub use geometry::BlockGeometry;
-pub use header::FileId;
 pub use leaf::LeafEntry;
 pub use metadata::{Bound, Metadata};
 pub use payload::{

@@ -1,20 +1,15 @@
-//! The metadata record: grid, type, units, times, tolerance, windows, provenance. The only user of bincode.
-//!
-//! bincode 2.0.1 needs a size limit and a check for trailing bytes. Without the limit it aborts on nine hostile bytes,
-//! and it ignores bytes after a value.
+//! The metadata record: grid, type, units, times, tolerance, windows, provenance.
 
-use crate::bytes::{ParseResult, ensure};
-use crate::directory::finite_amount;
+use crate::bytes::{FieldWriter, ParseResult, ensure, finite_amount};
+use crate::file_id::FileId;
 use crate::header::HEADER;
 use crate::limits::*;
+use crate::record::{decode_exact, encode};
 use crate::section::section_end;
 use crate::window::{Window, WindowEnd, WindowRecord};
 use crate::{BlockGeometry, BlockId, Error, Result, SampleType};
-use bincode::{Decode, Encode, config};
-
-/// Fixed-width little-endian integers, at most [`MAX_METADATA`] bytes.
-pub(crate) const CONFIG: config::Configuration<config::LittleEndian, config::Fixint, config::Limit<MAX_METADATA>> =
-    config::standard().with_little_endian().with_fixed_int_encoding().with_limit::<MAX_METADATA>();
+use bincode::{Decode, Encode};
+use xxhash_rust::xxh3::xxh3_128;
 
 /// The error measure that the tolerance bounds. New kinds are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Encode, Decode)]
@@ -93,14 +88,6 @@ pub struct Metadata {
     pub program: String,
 }
 
-/// Decodes a record that must take up all of `bytes`.
-pub(crate) fn decode_exact<T: Decode<()>>(bytes: &[u8], what: &str) -> ParseResult<T> {
-    let decoded = bincode::decode_from_slice::<T, _>(bytes, CONFIG);
-    let (record, used) = decoded.map_err(|e| format!("not a {what}: {e}"))?;
-    ensure(used == bytes.len(), || format!("{} bytes after the record", bytes.len() - used))?;
-    Ok(record)
-}
-
 impl Metadata {
     /// Encodes the record.
     ///
@@ -108,7 +95,7 @@ impl Metadata {
     /// [`Error::Invalid`] if the metadata is invalid, [`Error::TooLarge`] if the record exceeds the limit.
     pub fn encode(&self) -> Result<Vec<u8>> {
         self.validate()?;
-        let bytes = bincode::encode_to_vec(self, CONFIG).map_err(|e| Error::Invalid(format!("metadata: {e}")))?;
+        let bytes = encode(self, "metadata").map_err(Error::Invalid)?;
         let (size, limit) = (bytes.len() as u64, MAX_METADATA as u64);
         if size > limit {
             return Err(Error::TooLarge { what: "bytes of metadata".into(), size, limit });
@@ -151,6 +138,17 @@ impl Metadata {
             windows, settings, program,
         };
         start
+    }
+
+    /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the
+    /// first window (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the metadata cannot be encoded.
+    pub fn file_id(&self, first_digest: u64) -> Result<FileId> {
+        let mut bytes = self.start().encode()?;
+        bytes.put_u64(first_digest);
+        Ok(FileId(xxh3_128(&bytes).to_le_bytes()))
     }
 
     /// The offset at which the start section ends.

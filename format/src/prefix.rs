@@ -3,7 +3,8 @@
 use crate::block::BlockId;
 use crate::bytes::{FieldReader, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
-use crate::header::{FileId, HEADER};
+use crate::file_id::FileId;
+use crate::header::HEADER;
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;

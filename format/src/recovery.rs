@@ -4,8 +4,8 @@
 use crate::block::{BlockId, EncodedBlock, EncodedPart};
 use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
+use crate::file_id::FileId;
 use crate::footer::FOOTER;
-use crate::header::FileId;
 use crate::leaf::{LeafEntry, MIN_BLOCK, leaves_of};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
 use crate::metadata::Metadata;

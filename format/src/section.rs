@@ -2,7 +2,7 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
-use crate::header::FileId;
+use crate::file_id::FileId;
 use crate::{Error, Result, Storage};
 use std::fmt;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};

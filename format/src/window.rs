@@ -1,9 +1,8 @@
 //! A window of frames: how its blocks are coded, and their error bounds and totals.
 
-use crate::bytes::{ParseResult, ensure};
-use crate::directory::{finite_amount, is_amount, is_range};
+use crate::bytes::{ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::limits::*;
-use crate::metadata::{CONFIG, decode_exact};
+use crate::record::{decode_exact, encode};
 use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
@@ -116,7 +115,7 @@ pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
 impl WindowRecord {
     pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
-        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+        encode(self, "window")
     }
 
     /// Parses a record that must take up all of `bytes`. Does not compare it with the rest of the metadata.
@@ -160,7 +159,7 @@ impl WindowEnd {
     }
 
     pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
-        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+        encode(self, "window")
     }
 
     pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {

@@ -3,8 +3,9 @@
 use crate::block::{BlockId, EncodedBlock};
 use crate::bytes::ensure;
 use crate::directory::{BlockEntry, PartEntry};
+use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
-use crate::header::{FileId, Header};
+use crate::header::Header;
 use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;

@@ -147,7 +147,7 @@ impl WindowReader<'_> {
 
     /// The file's id: that of the file which is continued, or a new one that follows from the first window's digest.
     fn id(&mut self, digest: u64) -> Result<FileId> {
-        let new = || FileId::derive(&self.plan.start, digest).map_err(|e| Error::usage(e.to_string()));
+        let new = || self.plan.start.file_id(digest).map_err(|e| Error::usage(e.to_string()));
         let id = self.id.map_or_else(new, Ok)?;
         self.id = Some(id);
         Ok(id)

@@ -4,9 +4,11 @@
 //! of pixels.
 
 mod select;
+mod batch_plan;
 mod coded;
 mod coefficients;
 mod frames;
 
-pub use coefficients::{CoefficientScene, SplatSource};
+pub use batch_plan::SplatSource;
+pub use coefficients::CoefficientScene;
 pub use frames::FrameScene;

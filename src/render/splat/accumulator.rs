@@ -118,7 +118,7 @@ impl<'a> ResolvedTile<'a> {
         let sums = match cells.first() {
             Some((lattice, _)) => {
                 let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
-                TileSums::Gather(lattice.gather((&cells, planes), rect))
+                TileSums::Gather(Gather::new(lattice, (&cells, planes), rect))
             }
             None => TileSums::Tiles(tiles),
         };

@@ -191,6 +191,14 @@ pub(in crate::render) struct CellPlane<'a> {
     sums: &'a mut Option<Aligned>,
 }
 
+/// How many of so many planes a bundle has.
+pub(super) fn side_by_side(planes: usize) -> usize {
+    planes.next_power_of_two().min(TOGETHER)
+}
+
+/// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
+pub(super) const TOGETHER: usize = 16;
+
 #[cfg(test)]
 mod tests {
     use super::*;

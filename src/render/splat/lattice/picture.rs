@@ -1,15 +1,14 @@
 //! The lattice of one view as a way of splatting: when it is used (its stated error, eq 37, is small enough and it is
 //! less work than footprints), the sums of blocks, and from sums to pixels.
 
-use super::cells::{Cells, LINE, Rectangle};
-use super::gather::side_by_side;
+use super::cells::{Cells, LINE, Rectangle, side_by_side};
 use super::kernel::{Kernel, SINGLES};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
-use super::{Gather, Placed, Spreading};
+use super::{Placed, Spreading};
 use crate::base::grid::{Grid, Region};
 use crate::render::splat::slab::Slab;
-use crate::render::splat::tile_rect::{TILE, TileRect, pixels_around};
+use crate::render::splat::tile_rect::{TILE, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
 use std::ops::Range;
@@ -166,11 +165,6 @@ impl Lattice {
         let end = |i: usize| (first[i] + size[i] as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
-    }
-
-    /// The cells of a tile of a band, as far as its pixels see them, in layers of so many planes each.
-    pub(in crate::render) fn gather<'a>(&'a self, layers: (&[&Cells], usize), place: &'a TileRect) -> Gather<'a> {
-        Gather::new(self, layers, place)
     }
 
     /// Pixels a side of a tile: as many as have cells that stay in a core's cache with all planes.
