@@ -69,7 +69,7 @@ impl Group {
         kept(&self.codes[k], &self.rank[k], &self.dropped)
     }
 
-    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded`.
+    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded` (eq 7).
     pub(super) fn truncate(&mut self, codec: &WindowCodec, step: f64) {
         let counts = self.order();
         let mut holds = [0; LANES]; // so many can be dropped, or none can

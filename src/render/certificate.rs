@@ -42,7 +42,7 @@ impl Certificate {
         Self { quantity, rounding: sum_rounding(setup) + INVERSE }
     }
 
-    /// The error of a pixel that holds `value`: `errors` is sum c_i r_i, `absent` the weights that are missing.
+    /// The error of a pixel that holds `value` (eq 26): `errors` is the sum of w'_i r_i, `absent` the weights that are missing.
     pub(super) fn error(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64, value: f64) -> f32 {
         let errors = errors * (1.0 + self.rounding);
         let bound = match self.quantity {
@@ -57,10 +57,12 @@ impl Certificate {
         }
     }
 
+    /// The first line of eq 26, and rounding.
     fn emission(&self, frame: &FrameBounds, weight: &PixelWeight, errors: f64) -> f64 {
         errors + weight.beyond * magnitude(frame.range) + self.rounding * weight.sum * frame.absolute_sum
     }
 
+    /// The second line of eq 26, and rounding.
     fn mean(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64) -> f64 {
         let present = weight.sum - absent; // more than 0, or the pixel is background
         let own = (errors / present).min(frame.error); // a mean of errors

@@ -28,10 +28,10 @@ pub(super) fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
     }
 }
 
-/// What a pixel means (method.md section 2).
+/// What a pixel means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// g, the weighted mean along the ray; NaN is background (eq 12).
+    /// g, the weighted mean along the ray (eq 12); NaN is background (eq 16).
     Mean,
     /// I, the emission: value times length (eq 4).
     Emission,
@@ -43,7 +43,7 @@ pub enum Mode {
     /// It is summed up: the quantity that is asked for.
     #[default]
     Projection,
-    /// It is coloured, and hides what is behind (method.md section 7).
+    /// It is coloured, and hides what is behind (eq 29-31).
     Composite {
         /// Colour and opacity of every value.
         transfer: TransferFunction,

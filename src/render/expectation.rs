@@ -86,7 +86,7 @@ impl<'a> Expectation<'a> {
         BlockInfluence { together: seen.together * share, apart: seen.apart * share }
     }
 
-    /// Summed over pixels.
+    /// Eq 27 for one voxel, summed over pixels.
     fn of_voxel(&self, voxel: [usize; 3]) -> BlockInfluence {
         let WeightedView { setup, weights } = self.weighted;
         let [x, y, z] = setup.camera.project(setup.grid.position(voxel));

@@ -38,17 +38,17 @@ pub(super) struct WeightedView<'a> {
 /// The weights of one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelWeight {
-    /// C, as values are splatted.
+    /// W', the sum of weights as values are splatted.
     pub(super) sum: f64,
     reference: f64,
-    /// T, beyond the cut.
+    /// B, the sum of weights beyond the cut (eq 26).
     pub(super) beyond: f64,
     threshold: f64,
 }
 
 impl PixelWeight {
-    /// What a mean divides by, less weights that are missing; NaN in the background, and where so much is missing that
-    /// rounding is what is left.
+    /// The sum of weights of samples that are not missing (eq 12). NaN in the background (eq 16), and where so much is
+    /// missing that rounding errors would dominate.
     pub(super) fn present(&self, absent: f64) -> f64 {
         let present = self.sum - absent;
         let enough = self.reference - absent >= self.threshold && present > LEAST_PRESENT * self.sum;

@@ -93,7 +93,7 @@ impl Tile {
         }
     }
 
-    /// Adds a block's voxels, of which these are the terms.
+    /// Adds the terms of a block's voxels times their footprints (eq 9).
     pub(in crate::render) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;

@@ -108,7 +108,7 @@ impl Kernel {
         (uu * u + 2.0 * uv * v) * u + vv * v * v
     }
 
-    /// The weights of a pixel at `place`, row by row, and the first cell of the first row.
+    /// The weights of a pixel at `place` (eq 36), row by row, and the first cell of the first row.
     ///
     /// With du, dv from the nearest cell to the pixel, and i, j from that to another one, the Gaussian is
     ///
@@ -168,13 +168,8 @@ impl Kernel {
         [weight, libm::exp(uu * (du - 0.5) + uv * dv), libm::exp(-uu)]
     }
 
-    /// How far weights w~ are from those of the footprint, w = exp(-d^2 / (2 sigma^2)): for any voxels and any place,
-    /// sum |w~ - w| is at most this times the largest sum of w of any place.
-    ///
-    /// For if |w~ - w| <= sum over j of c_j w(d - t_j) for all places d, then all voxels are off by at most the sum of c_j
-    /// times what they weigh at places moved by t_j.
-    ///
-    /// Infinite as soon as it is known to be more than `most`.
+    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Infinite as soon as it is known to be more
+    /// than `most`.
     pub(super) fn error(&self, shear: &Shear, sigma: f64, most: f64) -> f64 {
         let mut off = vec![0.0; SIDE * SIDE];
         // From the middle outwards, and the same on the other side.
@@ -244,7 +239,7 @@ fn powers(x: f64, first: isize) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(lowest), move |power| Some(power * up))
 }
 
-/// (n + 1) (d^4 / 2880 - d^6 / 181440) of exp(-i x^2 / 2), in units of that, as a polynomial of (i x)^2.
+/// (n + 1) (D^4 / 2880 - D^6 / 181440) of exp(-i x^2 / 2), in units of that, as a polynomial of (i x)^2 (eq 36).
 fn bend(splines: f64, i: f64) -> [f64; 4] {
     let (fourth, sixth) = (splines / 2880.0, splines / 181_440.0);
     let constant = (3.0 * fourth + 15.0 * sixth * i) * i * i;

@@ -44,7 +44,7 @@ impl Shear {
         Self { axes, slopes, depths: [b[2], c[2], a[2]], pixels, origin, fineness }
     }
 
-    /// The cells of a voxel.
+    /// The place of a voxel in cells (eq 35).
     pub(in crate::render) fn place(&self, voxel: [usize; 3]) -> [f64; 2] {
         let [b, c, a] = self.axes.map(|axis| voxel[axis] as f64);
         let q = self.fineness as f64;

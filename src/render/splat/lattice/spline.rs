@@ -14,7 +14,8 @@ pub(super) fn spread(degree: usize, place: f64) -> (isize, Spread) {
     (below as isize - (degree / 2) as isize, weights(degree, place - below))
 }
 
-/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first (de Boor's recurrence).
+/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first, by the recurrence of
+/// [DeBoor](crate::bibliography).
 fn weights(degree: usize, t: f64) -> Spread {
     let mut n = Spread::default();
     n[0] = 1.0;
