@@ -4,7 +4,7 @@ use crate::common::random::Random;
 use crate::common::times;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::Result;
+use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::load;
@@ -66,7 +66,8 @@ impl Case {
     fn check(&self) -> std::result::Result<(), String> {
         for (access, memory) in [(Access::Map, 1 << 20), (Access::Read, 1600)] {
             let opened = self.open(access, memory);
-            let needs_more = opened.as_ref().err().is_some_and(|e| e.to_string().contains("--memory"));
+            let needs_more =
+                opened.as_ref().err().is_some_and(|e| matches!(e, Error::Setting { setting: "memory", .. }));
             let found = match (if needs_more { self.open(access, 1 << 20) } else { opened }, self.refused) {
                 (Ok(_), true) => return Err("was read".into()),
                 (Err(e), true) => return if e.to_string().len() > 40 { Ok(()) } else { Err(e.to_string()) },

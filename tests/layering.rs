@@ -162,6 +162,28 @@ fn every_crate_stays_at_home() {
     }
 }
 
+/// Whether a path is of the programs or of what they share: only these know options.
+fn knows_options(path: &str) -> bool {
+    matches!(room(path), "bin" | "cli")
+}
+
+#[test]
+fn only_programs_name_options() {
+    for (path, code) in sources().into_iter().filter(|(path, _)| !knows_options(path)) {
+        let mut after = code.split("--").skip(1);
+        let option = after.find(|text| text.starts_with(|c: char| c.is_ascii_lowercase()));
+        let option = option.map(|text| text.split_whitespace().next().unwrap_or_default());
+        assert_eq!(option, None, "src/{path}: errors and notes name fields; cli/messages.rs makes options of them");
+    }
+}
+
+#[test]
+fn only_programs_have_errors_of_usage() {
+    for (path, code) in sources().into_iter().filter(|(path, _)| !knows_options(path) && path != "base/error.rs") {
+        assert!(!code.contains("Error::usage") && !code.contains("Error::Usage"), "src/{path}: name the setting");
+    }
+}
+
 #[test]
 fn unsafe_code_is_in_one_file() {
     for (path, code) in sources() {

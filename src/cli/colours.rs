@@ -35,7 +35,7 @@ pub fn transfer_function(
 /// The colours of a name that an option has.
 pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
-        Error::Usage(what) => Error::usage(format!("{option} {what}")),
+        Error::Path { path, problem, .. } => Error::usage(format!("{option} {}: {problem}", path.display())),
         other => other,
     })
 }

@@ -1,6 +1,6 @@
 //! Options that say how an archive is read.
 
-use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
+use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple, note_text};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::Access;
 use crate::base::output::part_of;
@@ -84,7 +84,7 @@ impl InputArgs {
     /// Opens an archive, with notes on how it is read.
     pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
         let source = self.open_quietly(inputs, common)?;
-        source.archive().notes.iter().for_each(|n| common.note(n));
+        source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
         Ok(source)
     }
 

@@ -56,8 +56,8 @@ impl TransferFunction {
         }
         let path = Path::new(file::split(name).0);
         if path.extension().is_none() && !path.exists() {
-            let what = format!("{name}: no such colour map or file; the maps are {}", NAMES.join(" "));
-            return Err(Error::usage(what));
+            let what = format!("no such colour map or file; the maps are {}", NAMES.join(" "));
+            return Err(Error::path(name, what));
         }
         file::read(name)
     }
@@ -246,11 +246,11 @@ impl TransferFunction {
 fn check_range((lo, hi): (f64, f64)) -> Result<()> {
     let wrong = match (hi - lo).is_finite() {
         true if lo < hi => return Ok(()),
-        true if lo == hi => "an empty range shows nothing; it takes two numbers, the lower one first",
+        true if lo == hi => "an empty range shows nothing; give two numbers, the lower one first",
         true => "takes two numbers, the lower one first",
         false => "takes two finite numbers, the lower one first, that are not too far apart",
     };
-    Err(Error::usage(format!("--range {lo},{hi}: {wrong}")))
+    Err(Error::setting("range", format!("{wrong}, not {lo},{hi}")))
 }
 
 /// Opacity from 0 to 1 over a range.

@@ -130,7 +130,7 @@ impl SchemeSelector<'_> {
             }
         }
         let tuned = promising.map(|f| self.coarsest(f, &trials));
-        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
+        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
         for variants in [Self::orders, Self::stencils, Self::growths] {
             let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
             best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);

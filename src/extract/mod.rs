@@ -118,7 +118,7 @@ impl Pieces {
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
         if available < plane {
             let least = (2 * plane + memory::FIXED + block_bytes(file)).div_ceil(1 << 20);
-            return Err(Error::usage(format!("--memory: extracting from this file needs at least {least}MiB")));
+            return Err(Error::setting("memory", format!("extracting from this file needs at least {least}MiB")));
         }
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
         Ok(Self { blocks, frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })

@@ -3,7 +3,7 @@
 //! Both are the same: whole windows at the beginning of `NAME.part`, after which writing goes on. Those of a finished file are
 //! copied there first, so that it stays what it is until its successor takes its name.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::output::Output;
 use crate::file::CoefficientFile;
@@ -26,7 +26,7 @@ pub enum Earlier {
 }
 
 impl Earlier {
-    /// As `--force` and `--resume` say.
+    /// What becomes of them with `resume`, or else with `force`.
     pub fn by(force: bool, resume: bool) -> Self {
         match (resume, force) {
             (true, _) => Self::Resume,
@@ -40,9 +40,8 @@ impl Earlier {
         match (self, held) {
             (Self::Resume, held) => Ok(held),
             (Self::Refuse, Some(held)) => {
-                let (part, frames) = (part.display(), held.metadata().frames);
-                let what = "--resume goes on with it, --force begins anew";
-                Err(Error::usage(format!("{part}: holds {frames} frames of a run that was not finished; {what}")))
+                let what = format!("holds {} frames of a run that was not finished", held.metadata().frames);
+                Err(Error::path(part, Note::with(what, Remedy::ResumeOrBeginAnew)))
             }
             (Self::Discard | Self::Refuse, _) => Ok(None),
         }
@@ -55,7 +54,7 @@ pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Opt
     let mut out = Output::resumable(path, replace)?;
     let Some(part) = out.part() else {
         return match earlier {
-            Earlier::Resume => Err(Error::usage("--resume: takes a file to write to, not a pipe or a device")),
+            Earlier::Resume => Err(Error::setting("resume", "takes a file to write to, not a pipe or a device")),
             _ => Ok((out, None)),
         };
     };
@@ -79,10 +78,7 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
             out.begin_at(held.bytes())?;
             Ok((out, held))
         }
-        Some(_) => {
-            let what = "is of another file; --force begins anew";
-            Err(Error::usage(format!("{}: {what}", part.display())))
-        }
+        Some(_) => Err(Error::path(part, Note::with("is of another file", Remedy::BeginAnew))),
         None => {
             out.begin_at(0)?;
             let mut start = File::open(path).map_err(|e| Error::io(path, "opening", e))?.take(own.bytes());
@@ -102,10 +98,9 @@ fn whole_windows(part: &Path) -> Result<Option<CompletePrefix>> {
     match CompletePrefix::read(&FileBytes::open(part, Access::Read)?) {
         Ok(held) => Ok(Some(held).filter(|held| held.metadata().frames > 0)),
         Err(FormatError::Io(e)) => Err(Error::io(part, "reading", e)),
-        Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => Err(Error::usage(format!(
-            "{}: is in the way, and not an unfinished conversion; --force replaces it",
-            part.display()
-        ))),
+        Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => {
+            Err(Error::path(part, Note::with("is in the way, and not an unfinished conversion", Remedy::Replace)))
+        }
         Err(_) => Ok(None),
     }
 }

@@ -60,13 +60,17 @@ const FIT: f64 = 0.9;
 impl Camera {
     /// The camera that shows `grid` as `view` asks.
     pub fn new(view: &View, grid: &Grid) -> Result<Self> {
-        let numbers = [view.azimuth, view.elevation, view.roll, view.scale.unwrap_or(1.0)];
         let center = view.center.unwrap_or_else(|| middle(grid));
-        if !numbers.iter().chain(&center).all(|n| n.is_finite()) || view.scale.is_some_and(|s| s <= 0.0) {
-            return Err(Error::usage("a view takes finite angles and positions, and a scale above 0"));
+        let numbers = [("azimuth", view.azimuth), ("elevation", view.elevation), ("roll", view.roll)];
+        let all = numbers.into_iter().chain(center.map(|n| ("center", n)));
+        if let Some((setting, _)) = all.into_iter().find(|(_, n)| !n.is_finite()) {
+            return Err(Error::setting(setting, "takes finite numbers"));
+        }
+        if view.scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
+            return Err(Error::setting("scale", "takes a finite number above 0"));
         }
         if view.size.iter().any(|n| *n == 0 || *n > MOST_PIXELS) {
-            return Err(Error::usage(format!("--size: a picture is 1 to {MOST_PIXELS} pixels wide and high")));
+            return Err(Error::setting("size", format!("a picture is 1 to {MOST_PIXELS} pixels wide and high")));
         }
         let [right, up, forward] = axes(view);
         let mut camera = Self { size: view.size, scale: 1.0, right, up, forward, center, nearest: 0.0 };

@@ -38,9 +38,11 @@ impl Kernel {
     /// With the default sigma, 0.75 of the largest spacing, unless one is given.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
         let sigma = sigma.unwrap_or(0.75 * grid.largest_spacing());
-        let sensible = sigma.is_finite() && sigma > 0.0 && tau.is_finite() && tau >= 0.0;
-        if !sensible {
-            return Err(Error::usage("--sigma takes a number above 0, and --tau a number of 0 or more"));
+        if !(sigma.is_finite() && sigma > 0.0) {
+            return Err(Error::setting("sigma", "takes a number above 0"));
+        }
+        if !(tau.is_finite() && tau >= 0.0) {
+            return Err(Error::setting("tau", "takes a number of 0 or more"));
         }
         Ok(Self { sigma, tau })
     }
@@ -104,8 +106,8 @@ impl Footprint {
         let reach = (method.radius * in_pixels).max(1.0);
         let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
-            let what = "the kernel's weights are beyond numbers: choose another --sigma, --tau or --scale";
-            return Err(Error::usage(format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
+            let what = "the kernel's weights are beyond numbers: choose another sigma, tau or scale";
+            return Err(Error::setting("kernel", format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
         }
         Ok(Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) })
     }

@@ -73,7 +73,8 @@ pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
     if fits && frames <= most {
         return Ok(());
     }
-    Err(Error::usage(format!("--window {frames}: the {kind:?} basis takes {rule}, at most {most}").to_lowercase()))
+    let problem = format!("the {kind:?} basis takes {rule}, at most {most}, not {frames}");
+    Err(Error::setting("window", problem.to_lowercase()))
 }
 
 /// The basis functions as numbers: `rows[k][t]` is u_k(t), with K rows of `frames` columns.

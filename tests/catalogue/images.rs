@@ -140,7 +140,7 @@ fn depths_beyond_an_exponential_are_right_or_refused() {
 #[test]
 fn depths_of_less_than_nothing_or_without_end_are_refused() {
     for tau in [-1e-300, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert!(matches!(Kernel::new(None, tau, &SKEWED), Err(Error::Usage(what)) if what.contains("--tau")), "{tau}");
+        assert!(matches!(Kernel::new(None, tau, &SKEWED), Err(Error::Setting { setting: "tau", .. })), "{tau}");
     }
 }
 

@@ -124,7 +124,7 @@ fn what_does_not_belong_to_a_file_is_not_appended_and_leaves_it_as_it_is() {
     work.wavesplat("append a.wspl other.npy").fails(2, &["a.wspl", "another size"]);
     work.write("type.npy", npy("<f8", "2, 10, 14, 20", &[0; 2 * 2800 * 8]));
     work.wavesplat("append a.wspl type.npy").fails(2, &["a.wspl", "another type of samples: f32, now f64"]);
-    work.wavesplat("append a.wspl rest.npy --spacing 2,2,2").fails(2, &["a.wspl", "another --spacing"]);
+    work.wavesplat("append a.wspl rest.npy --spacing 2,2,2").fails(2, &["a.wspl", "another spacing"]);
     work.wavesplat("append a.wspl missing.npy").fails(1, &["missing.npy"]);
     work.wavesplat("append missing.wspl rest.npy").fails(1, &["missing.wspl"]);
     let mut nan = archive.clone();

@@ -24,7 +24,7 @@ mod xml;
 pub use npy::{ArrayHeader, array_header};
 
 use super::OpenOptions;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::file_header::{FileHeader, head};
 use std::fmt::{self, Display};
@@ -188,51 +188,37 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         #[cfg(feature = "zarr")]
         Some(Format::Zarr) => arrays::describe_zarr(path, options),
         #[cfg(not(feature = "zarr"))]
-        Some(Format::Zarr) => {
-            let what = "Zarr is not built in; cargo build --release --features zarr does that";
-            Err(Error::input(path, what))
-        }
-        Some(Format::Pvd | Format::FileSeries) => {
-            Err(Error::usage(format!("{}: a list of files must be the only input", path.display())))
-        }
-        Some(Format::Coefficients) => {
-            Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
-        }
+        Some(Format::Zarr) => Err(Error::input(path, Note::with("Zarr is not built in", Remedy::BuildWith("zarr")))),
+        Some(Format::Pvd | Format::FileSeries) => Err(Error::path(path, "a list of files must be the only input")),
+        Some(Format::Coefficients) => Err(Error::path(path, "is a coefficient file already, not frames to convert")),
         None if options.dims.is_none() => Err(unknown(path)),
         None => raw::describe(path, options),
     }
 }
 
 fn unknown(path: &Path) -> Error {
-    let what = "is of no known format. Headerless data needs --dims NXxNYxNZ and --dtype";
-    Error::usage(format!("{}: {what}. Supported are {SUPPORTED}", path.display()))
+    let what = format!("is of no known format. Supported are {SUPPORTED}");
+    Error::path(path, Note::with(what, Remedy::DescribeSamples))
 }
 
 /// Options that would be ignored are refused, so that nobody thinks they had an effect.
 pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
     let given = [
-        (options.dims.is_some(), "--dims"),
-        (options.sample.is_some(), "--dtype"),
-        (options.big_endian, "--endian"),
-        (options.offset > 0, "--offset"),
-        (options.variable.is_some() && format == Format::Npy, "--variable"),
-        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "--axes"),
+        (options.dims.is_some(), "dims"),
+        (options.sample.is_some(), "sample"),
+        (options.big_endian, "big_endian"),
+        (options.offset > 0, "offset"),
+        (options.variable.is_some() && format == Format::Npy, "variable"),
+        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "axes"),
     ];
-    match given.into_iter().find(|(given, _)| *given) {
-        Some((_, "--variable")) => Err(Error::usage(format!(
-            "{}: --variable is for files that have names; this has one array",
-            path.display()
-        ))),
-        Some((_, "--axes")) => {
-            let what = "--axes is for HDF5, NetCDF and Zarr; this file says it itself";
-            Err(Error::usage(format!("{}: {what}", path.display())))
-        }
-        Some((_, name)) if format.holds_frames() => {
-            let what = format!("says itself what it holds; {name} is for headerless data, leave it out");
-            Err(Error::usage(format!("{}: {what}", path.display())))
-        }
-        _ => Ok(()),
-    }
+    let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
+    let what = match setting {
+        "variable" => "has one array; this is for files that have names",
+        "axes" => "says itself what its axes count; this is for HDF5, NetCDF and Zarr",
+        _ if format.holds_frames() => "says itself what it holds; this is for headerless data, leave it out",
+        _ => return Ok(()),
+    };
+    Err(Error::setting(setting, format!("{} {what}", path.display())))
 }
 
 #[cfg(test)]
