@@ -74,4 +74,5 @@ pub mod convert;
 pub mod view;
 pub mod render;
 pub mod extract;
+#[cfg(feature = "args")]
 pub mod cli;

@@ -15,10 +15,10 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// Where each third-party crate is at home: `src/` and then one of these.
-const HOMES: [(&str, &[&str]); 22] = [
+const HOMES: [(&str, &[&str]); 21] = [
     ("memmap2::", &["base/mapped.rs"]),
     ("libc::", &["base/mapped.rs"]),
-    ("crossbeam::", &["convert/"]),
+    ("crossbeam_channel::", &["convert/"]),
     (
         "rayon::",
         &[
@@ -46,7 +46,6 @@ const HOMES: [(&str, &[&str]); 22] = [
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),
-    ("npyz::", &["base/npy.rs", "source/formats/npy.rs"]),
     ("quick_xml::", &["source/formats/", "extract/vti.rs"]),
     ("flate2::", &["source/formats/"]),
     ("hdf5_reader::", &["source/formats/arrays/"]),
