@@ -74,6 +74,7 @@ pub mod convert;
 pub mod view;
 pub mod render;
 pub mod extract;
+#[cfg(feature = "args")]
 pub mod cli;
 
 #[doc = include_str!("method.md")]

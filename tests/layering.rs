@@ -15,10 +15,10 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// The files below `src/` in which each third-party crate may be used.
-const HOMES: [(&str, &[&str]); 22] = [
+const HOMES: [(&str, &[&str]); 21] = [
     ("memmap2::", &["base/mapped.rs"]),
     ("libc::", &["base/mapped.rs"]),
-    ("crossbeam::", &["convert/"]),
+    ("crossbeam_channel::", &["convert/"]),
     (
         "rayon::",
         &[
@@ -49,7 +49,6 @@ const HOMES: [(&str, &[&str]); 22] = [
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),
-    ("npyz::", &["base/npy.rs", "source/formats/npy.rs"]),
     ("quick_xml::", &["source/formats/", "extract/vti.rs"]),
     ("flate2::", &["source/formats/"]),
     ("hdf5_reader::", &["source/formats/arrays/"]),

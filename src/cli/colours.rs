@@ -4,8 +4,7 @@ use super::{CommonArgs, Pair};
 use crate::base::error::{Error, Result};
 use crate::base::output::STANDARD;
 use crate::colour::TransferFunction;
-use crate::source::FrameSource;
-use crate::source::scan::value_range;
+use crate::source::{FrameSource, value_range};
 use std::path::{Path, PathBuf};
 
 /// The transfer function of a name, stretched over `range` if one is given. A map that is of no values of its own is stretched

@@ -1,7 +1,9 @@
 //! A program from its arguments to its exit code.
 
+use super::advice;
+use super::common::note;
 use super::config::Config;
-use super::{advice, messages, note};
+use super::messages;
 use crate::base::error::{Error, Result};
 use crate::base::mapped;
 use crate::base::output::abandon;

@@ -11,7 +11,7 @@ use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::codec::scheme::Scheme;
 use crate::source::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
-use crossbeam::channel::Sender;
+use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_format::{BlockId, FileId, Window};

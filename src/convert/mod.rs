@@ -36,7 +36,7 @@ use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
 use crate::wavelet;
 pub use choose::{SchemeConstraint, SpatialPredictor};
-use crossbeam::channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;

@@ -4,7 +4,7 @@ use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, Windo
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::file::report::{BoundReport, WindowReport};
-use crossbeam::channel::Receiver;
+use crossbeam_channel::Receiver;
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -25,6 +25,7 @@ pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;
 pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
+pub use scan::value_range;
 pub use select::{Selection, select};
 
 use crate::base::error::{Note, Result};

@@ -9,6 +9,7 @@ use super::spill_buffer::{SpillBuffer, read_some};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
+use crate::base::npy::MAGIC;
 use crate::base::output::STANDARD;
 use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
@@ -32,9 +33,9 @@ impl<R: Read> Stream<R> {
     /// Reads what comes before the first frame.
     pub(super) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
         let mut head = Vec::new();
-        let magic = npy::MAGIC.len() as u64;
+        let magic = MAGIC.len() as u64;
         reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;
-        let is_npy = head == npy::MAGIC;
+        let is_npy = head == MAGIC;
         let mut reader = Cursor::new(head).chain(reader);
         let (shape, frames, big_endian) = match (&options.dims, is_npy) {
             (Some(_), false) => headerless(&mut reader, options)?,

@@ -1,5 +1,6 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
+#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 mod arrays;
 mod association;
 mod base64;
@@ -26,6 +27,7 @@ pub use npy::{ArrayHeader, array_header};
 use super::OpenOptions;
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
+use crate::base::npy::MAGIC;
 use crate::source::file_header::{FileHeader, head};
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -137,7 +139,7 @@ impl Format {
         let head = head(&FileBytes::open(path, Access::Read)?, FIRST_READ)?;
         let is_nifti = nifti::is_nifti(&head) || nifti::header_of(path).is_some();
         let formats = [
-            (head.starts_with(npy::MAGIC), Self::Npy),
+            (head.starts_with(MAGIC), Self::Npy),
             (head.starts_with(nrrd::MAGIC), Self::Nrrd),
             (head.starts_with(vtk::MAGIC), Self::Vtk),
             (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
@@ -183,17 +185,34 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
+        #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
+        #[cfg(feature = "netcdf")]
         Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
         #[cfg(feature = "zarr")]
         Some(Format::Zarr) => arrays::describe_zarr(path, options),
+        #[cfg(not(feature = "hdf5"))]
+        Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5)),
+        #[cfg(not(feature = "netcdf"))]
+        Some(Format::NetCdf) => Err(not_built_in(path, Format::NetCdf)),
         #[cfg(not(feature = "zarr"))]
-        Some(Format::Zarr) => Err(Error::input(path, Note::with("Zarr is not built in", Remedy::BuildWith("zarr")))),
+        Some(Format::Zarr) => Err(not_built_in(path, Format::Zarr)),
         Some(Format::Pvd | Format::FileSeries) => Err(Error::path(path, "a list of files must be the only input")),
         Some(Format::Coefficients) => Err(Error::path(path, "is a coefficient file already, not frames to convert")),
         None if options.dims.is_none() => Err(unknown(path)),
         None => raw::describe(path, options),
     }
+}
+
+/// The error of a format whose crates this build does not have.
+#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "zarr")))]
+fn not_built_in(path: &Path, format: Format) -> Error {
+    let feature = match format {
+        Format::Hdf5 => "hdf5",
+        Format::NetCdf => "netcdf",
+        _ => "zarr",
+    };
+    Error::input(path, Note::with(format!("{} is not built in", format.name()), Remedy::BuildWith(feature)))
 }
 
 fn unknown(path: &Path) -> Error {

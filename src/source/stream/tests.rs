@@ -29,7 +29,7 @@ fn stream(bytes: Vec<u8>, options: &OpenOptions) -> Result<Box<dyn FrameSource>>
 fn npy(frames: usize, payload: &[u8]) -> Vec<u8> {
     let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, 3, 5, 7)}}\n");
     let len = (dict.len() as u16).to_le_bytes();
-    [npy::MAGIC, &[1, 0], &len, dict.as_bytes(), payload].concat()
+    [MAGIC, &[1, 0], &len, dict.as_bytes(), payload].concat()
 }
 
 #[test]

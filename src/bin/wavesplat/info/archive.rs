@@ -41,7 +41,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if args.estimate.is_some() && args.inputs == [Path::new(STANDARD)] {
         return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
     }
-    let source = args.input.open_quietly(&args.inputs, &args.common)?;
+    let source = args.input.open_quietly(&args.inputs, args.common.stream_memory())?;
     let mut source = args.select.narrow(source)?;
     let archive = source.archive().clone();
     let progress = args.common.progress("estimate", "windows");

@@ -6,7 +6,9 @@
 mod axes;
 mod choose;
 mod chunks;
+#[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(feature = "netcdf")]
 mod netcdf;
 mod openpmd;
 mod places;
@@ -165,17 +167,22 @@ impl Opener {
 }
 
 /// Reads what an HDF5 file holds.
+#[cfg(feature = "hdf5")]
 pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, hdf5::open, options);
     let file = opener.open()?;
     // What the NetCDF library wrote says so, whatever its name is.
     match file.group("/").contains_key("_NCProperties") {
+        #[cfg(feature = "netcdf")]
         true => describe_netcdf(path, options),
+        #[cfg(not(feature = "netcdf"))]
+        true => Err(super::not_built_in(path, super::Format::NetCdf)),
         false => describe(&opener, file.as_ref(), path, options),
     }
 }
 
 /// Reads what a NetCDF file holds.
+#[cfg(feature = "netcdf")]
 pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, netcdf::open, options);
     describe(&opener, opener.open()?.as_ref(), path, options)
