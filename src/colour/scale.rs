@@ -56,8 +56,8 @@ impl Scale {
         self.colour_at(self.share(value))
     }
 
-    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the background
-    /// where any number is NaN.
+    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the
+    /// background where any number is NaN.
     pub fn colour_of_pixel(&self, numbers: &[f32]) -> Rgb {
         match *numbers {
             [value] => self.colour(value),

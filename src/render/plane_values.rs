@@ -1,25 +1,25 @@
-//! What a block adds to the planes of a picture, as amounts of its voxels and one plane at a time.
+//! The values that the voxels of a block add to the planes of a picture, one plane at a time.
 
 use crate::base::error::Result;
 use crate::base::sample::{SampleType, load_as};
 use crate::codec::field::Plane;
 use crate::codec::real::Real;
 
-/// The amounts of a block's voxels in one plane.
+/// The values of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]
 pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
-    /// One for each voxel, x fastest.
+    /// One value for each voxel, x fastest.
     Single(&'a [f32]),
-    /// As [`Self::Single`].
+    /// The same as [`Self::Single`], in f64.
     Double(&'a [f64]),
-    /// Those that are not zero: (voxel, amount).
+    /// The nonzero values: (voxel, value), ascending by voxel.
     Few(&'a [(u32, f64)]),
 }
 
 impl PlaneValues<'_> {
-    /// Calls `visit(voxel, amount)` for all that are not zero, ascending.
+    /// Calls `visit(voxel, value)` for all nonzero values, ascending by voxel.
     pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
         let mut all = |amounts: &mut dyn Iterator<Item = f64>| {
             amounts.enumerate().filter(|(_, amount)| *amount != 0.0).for_each(|(voxel, amount)| visit(voxel, amount));
@@ -32,7 +32,7 @@ impl PlaneValues<'_> {
         }
     }
 
-    /// Adds `factor` times each to the sums of the voxels.
+    /// Adds `factor` times each value to the sum of its voxel.
     pub(super) fn add_to(&self, factor: f64, sums: &mut [f64]) {
         match self {
             Self::Nothing => {}
@@ -60,23 +60,23 @@ impl<'a> From<Plane<'a>> for PlaneValues<'a> {
 
 /// A block that has been read.
 pub trait BlockPlanes: Send + Sync {
-    /// Voxels of the block.
+    /// Number of voxels in the block.
     fn voxels(&self) -> usize;
 
-    /// The amounts of a plane, which may be in `room`.
+    /// The values of a plane. They may be stored in `scratch`.
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
-    /// Nonzero coefficients, and stored bytes that were read for them.
+    /// Number of nonzero coefficients, and stored bytes that were read.
     fn held(&self) -> [u64; 2];
 }
 
-/// Where blocks come from.
+/// A source of blocks.
 pub(super) trait BlockSource: Sync {
     /// Reads a block.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
 
-/// Room for the amounts of a plane while they are made.
+/// Buffers for the values of a plane, reused from call to call.
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(super) bytes: Vec<u8>,
@@ -85,11 +85,11 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// The samples that lie in `bytes`, of which none is missing.
+    /// The samples in `bytes`; none of them is missing.
     pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();
         if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
-            // Singles do not hold them.
+            // f32 cannot represent these exactly.
             self.double.resize(count, 0.0);
             load_as(ty, &self.bytes, &mut self.double, |v| v);
             return PlaneValues::Double(&self.double);
@@ -99,7 +99,8 @@ impl Scratch {
         PlaneValues::Single(&self.single)
     }
 
-    /// Those with zeros for what is missing; or, if `absent`, a 1 for that and zeros else.
+    /// The samples in `bytes`, with zeros for missing samples. If `absent`, ones for missing samples and zeros
+    /// elsewhere instead.
     pub(super) fn masked(
         &mut self,
         ty: SampleType,
@@ -119,7 +120,7 @@ impl Scratch {
     }
 }
 
-/// A 1 for each of so many voxels.
+/// A block of this many voxels with the value 1.
 #[derive(Debug)]
 pub(super) struct UnitValues(pub(super) usize);
 

@@ -79,7 +79,8 @@ impl Camera {
         Ok(camera)
     }
 
-    /// The pixel position (x, y) and the depth z of a world position (eq 14); z is in world units behind the nearest corner.
+    /// The pixel position (x, y) and the depth z of a world position (eq 14); z is in world units behind the nearest
+    /// corner.
     pub fn project(&self, position: [f64; 3]) -> [f64; 3] {
         let q = minus(position, self.center);
         [
@@ -115,7 +116,8 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of depth.
+    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of
+    /// depth.
     pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
         let far = corners(grid).map(size).fold(size(self.center), f64::max);

@@ -117,8 +117,9 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
-    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at depth `z`,
-    /// and each next one a `step` in pixels and in depth from the one before. They should not be much further than reach.
+    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at
+    /// depth `z`, and each next one a `step` in pixels and in depth from the one before. They should not be much
+    /// further than reach.
     pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);

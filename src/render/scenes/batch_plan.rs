@@ -63,7 +63,8 @@ pub(super) fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     }
 }
 
-/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
+/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a
+/// pixel are added faster.
 fn is_dense(window: &Window, series: usize) -> bool {
     window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
 }
@@ -94,8 +95,8 @@ fn layout(
     }
 }
 
-/// Whether so few frames of a window are asked for that their values are less work than the coefficients that they need. Judged by
-/// all that are asked for, not by a batch, whose frames depend on the memory that there is.
+/// Whether so few frames of a window are asked for that their values are less work than the coefficients that they
+/// need. Judged by all that are asked for, not by a batch, whose frames depend on the memory that there is.
 fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
     let range = file.window_range(window);
     let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();

@@ -177,8 +177,8 @@ impl<'a> CoefficientBatch<'a> {
         }
     }
 
-    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms that
-    /// sum to more than `absolute_sum`.
+    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms
+    /// that sum to more than `absolute_sum`.
     fn sample_errors(&self, certified: f64, absolute_sum: f64) -> SampleErrors {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());

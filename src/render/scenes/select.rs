@@ -57,8 +57,8 @@ pub(super) enum Rule {
     Cheap(Cost),
 }
 
-/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the same
-/// for all blocks, no other choice of steps reads fewer bytes for the same expected error.
+/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the
+/// same for all blocks, no other choice of steps reads fewer bytes for the same expected error.
 type Cost = i32;
 
 /// Some level parts, from the finest on, of which none is left out without all before it.
@@ -115,8 +115,8 @@ impl<'a> RateAllocator<'a> {
         }
     }
 
-    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to come
-    /// to at most `allowed` in the mean square over pixels.
+    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to
+    /// come to at most `allowed` in the mean square over pixels.
     pub(super) fn within(&self, allowed: f64) -> Rule {
         let mut sum = self.own;
         let affordable = self.changes.iter().take_while(|(_, change)| {
@@ -138,8 +138,8 @@ impl BlockSelector {
         Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
     }
 
-    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that the
-    /// rule leaves out.
+    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that
+    /// the rule leaves out.
     pub(super) fn keep(&self, block: &BlockView<'_>) -> KeptParts {
         let (entry, stats) = (block.entry, block.entry.stats);
         let mut kept = KeptParts {

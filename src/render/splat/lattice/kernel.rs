@@ -46,13 +46,14 @@ pub(super) struct Kernel {
     spans: Vec<Range<usize>>,
 }
 
-/// Numbers of neighbouring cells. Singles are near enough, and as near for values as for weights, of which means are quotients.
+/// Numbers of neighbouring cells. Singles are near enough, and as near for values as for weights, of which means are
+/// quotients.
 type Run = [f32; RUN];
 const RUN: usize = 16;
 
 impl Kernel {
-    /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline is
-    /// too wide for it, or cells too small.
+    /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline
+    /// is too wide for it, or cells too small.
     pub(super) fn new(shear: &Shear, sigma: f64, degree: usize, radius: f64) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
@@ -161,15 +162,16 @@ impl Kernel {
         sum
     }
 
-    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring quotients.
+    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring
+    /// quotients.
     fn gaussian(&self, du: f64, dv: f64) -> [f64; 3] {
         let [uu, uv, _] = self.inverse;
         let weight = self.peak * libm::exp(-0.5 * self.square([du, dv]));
         [weight, libm::exp(uu * (du - 0.5) + uv * dv), libm::exp(-uu)]
     }
 
-    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Infinite as soon as it is known to be more
-    /// than `most`.
+    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Infinite as soon as it is known to be
+    /// more than `most`.
     pub(super) fn error(&self, shear: &Shear, sigma: f64, most: f64) -> f64 {
         let mut off = vec![0.0; SIDE * SIDE];
         // From the middle outwards, and the same on the other side.
@@ -207,7 +209,8 @@ impl Kernel {
     }
 }
 
-/// The weights of the cells that a pixel reaches: of a row as many runs as of any other, of which those in its span count.
+/// The weights of the cells that a pixel reaches: of a row as many runs as of any other, of which those in its span
+/// count.
 #[derive(Debug)]
 pub(super) struct Weights {
     rows: Vec<[f64; RUN]>,
@@ -224,7 +227,8 @@ impl Weights {
         Self { rows: vec![[0.0; RUN]; kernel.table.len()], spans: kernel.spans.clone(), along, across }
     }
 
-    /// Row by row the weights that count: the number of the row and of its first cell that does, and those from there on.
+    /// Row by row the weights that count: the number of the row and of its first cell that does, and those from there
+    /// on.
     #[inline(always)]
     pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize, &[f64])> {
         let rows = self.rows.chunks_exact(self.along.len()).zip(&self.spans);

@@ -34,8 +34,8 @@ const STEEPEST: f64 = 0.5;
 const TILE_CELLS: usize = 4096;
 
 impl Lattice {
-    /// The lattice that splats within `error` (as in [`Method::within`]), and as what it is reported; none if footprints
-    /// are better.
+    /// The lattice that splats within `error` (as in [`Method::within`]), and as what it is reported; none if
+    /// footprints are better.
     pub(in crate::render) fn within(
         error: f64,
         gaussian: Gaussian,
@@ -147,8 +147,8 @@ impl Lattice {
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in cells,
-    /// for planes of `seen`.
+    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in
+    /// cells, for planes of `seen`.
     pub(in crate::render) fn placed(
         &self,
         region: &Region,
@@ -191,8 +191,8 @@ impl Lattice {
     }
 }
 
-/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product from
-/// voxels to cells; in units of a product of a footprint, as measured.
+/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product
+/// from voxels to cells; in units of a product of a footprint, as measured.
 const GATHERING: f64 = 0.5;
 const COPYING: f64 = 5.0;
 const SPREADING: f64 = 0.15;

@@ -7,8 +7,8 @@ pub(super) const MOST_DEGREE: usize = 7;
 /// Weights of the cells around a place.
 pub(super) type Spread = [f64; MOST_DEGREE + 1];
 
-/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1, odd
-/// degrees only. They sum to 1, and the centre of the amount stays where it is.
+/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1,
+/// odd degrees only. They sum to 1, and the centre of the amount stays where it is.
 pub(super) fn spread(degree: usize, place: f64) -> (isize, Spread) {
     let below = place.floor();
     (below as isize - (degree / 2) as isize, weights(degree, place - below))

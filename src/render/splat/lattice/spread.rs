@@ -61,8 +61,8 @@ pub(in crate::render) struct Work {
 }
 
 impl Placed {
-    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for planes of
-    /// some cells.
+    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for
+    /// planes of some cells.
     pub(super) fn new(
         spreading: &Spreading,
         region: &Region,
@@ -290,8 +290,8 @@ fn live_lines(row: &[f64]) -> u64 {
     live
 }
 
-/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c, what is
-/// spread along u stays in registers for all rows of cells that it reaches.
+/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c,
+/// what is spread along u stays in registers for all rows of cells that it reaches.
 #[inline(always)]
 fn add_rows<const Q: usize, const TAPS: usize>(
     (slice, rectangle): (&Slice, &Rectangle),
