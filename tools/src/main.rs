@@ -58,8 +58,10 @@ enum Command {
     /// One measured stage of the benchmark
     #[command(hide = true)]
     BenchStep {
-        /// What to do, as JSON
-        step: String,
+        /// The name of the measurement
+        name: String,
+        /// Its settings, as JSON
+        task: String,
     },
 }
 
@@ -415,7 +417,9 @@ fn main() -> ExitCode {
             Some(OtherBench::Speed(args)) => bench_speed(args),
             None => bench(&args),
         },
-        Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),
+        Command::BenchStep { name, task } => {
+            bench::run_step(&name, &task).and_then(|answer| wavesplat::cli::print(&answer))
+        }
     };
     result.map_or_else(|e| report(&e), |()| ExitCode::SUCCESS)
 }

@@ -1,10 +1,11 @@
 //! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
 
-use super::look::{Look, SIGMA};
+use super::camera::{Look, SIGMA};
+use super::json::bad_json;
 use super::machine::Made;
+use super::process::{ProcessTask, in_process};
 use super::size::Data;
 use super::stages::MEMORY;
-use super::step::{Outcome, Step, in_process};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
@@ -105,21 +106,29 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
         let (tolerances, file) = (config.tolerances.clone(), file.clone());
         let (name, source, dims, frames, range) = (one.name.clone(), one.path.clone(), one.dims, one.frames, one.range);
         let task = Task { name, source, dims, frames, range, tolerances, file };
-        let outcome: Outcome<Vec<Row>> = in_process(&config.program, &Step::Layers(task))?;
-        rows.extend(outcome.did);
+        rows.extend(in_process(&config.program, &task)?.measured);
     }
     let results = Results { made: Made::here(SCHEMA, config.date.as_ref()), data, rows };
     let text = markdown(&results);
     let json = config.output.join("layers.json");
-    let numbers = serde_json::to_string_pretty(&results).map_err(|e| super::bad_json(&json, &e))?;
+    let numbers = serde_json::to_string_pretty(&results).map_err(|e| bad_json(&json, &e))?;
     for (path, text) in [(json, &numbers), (config.output.join("layers.md"), &text)] {
         fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
     }
     Ok((results, text))
 }
 
+impl ProcessTask for Task {
+    const NAME: &'static str = "layers";
+    type Measured = Vec<Row>;
+
+    fn measure(&self) -> Result<Vec<Row>> {
+        measure(self)
+    }
+}
+
 /// Converts and renders in this process.
-pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
+fn measure(task: &Task) -> Result<Vec<Row>> {
     let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
     let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
     let settings =

@@ -1,12 +1,13 @@
 //! Measures a group: its contenders in turns, and the check of every sample.
 
-use super::look::{Look, compared_frames};
+use super::camera::{Look, compared_frames};
+use super::json::bad_json;
 use super::plan::{Contender, Group, kind_name};
 use super::point::{Conversion, Point, Rendering, Spread};
-use super::stages::{MEMORY, open_frames};
-use super::step::{Convert, Converted, Outcome, Render, Rendered, Step, Way, in_process};
+use super::process::{Outcome, in_process};
+use super::settings::Config;
+use super::stages::{Convert, Converted, MEMORY, Render, Rendered, Way, open_frames};
 use super::truth::Truth;
-use super::{Config, bad_json};
 use crate::output::{Format, Shape, Target};
 use crate::synth::{Kind, Synth};
 use std::fs;
@@ -97,7 +98,7 @@ impl<'a> Bench<'a> {
         for round in 0..repeats {
             for ((step, contender), runs) in steps.iter().zip(&group.contenders).zip(&mut runs) {
                 if let Some(step) = step.as_ref().filter(|_| round < contender.rounds(repeats)) {
-                    runs.push(in_process(&self.config.program, &Step::Convert(step.clone()))?);
+                    runs.push(in_process(&self.config.program, step)?);
                 }
             }
         }
@@ -125,7 +126,7 @@ impl<'a> Bench<'a> {
             for ((number, contender), runs) in group.contenders.iter().enumerate().zip(&mut runs) {
                 if round < contender.rounds(repeats) {
                     let step = Render { certify: round == 0, ..self.rendering(group, number, contender) };
-                    runs.push(in_process(&self.config.program, &Step::Render(step))?);
+                    runs.push(in_process(&self.config.program, &step)?);
                 }
             }
         }
@@ -183,8 +184,8 @@ fn promised(contender: &Contender, conversion: &Conversion) -> Option<f64> {
 }
 
 fn conversion(checked: &Checked, frames: usize) -> Conversion {
-    let (run, found) = (&checked.runs[0].did, &checked.found);
-    let seconds = Spread::of(checked.runs.iter().map(|r| r.did.seconds).collect());
+    let (run, found) = (&checked.runs[0].measured, &checked.found);
+    let seconds = Spread::of(checked.runs.iter().map(|r| r.measured.seconds).collect());
     Conversion {
         megabytes_per_second: run.input_bytes as f64 / 1e6 / seconds.median,
         seconds,
@@ -208,9 +209,9 @@ const LEAST_WEIGHT: f64 = 0.01;
 
 /// `voxel` is what no sample's error may exceed, if anything.
 fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> Rendering {
-    let spread = |seconds: fn(&Rendered) -> f64| Spread::of(runs.iter().map(|r| seconds(&r.did)).collect());
+    let spread = |seconds: fn(&Rendered) -> f64| Spread::of(runs.iter().map(|r| seconds(&r.measured)).collect());
     let further_view = spread(|r| r.further_seconds);
-    let run = &runs[0].did;
+    let run = &runs[0].measured;
     Rendering {
         first_view: spread(|r| r.first_seconds),
         milliseconds_per_frame: 1e3 * further_view.median / frames as f64,

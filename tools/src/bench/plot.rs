@@ -1,10 +1,10 @@
 //! What the figures show.
 
-use super::Settings;
 use super::chart::{Curve, Figure, Line, Marker, Panel, draw};
 use super::plan::{BASES, BOUNDS, BasisRow, BoundRow};
 use super::point::{Conversion, Point, Results};
 use super::report::kinds;
+use super::settings::Settings;
 use std::path::Path;
 use wavesplat::base::error::Result;
 

@@ -1,6 +1,6 @@
 //! What is recorded.
 
-use super::Settings;
+use super::settings::Settings;
 use super::truth::ImageError;
 use serde::{Deserialize, Serialize};
 

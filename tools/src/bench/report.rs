@@ -1,7 +1,8 @@
 //! `results.json` for programs, `results.md` for people.
 
+use super::json::bad_json;
 use super::point::{Conversion, Point, Results};
-use super::{Settings, bad_json};
+use super::settings::Settings;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

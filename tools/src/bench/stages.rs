@@ -1,13 +1,15 @@
 //! The measured stages: conversion, and two views by any method.
 
-use super::look::{Look, SIGMA};
+use super::camera::{Look, SIGMA};
+use super::json::bad_json;
 use super::plan::{BASES, BOUNDS};
-use super::step::{Convert, Converted, Render, Rendered, Way};
-use super::truth::Truth;
-use super::{bad_json, textbook};
+use super::process::ProcessTask;
+use super::textbook;
+use super::truth::{ImageError, Truth};
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::Access;
@@ -18,6 +20,100 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
+
+/// Frames to a coefficient file.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Convert {
+    /// The archive.
+    pub(super) frames: PathBuf,
+    /// How many of its frames.
+    pub(super) count: usize,
+    /// A name of [`super::plan::BASES`].
+    pub(super) basis: String,
+    /// A name of [`super::plan::BOUNDS`].
+    pub(super) bound: String,
+    pub(super) tolerance: f64,
+    pub(super) output: PathBuf,
+}
+
+/// What a conversion did.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Converted {
+    pub(super) seconds: f64,
+    pub(super) input_bytes: u64,
+    pub(super) file_bytes: u64,
+    pub(super) coefficients_per_sample: f64,
+    pub(super) outliers: u64,
+    /// Highest less lowest value.
+    pub(super) range: f64,
+    /// The voxel bound.
+    pub(super) delta: f64,
+}
+
+/// Two views of all frames.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Render {
+    /// The coefficient file, or the archive for the conventional method.
+    pub(super) input: PathBuf,
+    pub(super) way: Way,
+    /// How many frames.
+    pub(super) frames: usize,
+    pub(super) look: Look,
+    pub(super) splat_error: f64,
+    /// The file of the truth for the first view.
+    pub(super) truth: PathBuf,
+    /// Whether to render the first view once more for its certificate, not timed.
+    pub(super) certify: bool,
+}
+
+/// How pictures are made.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) enum Way {
+    Coefficients,
+    /// Footprints shared by 32 frames.
+    Shared,
+    /// A table of footprints, cut at so many standard deviations.
+    Textbook(f64),
+}
+
+/// What a rendering did.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Rendered {
+    /// From opening the input to the last picture of the first view.
+    pub(super) first_seconds: f64,
+    /// All pictures of another view.
+    pub(super) further_seconds: f64,
+    /// The splat method.
+    pub(super) splat: String,
+    /// What splatting may have added, as a share of the value range; unknown for the textbook form.
+    pub(super) stated_splat_error: Option<f64>,
+    /// Of the first view.
+    pub(super) error: ImageError,
+    /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
+    pub(super) certified_error: Option<f64>,
+    /// That in units of the largest true error of the same pictures.
+    pub(super) certificate_tightness: Option<f64>,
+    /// Compared pixels that are further off than certified.
+    pub(super) beyond_certificate: usize,
+}
+
+impl ProcessTask for Convert {
+    const NAME: &'static str = "convert";
+    type Measured = Converted;
+
+    fn measure(&self) -> Result<Converted> {
+        convert(self)
+    }
+}
+
+impl ProcessTask for Render {
+    const NAME: &'static str = "render";
+    type Measured = Rendered;
+
+    fn measure(&self) -> Result<Rendered> {
+        render(self)
+    }
+}
 
 /// The programs' default budget.
 pub(super) const MEMORY: usize = 512 << 20;
@@ -30,7 +126,7 @@ pub(super) fn open_frames(path: &Path, count: usize) -> Result<Box<dyn FrameSour
 }
 
 /// Converts as `wavesplat convert` does.
-pub(super) fn convert(step: &Convert) -> Result<Converted> {
+fn convert(step: &Convert) -> Result<Converted> {
     let unknown = || Error::usage(format!("bench-step: there is no {} or no {}", step.basis, step.bound));
     let basis = BASES.iter().find(|b| b.name == step.basis).ok_or_else(unknown)?;
     let bound = BOUNDS.iter().find(|b| b.name == step.bound).ok_or_else(unknown)?;
@@ -54,11 +150,11 @@ pub(super) fn convert(step: &Convert) -> Result<Converted> {
 }
 
 /// Renders two views, the first from opening the input on, and compares the first with the truth outside of its time.
-pub(super) fn render(step: &Render) -> Result<Rendered> {
+fn render(step: &Render) -> Result<Rendered> {
     let truth = File::open(&step.truth).map_err(|e| Error::io(&step.truth, "opening", e))?;
     let truth: Truth = serde_json::from_reader(BufReader::new(truth)).map_err(|e| bad_json(&step.truth, &e))?;
     let clock = Instant::now();
-    let mut method = Method::open(step)?;
+    let mut method = Renderer::open(step)?;
     let opening = clock.elapsed().as_secs_f64();
     let mut differences = Vec::new();
     let first = method.view(step, &step.look, &mut |frame, picture| {
@@ -80,7 +176,7 @@ pub(super) fn render(step: &Render) -> Result<Rendered> {
 }
 
 /// What renders views.
-enum Method {
+enum Renderer {
     Library(Box<dyn Scene>),
     Textbook(Box<dyn FrameSource>, f64),
 }
@@ -93,7 +189,7 @@ struct Viewed {
     stated_error: Option<f64>,
 }
 
-impl Method {
+impl Renderer {
     fn open(step: &Render) -> Result<Self> {
         let frames = || open_frames(&step.input, step.frames);
         Ok(match step.way {
@@ -114,7 +210,7 @@ impl Method {
     }
 }
 
-impl Method {
+impl Renderer {
     /// The certified and the true errors of the first view's compared pixels where pictures are certified, as shares of the
     /// value range; none of the textbook form.
     fn certified(&mut self, step: &Render, truth: &Truth) -> Result<Vec<(f64, f64)>> {

@@ -5,7 +5,7 @@
 //! Where voxels are in the picture is computed once a view. Voxels of value 0 add nothing and are passed over. All
 //! is f32. Frames are rendered in parallel, each by one thread. There is no attenuation: weights do not depend on depth.
 
-use super::look::{Look, SIGMA};
+use super::camera::{Look, SIGMA};
 use rayon::prelude::*;
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::Grid;

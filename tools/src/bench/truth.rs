@@ -3,7 +3,7 @@
 //! Written from the image model alone (the weighted mean along a ray, eq 12): nothing of the library's camera or
 //! splatting is used, and no trick that could be wrong.
 
-use super::look::{Look, SIGMA};
+use super::camera::{Look, SIGMA};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;

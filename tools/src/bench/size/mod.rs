@@ -10,23 +10,26 @@
 //! ```
 
 pub(super) mod clock;
-mod data;
-pub(super) mod own;
-pub(super) mod peers;
-mod row;
 mod schemes;
-mod tables;
+pub(super) mod own;
+mod row;
+pub(super) mod peers;
+mod data;
 mod targets;
+mod results;
+mod tables;
 
 pub use data::{Data, Subject};
 pub use peers::Peers;
-pub use row::{Own, Results, Row};
+pub use results::Results;
+pub use row::{Own, Row};
 pub use schemes::{BASELINE, SCHEMES, Scheme};
 pub use targets::Verdict;
 
+use super::json::bad_json;
 use super::machine::Made;
-use super::step::{Outcome, Step, in_process};
-use own::{Measured, Task};
+use super::process::in_process;
+use own::Task;
 use peers::PeersTask;
 use std::collections::HashSet;
 use std::fs;
@@ -140,8 +143,8 @@ fn by_scheme(config: &Config, data: &Data, scheme: &Scheme, tolerance: f64, file
         repeats: IN_A_ROW,
         output: file.into(),
     };
-    let outcome: Outcome<Measured> = in_process(&config.program, &Step::Size(task))?;
-    Ok(Row::of_own(data, tolerance, scheme.name, &outcome.did))
+    let outcome = in_process(&config.program, &task)?;
+    Ok(Row::of_scheme((&data.name, data.bytes), tolerance, scheme.name, &outcome.measured))
 }
 
 fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a> {
@@ -152,7 +155,7 @@ fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a
 
 fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {
     let json = folder.join("size.json");
-    let text = serde_json::to_string_pretty(results).map_err(|e| super::bad_json(&json, &e))?;
+    let text = serde_json::to_string_pretty(results).map_err(|e| bad_json(&json, &e))?;
     for (path, text) in [(json, text.as_str()), (folder.join("size.md"), tables)] {
         fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
     }

@@ -2,6 +2,7 @@
 
 use super::clock::{least, stay_on_one_core};
 use super::schemes;
+use crate::bench::process::ProcessTask;
 use crate::bench::stages::MEMORY;
 use memmap2::MmapMut;
 use serde::{Deserialize, Serialize};
@@ -59,8 +60,17 @@ pub(in crate::bench) struct Measured {
     pub(super) codes_seconds: f64,
 }
 
+impl ProcessTask for Task {
+    const NAME: &'static str = "size";
+    type Measured = Measured;
+
+    fn measure(&self) -> Result<Measured> {
+        measure(self)
+    }
+}
+
 /// Measures, and compares every sample.
-pub(in crate::bench) fn measure(task: &Task) -> Result<Measured> {
+fn measure(task: &Task) -> Result<Measured> {
     stay_on_one_core();
     let ((report, bytes), encode_seconds) = least(task.repeats, || encode(task))?;
     fs::write(&task.output, &bytes).map_err(|e| Error::io(&task.output, "writing", e))?;

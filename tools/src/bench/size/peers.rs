@@ -53,7 +53,7 @@ impl Peers {
     }
 
     fn line(&self, text: &str) -> Result<Line> {
-        serde_json::from_str(text).map_err(|e| crate::bench::bad_json(&self.script, &e))
+        serde_json::from_str(text).map_err(|e| crate::bench::json::bad_json(&self.script, &e))
     }
 
     /// What a script prints.

@@ -1,26 +1,7 @@
-//! What is recorded.
+//! The measurements of one coder.
 
-use super::data::Data;
 use super::own::Measured;
-use super::targets::Verdict;
-use crate::bench::machine::Made;
 use serde::{Deserialize, Serialize};
-
-/// All results of a run: `size.json`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Results {
-    /// By what, where and when.
-    #[serde(flatten)]
-    pub made: Made,
-    /// How many rounds were run, in each of which every time is taken [`super::IN_A_ROW`] times.
-    pub rounds: usize,
-    /// What was measured.
-    pub data: Vec<Data>,
-    /// Every coder on everything at every tolerance.
-    pub rows: Vec<Row>,
-    /// Which targets are met.
-    pub verdicts: Vec<Verdict>,
-}
 
 /// A coder on one archive at one tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,14 +48,14 @@ fn infinite_if_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D:
 }
 
 impl Row {
-    /// Of wavesplat.
-    pub(super) fn of_own(data: &Data, tolerance: f64, scheme: &str, measured: &Measured) -> Self {
+    /// A row of wavesplat, for data of this name and number of bytes.
+    pub(super) fn of_scheme(data: (&str, u64), tolerance: f64, scheme: &str, measured: &Measured) -> Self {
         Self {
-            data: data.name.clone(),
+            data: data.0.into(),
             tolerance,
             coder: scheme.into(),
             bytes: measured.bytes,
-            ratio: data.bytes as f64 / measured.bytes as f64,
+            ratio: data.1 as f64 / measured.bytes as f64,
             bound: measured.bound,
             largest_error: measured.largest_error,
             encode_seconds: measured.encode_seconds,

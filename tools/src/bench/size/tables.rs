@@ -1,6 +1,7 @@
 //! The tables for people, in Markdown.
 
-use super::row::{Results, Row};
+use super::results::Results;
+use super::row::Row;
 use super::schemes::{BASELINE, SCHEMES};
 use super::targets::{TARGETS, Verdict};
 use crate::bench::machine::Made;

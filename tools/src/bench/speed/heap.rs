@@ -1,9 +1,9 @@
 //! Memory: what conversion takes of archives of different sizes.
 
+use super::archives::{Bench, Subject};
 use super::convert::{Conversion, Scheme};
-use super::rows::{Row, Value, Wanted};
+use super::results::{Row, Value, Wanted};
 use super::work::{Task, Work};
-use super::{Bench, Subject};
 use crate::bench::stages::MEMORY;
 use crate::synth::Kind;
 use wavesplat::base::error::Result;

@@ -87,6 +87,11 @@ impl Measured {
     }
 }
 
+/// The time of a view with its input open.
+pub(super) fn further(view: &Measured) -> Time {
+    view.further.unwrap_or(view.time)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

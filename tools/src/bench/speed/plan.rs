@@ -3,7 +3,7 @@
 use super::convert::{Conversion, Scheme};
 use super::view::{Method, View};
 use super::work::{Task, Work};
-use crate::bench::look::{Look, compared_frames};
+use crate::bench::camera::{Look, compared_frames};
 use crate::bench::size::Data;
 use std::path::{Path, PathBuf};
 use wavesplat::render::default_splat_error;

@@ -1,9 +1,8 @@
 //! The tables for people, in Markdown.
 
-use super::measured::Measured;
+use super::measured::{Measured, Time, further};
 use super::plan::{FINEST, LOOSER, WHOLE};
-use super::rows::{Row, further};
-use super::{Archive, Results};
+use super::results::{Archive, Results, Row};
 use crate::bench::machine::Made;
 use std::fmt::Write as _;
 
@@ -203,7 +202,7 @@ fn times(results: &Results) -> String {
     text += "|---|---|--:|--:|--:|--:|--:|---|--:|\n";
     for (data, key, m) in results.archives.iter().flat_map(|a| a.measured.iter().map(|(k, m)| (&a.data.name, k, m))) {
         if m.time.wall > 0.0 {
-            let two = |t: super::Time| format!("{:.4} | {:.4}", t.processor, t.wall);
+            let two = |t: Time| format!("{:.4} | {:.4}", t.processor, t.wall);
             let further = m.further.map_or(" | ".into(), two);
             let share = m.splatting.map_or(String::new(), |s| format!("{:.0} %", 100.0 * s));
             let method = m.method.as_deref().unwrap_or_default();

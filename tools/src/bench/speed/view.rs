@@ -2,7 +2,7 @@
 
 use super::cold;
 use super::measured::{Measured, Stopwatch, Time};
-use crate::bench::look::{Look, SIGMA};
+use crate::bench::camera::{Look, SIGMA};
 use crate::bench::plan::TEXTBOOK_CUT;
 use crate::bench::stages::MEMORY;
 use crate::bench::textbook;

@@ -1,69 +1,9 @@
-//! What is to be how fast, and what was measured.
+//! Compares the measurements of an archive with the targets.
 
-use super::Archive;
 use super::convert::Scheme;
-use super::measured::{Measured, Time};
+use super::measured::{Measured, further};
 use super::plan::{Coded, Plan, key};
-use serde::{Deserialize, Serialize};
-
-/// A number that is to be reached, and what was.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// What is compared.
-    pub target: String,
-    /// The name of the archive.
-    pub data: String,
-    /// The file, the spacing and the number of threads.
-    pub case: String,
-    /// What was reached; none: not measured.
-    pub value: Option<f64>,
-    /// What is wanted, in words; none: nothing, it stands beside what is.
-    pub wanted: Option<String>,
-    /// Whether it was reached, where both are there.
-    pub met: Option<bool>,
-    /// Which method it was, or why nothing was measured.
-    pub note: String,
-}
-
-/// Which values are good.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Wanted {
-    AtLeast(f64),
-    AtMost(f64),
-}
-
-impl Wanted {
-    fn met(self, value: f64) -> bool {
-        match self {
-            Self::AtLeast(limit) => value >= limit,
-            Self::AtMost(limit) => value <= limit,
-        }
-    }
-
-    fn words(self) -> String {
-        match self {
-            Self::AtLeast(limit) => format!(">= {limit}"),
-            Self::AtMost(limit) if limit < 0.01 => format!("<= {limit:e}"),
-            Self::AtMost(limit) => format!("<= {limit}"),
-        }
-    }
-}
-
-/// A value, with a word on it; or why there is none.
-pub(super) type Value = Result<(f64, String), String>;
-
-impl Row {
-    pub(super) fn new(target: &str, data: &str, case: String, value: Value, wanted: Option<Wanted>) -> Self {
-        let finite = value.and_then(|(v, note)| if v.is_finite() { Ok((v, note)) } else { Err(format!("{v}")) });
-        let (value, note) = match finite {
-            Ok((value, note)) => (Some(value), note),
-            Err(why) => (None, why),
-        };
-        let met = value.zip(wanted).map(|(v, w)| w.met(v));
-        let wanted = wanted.map(Wanted::words);
-        Self { target: target.into(), data: data.into(), case, value, wanted, met, note }
-    }
-}
+use super::results::{Archive, Row, Value, Wanted};
 
 /// The files, spacings and numbers of threads of an archive, and what was found of them.
 pub(super) struct Judge<'a> {
@@ -321,9 +261,4 @@ impl Judge<'_> {
         let wall = |threads| self.at(&key("convert", Some(file), None, threads)).map(|m| m.time.wall).map_err(why);
         Ok((wall(1)? / wall(2)?, "wall time".into()))
     }
-}
-
-/// The time of a view with its input open.
-pub(super) fn further(view: &Measured) -> Time {
-    view.further.unwrap_or(view.time)
 }
