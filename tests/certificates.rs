@@ -277,7 +277,7 @@ fn masked_within_the_cut() -> Trial {
 }
 
 #[test]
-fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
+fn the_rest_of_a_masked_pixel_is_certified_or_background() {
     let trial = masked_within_the_cut();
     for tau in [0.0, 0.05] {
         let view = View { scale: Some(11.0), center: Some([-12.6, 20.0, 0.0]), ..view(0.0, 0.0, [24, 3]) };
@@ -298,7 +298,7 @@ fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
 }
 
 #[test]
-fn what_cannot_be_certified_is_infinitely_uncertain() {
+fn pixels_without_a_certificate_have_infinite_errors() {
     let grid = Grid { origin: [1e16, 0.0, 0.0], ..Grid::unit([2, 2, 2]) };
     let trial =
         Trial::new("far away", archive(grid, SampleType::F64, &field(&grid, 2, 1)), settings(Basis::Haar, 2, 0.1));

@@ -209,7 +209,7 @@ fn check_all(limits: &Limits, count: u64) {
 }
 
 #[test]
-fn pictures_of_random_scenes_are_within_what_is_promised() {
+fn pictures_of_random_scenes_are_within_their_bounds() {
     let limits = Limits { sigma: (0.02, 4.0), scale: (0.1, 8.0), moved: true, tau: 30.0 };
     check_all(&limits, 3000);
 }
