@@ -1,8 +1,8 @@
 //! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
 
-use super::camera::{Look, SIGMA};
+use super::camera::{CameraSettings, SIGMA};
 use super::json::bad_json;
-use super::machine::Made;
+use super::machine::Provenance;
 use super::process::{ProcessTask, in_process};
 use super::size::Data;
 use super::stages::MEMORY;
@@ -52,7 +52,7 @@ pub struct Config {
 pub struct Results {
     /// By what, where and when.
     #[serde(flatten)]
-    pub made: Made,
+    pub made: Provenance,
     /// What was measured.
     pub data: Vec<Data>,
     /// Every archive at every tolerance by both measures, after the whole file.
@@ -82,7 +82,7 @@ pub struct Row {
     pub rms: f64,
 }
 
-/// One archive, measured in a process of its own.
+/// The settings of one archive's measurement, which runs in its own process.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Task {
     name: String,
@@ -108,7 +108,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
         let task = Task { name, source, dims, frames, range, tolerances, file };
         rows.extend(in_process(&config.program, &task)?.measured);
     }
-    let results = Results { made: Made::here(SCHEMA, config.date.as_ref()), data, rows };
+    let results = Results { made: Provenance::here(SCHEMA, config.date.as_ref()), data, rows };
     let text = markdown(&results);
     let json = config.output.join("layers.json");
     let numbers = serde_json::to_string_pretty(&results).map_err(|e| bad_json(&json, &e))?;
@@ -154,7 +154,7 @@ fn measure(task: &Task) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// All pictures of a view, and the report of the fastest time; the truth is rendered once.
+/// Renders all pictures of a view. Returns them and the report of the fastest run; the reference is rendered once.
 fn pictures(
     scene: &mut dyn Scene,
     task: &Task,
@@ -162,7 +162,7 @@ fn pictures(
     allowed: Option<(f64, Limit)>,
 ) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        views: vec![Look::first(task.dims, SIZE).view()],
+        views: vec![CameraSettings::first(task.dims, SIZE).view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: (0..task.frames).collect(),
@@ -223,7 +223,7 @@ const TITLES: &str = "\
 ";
 
 fn markdown(results: &Results) -> String {
-    let Made { machine, version, date, .. } = &results.made;
+    let Provenance { machine, version, date, .. } = &results.made;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let made = format!("wavesplat {version}, {} threads of {cpu}, {}, {date}", machine.cores, machine.system);
     let mut text = format!("# What a looser tolerance leaves unread\n\n{made}.\n\n{HEAD}\n{TITLES}");

@@ -1,22 +1,29 @@
-//! The benchmark: what a picture costs in time at which error, beside the conventional method.
+//! The benchmark: time and error of pictures, compared with the conventional method.
 //!
 //! ```text
-//! plan      which groups of contenders are measured side by side
-//! look      from where pictures are taken, and which of their pixels are compared
-//! truth     those pixels by brute force
-//! step      one measured stage in a process of its own: conversion, or rendering of two views
-//!   stages    ... by the library: conversion, coefficients, the conventional method with shared footprints
-//!   textbook  ... the conventional method's textbook form
-//! measure   a group: stages in turns (A B A B ...), and the check of every sample
-//! point     what is recorded
-//! journal   finished points on disk, so that a run can be interrupted
-//! sanity    what must hold of every point, on any machine
-//! machine   where it ran, and when
-//! report    results.json and results.md;  plot, chart: the figures
-//! size      another benchmark: sizes under a hard bound, and times, beside other coders
-//! layers    another: what a looser tolerance of a picture leaves unread, and the errors
-//! speed     another: views from files beside the conventional method, and what they are to reach
+//! chart      figures with logarithmic axes
+//! json       errors of JSON
+//! machine    where and when a run took place
+//! plan       the groups of contenders that are measured together
+//! camera     the views, and the pixels and frames that are compared with the reference
+//! settings   the settings of a run
+//! reference  the compared pixels by brute force
+//! textbook   the textbook form of the conventional method
+//! point      the recorded measurements
+//! journal    finished points on disk, so that a run can be interrupted
+//! sanity     what must hold of every point, on any machine
+//! process    runs a measurement in its own process
+//! stages     the measured stages: conversion, and rendering of two views
+//! measure    measures a group: stages in turns (A B A B ...), and the check of every sample
+//! report     results.json and results.md
+//! plot       the figures
+//! size       another benchmark: sizes under a hard bound, and times, compared with other coders
+//! layers     another: the bytes that a looser tolerance of a picture skips, and the errors
+//! speed      another: views from files compared with the conventional method, and the targets
+//! step       the command `bench-step`
 //! ```
+//!
+//! The modules are listed in the order of their layers: each uses only earlier ones (`tests/layering.rs`).
 //!
 //! Errors are shares of the archive's value range throughout.
 
@@ -26,7 +33,7 @@ mod machine;
 pub mod plan;
 mod camera;
 mod settings;
-mod truth;
+mod reference;
 mod textbook;
 pub mod point;
 mod journal;
@@ -50,7 +57,7 @@ use point::Results;
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 
-/// Measures what is not measured yet and writes all results; `say` hears what is going on.
+/// Measures the points that are not measured yet and writes all results. Reports progress through `say`.
 pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<Results> {
     config.sweep.check()?;
     std::fs::create_dir_all(&config.output).map_err(|e| Error::io(&config.output, "creating the folder", e))?;

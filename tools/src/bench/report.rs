@@ -11,7 +11,7 @@ use wavesplat::base::error::{Error, Result};
 const HEAD: &str = "\
 Every stage ran in a process of its own, the contenders of a group in turns. Errors are shares of the value range.
 Pictures of other bounds than the first are rendered once, for their errors.
-*textbook*: a table of 32 x 32 footprints, one look-up for each voxel and frame. *shared*: the conventional method with
+*textbook*: a table of 32 x 32 footprints, one camera-up for each voxel and frame. *shared*: the conventional method with
 footprints shared by 32 frames. *first*: from opening the input; *further*: another view. Milliseconds for each frame, the
 median and in brackets the least. Memory is the peak of the process, pages of mapped files included. Image errors are
 against brute force, at every fifth pixel along each axis of four frames of the first view. In the figure of times,
@@ -65,7 +65,7 @@ const RENDER_HEAD: &str = "\
 |---|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
-/// A line for each of some points; `all` holds those they were measured with.
+/// A line for each of these points; `all` holds the points measured together with them.
 fn rows<'a>(points: impl Iterator<Item = &'a Point>, all: &[Point]) -> String {
     points.map(|point| rendered(point, all)).collect()
 }

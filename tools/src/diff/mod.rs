@@ -6,7 +6,7 @@ pub mod measure;
 mod report;
 mod ssim;
 
-pub use report::{Figures, HeatMap, Place, Report, Worst};
+pub use report::{HeatMap, PixelPosition, Report, Statistics, WorstFrame};
 
 use load::{Shape, Stack};
 use measure::Differences;
@@ -157,10 +157,11 @@ fn measure_all(args: &Args, a: &Stack, b: &Stack) -> Result<Report> {
         worst = worst.filter(|(_, before, _)| !is_worse(&found, before)).or(Some((frame, found, ssim)));
     }
     let ssim = (similar.1 > 0).then(|| similar.0 / similar.1 as f64);
-    let worst = worst
-        .filter(|_| shape.frames > 1)
-        .map(|(frame, found, ssim)| Worst { frame, figures: Figures::of(&found, frame, &shape, scope.peak, ssim) });
-    let figures = Figures::of(&all, 0, &shape, scope.peak, ssim);
+    let worst = worst.filter(|_| shape.frames > 1).map(|(frame, found, ssim)| WorstFrame {
+        frame,
+        figures: Statistics::of(&found, frame, &shape, scope.peak, ssim),
+    });
+    let figures = Statistics::of(&all, 0, &shape, scope.peak, ssim);
     Ok(report_of(args, &shape, scope.peak, figures, worst))
 }
 
@@ -174,7 +175,7 @@ fn is_worse(found: &Differences, before: &Differences) -> bool {
     key(found) > key(before)
 }
 
-fn report_of(args: &Args, shape: &Shape, peak: f64, all: Figures, worst: Option<Worst>) -> Report {
+fn report_of(args: &Args, shape: &Shape, peak: f64, all: Statistics, worst: Option<WorstFrame>) -> Report {
     Report {
         schema: 1,
         a: args.a.clone(),

@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tiles::{Look, Tile, short};
+use tiles::{SampleStyle, Tile, short};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::Access;
 use wavesplat::base::output::Output;
@@ -155,10 +155,10 @@ impl Gallery {
     }
 
     /// What suits the samples, by the largest ones that rays meet.
-    fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<Look> {
+    fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<SampleStyle> {
         let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
         let (largest, _) = pictures(scene, &mip)?;
-        Ok(Look::new(file.metadata().range(), &largest, scene.grid()))
+        Ok(SampleStyle::new(file.metadata().range(), &largest, scene.grid()))
     }
 
     fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {

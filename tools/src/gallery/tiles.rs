@@ -28,7 +28,7 @@ const SHELLS_OF_BOTH: &str = "0:0.9,0.2:0,0.3:0.5,0.4:0,0.6:0,0.7:0.5,0.8:0,1:0.
 const BOTH_ENDS: &str = "0:1,0.5:0,1:1";
 
 /// What suits the samples of an archive.
-pub(super) struct Look {
+pub(super) struct SampleStyle {
     /// Whether there are values on both sides of 0.
     both_signs: bool,
     /// The values of the first and the last colour of samples.
@@ -47,7 +47,7 @@ pub(super) struct Tile {
     norm: Norm,
 }
 
-impl Look {
+impl SampleStyle {
     /// For samples of a range, of which rays meet the `largest`.
     pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
@@ -155,8 +155,8 @@ fn spread(values: &[f32], share: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    fn look(range: (f64, f64), largest: &[f32]) -> Look {
-        Look::new(range, largest, &Grid::unit([9, 8, 4]))
+    fn look(range: (f64, f64), largest: &[f32]) -> SampleStyle {
+        SampleStyle::new(range, largest, &Grid::unit([9, 8, 4]))
     }
 
     #[test]

@@ -3,21 +3,21 @@
 use super::data::Data;
 use super::row::Row;
 use super::targets::Verdict;
-use crate::bench::machine::Made;
+use crate::bench::machine::Provenance;
 use serde::{Deserialize, Serialize};
 
 /// All results of a run: `size.json`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Results {
-    /// By what, where and when.
+    /// The program, the machine and the date.
     #[serde(flatten)]
-    pub made: Made,
+    pub made: Provenance,
     /// Number of rounds. Each round takes every time several times in a row.
     pub rounds: usize,
-    /// What was measured.
+    /// The measured archives.
     pub data: Vec<Data>,
-    /// Every coder on everything at every tolerance.
+    /// Every coder on every archive at every tolerance.
     pub rows: Vec<Row>,
-    /// Which targets are met.
+    /// The targets that are met and missed.
     pub verdicts: Vec<Verdict>,
 }

@@ -4,7 +4,7 @@ use super::results::Results;
 use super::row::Row;
 use super::schemes::{BASELINE, SCHEMES};
 use super::targets::{TARGETS, Verdict};
-use crate::bench::machine::Made;
+use crate::bench::machine::Provenance;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
@@ -30,7 +30,7 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { made: Made { machine, version, date, .. }, rounds, .. } = results;
+    let Results { made: Provenance { machine, version, date, .. }, rounds, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let mut text =
         format!("wavesplat {version} on one core of {cpu}, {}, {date}; {rounds} round(s).\n", machine.system);

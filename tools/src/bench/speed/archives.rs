@@ -1,7 +1,7 @@
 //! The archives of a run, and the measurements of one.
 
 use super::convert::Scheme;
-use super::evaluation::Judge;
+use super::evaluation::Evaluation;
 use super::measured::Measured;
 use super::peers;
 use super::plan::{Coded, Plan, Tasks};
@@ -22,14 +22,14 @@ use wavesplat::base::sample::SampleType;
 /// An archive of the user, or one to make.
 pub(super) enum Subject {
     Given(PathBuf),
-    Made(Kind, [usize; 4]),
+    Synthetic(Kind, [usize; 4]),
 }
 
 impl Subject {
     pub(super) fn path(&self, work: &Path) -> PathBuf {
         match self {
             Self::Given(path) => path.clone(),
-            Self::Made(kind, [x, y, z, t]) => {
+            Self::Synthetic(kind, [x, y, z, t]) => {
                 let kind = kind.to_possible_value().map_or(String::new(), |v| v.get_name().into());
                 work.join(format!("{kind}-{x}x{y}x{z}x{t}.npy"))
             }
@@ -38,7 +38,7 @@ impl Subject {
 
     pub(super) fn data(&self, work: &Path, say: &mut dyn FnMut(&str)) -> Result<Data> {
         let path = self.path(work);
-        if let Self::Made(kind, dims) = self {
+        if let Self::Synthetic(kind, dims) = self {
             say(&format!("making {}", path.display()));
             synthetic(*kind, *dims, &path)?;
         }
@@ -47,7 +47,7 @@ impl Subject {
 
     pub(super) fn remove(&self, work: &Path) -> Result<()> {
         let path = self.path(work);
-        let made = matches!(self, Self::Made(..));
+        let made = matches!(self, Self::Synthetic(..));
         if made { fs::remove_file(&path).map_err(|e| Error::io(&path, "removing", e)) } else { Ok(()) }
     }
 }
@@ -65,11 +65,11 @@ pub(super) struct Bench<'a> {
 impl Bench<'_> {
     pub(super) fn subjects(&self) -> Vec<Subject> {
         let Config { inputs, kinds, dims, .. } = self.config;
-        let made = dims.iter().flat_map(|dims| kinds.iter().map(|kind| Subject::Made(*kind, *dims)));
+        let made = dims.iter().flat_map(|dims| kinds.iter().map(|kind| Subject::Synthetic(*kind, *dims)));
         inputs.iter().cloned().map(Subject::Given).chain(made).collect()
     }
 
-    /// Everything about one archive, and how it is judged.
+    /// Measures everything about one archive, and compares it with the targets.
     pub(super) fn archive(&self, data: &Data, say: &mut dyn FnMut(&str)) -> Result<(Archive, Vec<Row>)> {
         let Config { tolerances, spacings, threads, size, .. } = self.config;
         let of = |scheme| tolerances.iter().map(move |tolerance| Coded { scheme, tolerance: *tolerance });
@@ -78,7 +78,7 @@ impl Bench<'_> {
         let missing = plan.without_textbook().into_iter().collect();
         let mut found = Archive { data: data.clone(), measured: BTreeMap::new(), missing };
         self.measure(&plan.tasks(), &mut found.measured, say)?;
-        let cold = plan.cold(|spacing, threads| Judge { plan: &plan, found: &found }.best(spacing, threads));
+        let cold = plan.cold(|spacing, threads| Evaluation { plan: &plan, found: &found }.best(spacing, threads));
         self.measure(&cold, &mut found.measured, say)?;
         self.measure(&plan.curves(), &mut found.measured, say)?;
         for (key, task) in &plan.comparisons() {
@@ -86,7 +86,7 @@ impl Bench<'_> {
             found.measured.insert(key.clone(), self.one(task)?);
         }
         peers::add(self.config, &plan, &mut found, say)?;
-        let rows = Judge { plan: &plan, found: &found }.rows();
+        let rows = Evaluation { plan: &plan, found: &found }.rows();
         Ok((found, rows))
     }
 

@@ -1,17 +1,21 @@
-//! The benchmark of speed: every picture of a view from a coefficient file, beside the conventional method.
+//! The benchmark of speed: all pictures of a view from a coefficient file, compared with the conventional method.
 //!
 //! ```text
-//! plan      what is measured of an archive
-//! work      one measurement in a process of its own
-//!   convert   frames to files
-//!   decode    files to codes, and to bare payloads
-//!   view      files or frames to pictures, and pictures against pictures
-//!   cold      with an empty cache;  the heap's peak
-//! measured  what a process measured, and the least of several
-//! peers     the same of other programs, by scripts in `tools/peers`
-//! rows      what is to be how fast, beside what was measured
-//! heap      rows of memory;  paper: rows of the paper's table 1
-//! tables    speed.md for people
+//! measured    the measurements of a process, and the least of several
+//! cold        empties the cache;  the heap's peak
+//! convert     frames to files
+//! decode      files to codes, and to bare payloads
+//! view        files or frames to pictures, and pictures compared with pictures
+//! work        one of these measurements in its own process
+//! plan        the measurements of an archive
+//! results     the recorded results
+//! evaluation  rows that compare measurements with targets
+//! tables      speed.md
+//! settings    the settings of a run
+//! peers       the same measurements of other programs, by scripts in `tools/peers`
+//! archives    the archives of a run, and all measurements of one
+//! heap        rows about memory
+//! paper       rows of the paper's table 1
 //! ```
 
 mod measured;
@@ -41,8 +45,8 @@ use std::fs;
 use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 
-/// Measures everything and writes `speed.json` and `speed.md`; returns the results and the tables. `say` hears what is
-/// going on.
+/// Measures everything and writes `speed.json` and `speed.md`. Returns the results and the tables; reports progress
+/// through `say`.
 pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, String)> {
     let counts = [config.repeats, config.tolerances.len(), config.spacings.len(), config.threads.len()];
     if counts.contains(&0) || config.threads.contains(&0) {

@@ -6,7 +6,7 @@ use super::measured::{Measured, further};
 use super::results::Row;
 use super::view::{Method, View};
 use super::work::{Task, Work};
-use crate::bench::camera::Look;
+use crate::bench::camera::CameraSettings;
 use crate::bench::size::{Data, Subject};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -65,7 +65,7 @@ impl Bench<'_> {
         View {
             input,
             method,
-            look: Look::first(data.dims, self.config.size),
+            camera: CameraSettings::first(data.dims, self.config.size),
             splat_error: TOLERANCE / 10.0,
             frames: (0..data.frames).collect(),
             region: None,

@@ -1,7 +1,7 @@
 //! The results of a run: measurements by archive, and rows that compare them with targets.
 
 use super::measured::Measured;
-use crate::bench::machine::Made;
+use crate::bench::machine::Provenance;
 use crate::bench::size::Data;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ pub const SCHEMA: u32 = 1;
 pub struct Results {
     /// By what, where and when.
     #[serde(flatten)]
-    pub made: Made,
+    pub made: Provenance,
     /// How many rounds were run.
     pub rounds: usize,
     /// Pixels a side of a picture.
@@ -59,12 +59,12 @@ pub struct Row {
 
 /// Which values are good.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Wanted {
+pub(super) enum Threshold {
     AtLeast(f64),
     AtMost(f64),
 }
 
-impl Wanted {
+impl Threshold {
     fn met(self, value: f64) -> bool {
         match self {
             Self::AtLeast(limit) => value >= limit,
@@ -85,14 +85,14 @@ impl Wanted {
 pub(super) type Value = Result<(f64, String), String>;
 
 impl Row {
-    pub(super) fn new(target: &str, data: &str, case: String, value: Value, wanted: Option<Wanted>) -> Self {
+    pub(super) fn new(target: &str, data: &str, case: String, value: Value, wanted: Option<Threshold>) -> Self {
         let finite = value.and_then(|(v, note)| if v.is_finite() { Ok((v, note)) } else { Err(format!("{v}")) });
         let (value, note) = match finite {
             Ok((value, note)) => (Some(value), note),
             Err(why) => (None, why),
         };
         let met = value.zip(wanted).map(|(v, w)| w.met(v));
-        let wanted = wanted.map(Wanted::words);
+        let wanted = wanted.map(Threshold::words);
         Self { target: target.into(), data: data.into(), case, value, wanted, met, note }
     }
 }
@@ -100,7 +100,14 @@ impl Row {
 impl Results {
     /// Nothing yet.
     pub(super) fn new(date: Option<&String>, rounds: usize, size: usize) -> Self {
-        Self { made: Made::here(SCHEMA, date), rounds, size, archives: Vec::new(), left: Vec::new(), rows: Vec::new() }
+        Self {
+            made: Provenance::here(SCHEMA, date),
+            rounds,
+            size,
+            archives: Vec::new(),
+            left: Vec::new(),
+            rows: Vec::new(),
+        }
     }
 
     /// Puts the rows of an archive after those of the archives before.

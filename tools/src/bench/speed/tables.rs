@@ -3,7 +3,7 @@
 use super::measured::{Measured, Time, further};
 use super::plan::{FINEST, LOOSER, WHOLE};
 use super::results::{Archive, Results, Row};
-use crate::bench::machine::Made;
+use crate::bench::machine::Provenance;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
@@ -32,7 +32,7 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { made: Made { machine, version, date, .. }, rounds, size, .. } = results;
+    let Results { made: Provenance { machine, version, date, .. }, rounds, size, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let mut text =
         format!("wavesplat {version} on {cpu}, {}, {date}; {rounds} round(s), {size}x{size} pixels.\n", machine.system);

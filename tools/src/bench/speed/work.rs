@@ -23,7 +23,7 @@ pub(in crate::bench) struct Task {
 pub(super) enum Work {
     /// Frames to a file.
     Convert(Conversion),
-    /// The same, with a look at memory every few milliseconds.
+    /// The same, with memory sampled every few milliseconds.
     Heap(Conversion),
     /// A file from its first byte to its last.
     Read(PathBuf),
