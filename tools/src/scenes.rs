@@ -1,4 +1,4 @@
-//! What the demo and the gallery have in common: archives to files, and scenes to pictures.
+//! Shared by demo and gallery: converts archives to files, and renders scenes to pictures.
 
 use std::path::Path;
 use wavesplat::base::error::Result;
@@ -15,7 +15,7 @@ use wavesplat::view::footprint::Kernel;
 /// Bytes that a conversion or a rendering may allocate.
 pub(crate) const MEMORY: usize = 512 << 20;
 
-/// What the programs' functions want of options, where there are none.
+/// Default options for the programs' functions.
 pub(crate) fn quietly() -> CommonArgs {
     CommonArgs {
         config: None,

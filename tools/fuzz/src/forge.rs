@@ -1,5 +1,5 @@
-//! A sound file taken apart, changed, and put together again with lengths, places, sums and checksums that fit, so that
-//! changes reach what lies behind the checks. Written from `format/FORMAT.md`, apart from the format's own code.
+//! Takes a valid file apart, changes it, and reassembles it with updated lengths, offsets, sums and checksums, so that
+//! changes reach the code behind the checks. Written from `format/FORMAT.md`, independent of the format's own code.
 
 use super::input::Input;
 use std::cell::RefCell;
@@ -10,25 +10,25 @@ const HEADER: usize = 128;
 const FRAME: usize = 24;
 const ENTRY: usize = 64;
 const PART: usize = 56;
-/// What the blocks of a window add up to.
+/// The totals of a window's blocks.
 const SUMS: usize = 64;
 
-/// What of a file is changed. All but the first is what the file says, before sums and checksums are made of it.
+/// What is changed in a file. All but the first are fields of the file, before sums and checksums are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum EditTarget {
-    /// Parts of a block: left out or doubled.
+    /// Parts of a block: omitted or duplicated.
     Parts,
     Header,
-    /// What start and metadata begin with alike: grid, type, blocks, channels.
+    /// The fields with which both start and metadata begin: grid, type, blocks, channels.
     Grid,
     Start,
-    /// A block's entry, before and after its places, lengths and checksums are filled in.
+    /// A block's entry, before and after its offsets, lengths and checksums are filled in.
     Entry,
     Placed,
-    /// What a part holds.
+    /// The payload of a part.
     Payload,
     Leaf,
-    /// A window's record, in its section and in the metadata; and what its end says, in both.
+    /// A window's record, in its section and in the metadata; and its totals, in both.
     Window,
     End,
     Metadata,
@@ -36,7 +36,7 @@ enum EditTarget {
     Root,
     Footer,
     Frame,
-    /// The bytes of a part as they are stored.
+    /// The stored bytes of a part.
     Stored,
 }
 
@@ -58,7 +58,7 @@ const PLACES: [EditTarget; 15] = [
     EditTarget::Stored,
 ];
 
-/// One change: of the bytes at `at` of the place with this number (counted as the file is written, modulo 256).
+/// One change: of the bytes at `at` of the target with this number (counted as the file is written, modulo 256).
 #[derive(Debug, Clone)]
 pub struct Edit<'a> {
     place: EditTarget,
@@ -69,7 +69,7 @@ pub struct Edit<'a> {
     bytes: &'a [u8],
 }
 
-/// The changes that an input asks for: at most 32, of 6 bytes or more each.
+/// The changes that an input describes: at most 32, of at least 6 bytes each.
 pub fn edits<'a>(input: &mut Input<'a>) -> Vec<Edit<'a>> {
     let mut edits = Vec::new();
     while !input.is_empty() && edits.len() < 32 {
@@ -111,7 +111,7 @@ fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
     bytes.iter_mut().skip(at).zip(value).for_each(|(to, from)| *to = *from);
 }
 
-/// A piece of a file, without what follows from others.
+/// A piece of a file, without values that are computed from other pieces.
 #[derive(Debug, Clone)]
 enum Piece {
     Start(Vec<u8>),
@@ -122,7 +122,7 @@ enum Piece {
     Metadata(Vec<u8>),
 }
 
-/// A sound file in pieces.
+/// A valid file in pieces.
 #[derive(Debug, Clone)]
 pub struct Seed {
     header: Vec<u8>,
@@ -130,7 +130,7 @@ pub struct Seed {
 }
 
 impl Seed {
-    /// Takes a file apart, which must be sound and without times.
+    /// Takes apart a file, which must be valid and without times.
     pub fn new(file: &[u8]) -> Self {
         let reader = Reader::open(file).expect("a sound seed");
         let leaves = (0..reader.metadata().windows.len() as u32).flat_map(|window| reader.leaves(window));
@@ -159,7 +159,7 @@ impl Seed {
         Self { header: file[..HEADER - 8].to_vec(), pieces }
     }
 
-    /// The file with changes.
+    /// The file with the changes.
     pub fn forge(&self, edits: &[Edit<'_>]) -> Vec<u8> {
         let mut forge = Forge { edits, ..Forge::default() };
         let mut header = self.header.clone();
@@ -173,27 +173,27 @@ impl Seed {
     }
 }
 
-/// A file that is being put together.
+/// A file that is being reassembled.
 #[derive(Default)]
 struct Forge<'a> {
     edits: &'a [Edit<'a>],
-    /// How many of each place there were.
+    /// How many of each target occurred.
     counts: [usize; PLACES.len()],
     id: [u8; 16],
     out: Vec<u8>,
-    /// The leaf's entries so far, and where its first block is.
+    /// The leaf's entries so far, and the offset of its first block.
     entries: Vec<Vec<u8>>,
     data_offset: u64,
     /// The root so far, and the blocks of all leaves.
     root: Vec<u8>,
     blocks: u64,
-    /// Codes and outliers of the window.
+    /// Numbers of codes and outliers in the window.
     coded: u64,
     outliers: u64,
-    /// The window's number, and how it begins: as it was, and as it is now.
+    /// The window's number and record, before and after the changes.
     number: [u8; 4],
     begun: [Vec<u8>; 2],
-    /// Each window as it was, and as it is now.
+    /// Each window before and after the changes.
     windows: Vec<(Vec<u8>, Vec<u8>)>,
     /// Offset, lengths and checksum, as in a footer.
     metadata: Vec<u8>,

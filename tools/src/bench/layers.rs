@@ -211,10 +211,10 @@ fn row(
 }
 
 const HEAD: &str = "\
-Files keep every sample within 1e-3 of the value range. *Tolerance* is a share of that range, too; all errors are shares
-of the largest absolute pixel, against pictures of the archive by the exact method: *certified* no pixel is further off
-(but for what the splat adds, 1e-5 of the range), *expected* is an estimate of *rms*, which is the true root mean square
-over all pixels and frames. Codes, bytes and time are shares of what the whole file takes.
+Files keep every sample within 1e-3 of the value range. *Tolerance* is a share of that range, too. All errors are shares
+of the largest absolute pixel, relative to pictures of the archive by the exact method. No pixel's error exceeds *certified*
+(plus the splat error, 1e-5 of the range). *Expected* is an estimate of *rms*, the true root mean square over all pixels and
+frames. Codes, bytes and time are shares of those for the whole file.
 ";
 
 const TITLES: &str = "\
@@ -226,7 +226,7 @@ fn markdown(results: &Results) -> String {
     let Provenance { machine, version, date, .. } = &results.made;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let made = format!("wavesplat {version}, {} threads of {cpu}, {}, {date}", machine.cores, machine.system);
-    let mut text = format!("# What a looser tolerance leaves unread\n\n{made}.\n\n{HEAD}\n{TITLES}");
+    let mut text = format!("# What a looser tolerance skips\n\n{made}.\n\n{HEAD}\n{TITLES}");
     for row in &results.rows {
         let Row { data, limit, codes, bytes, time, certified, expected, largest, rms } = row;
         let limit = limit.as_ref().map_or("whole file".into(), |(t, name)| format!("{t:e} {name}"));

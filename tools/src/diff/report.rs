@@ -1,4 +1,4 @@
-//! What is said of two stacks.
+//! The report about two stacks.
 
 use super::load::Shape;
 use super::measure::Differences;
@@ -7,14 +7,14 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Everything that was found; what `--json` prints. A change of a key's meaning changes `schema`.
+/// The whole report, as printed by `--json`. `schema` changes if the meaning of a key changes.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// 1.
     pub schema: u32,
-    /// What is compared.
+    /// The reference.
     pub a: PathBuf,
-    /// What it is compared with.
+    /// The pictures compared with it.
     pub b: PathBuf,
     /// The type of A's numbers.
     pub samples: &'static str,
@@ -26,18 +26,18 @@ pub struct Report {
     pub height: usize,
     /// Numbers a pixel.
     pub channels: usize,
-    /// What PSNR and SSIM take for the range of values: A's for floats, else that of the type.
+    /// The value range used for PSNR and SSIM: that of A's values for floats, otherwise that of the type.
     pub peak: f64,
-    /// Of all frames.
+    /// Statistics of all frames.
     pub all: Statistics,
-    /// Of the frame with the largest difference, the one with the larger sum of squares if several have it; none if there
-    /// is one frame only.
+    /// The frame with the largest difference, and of several the one with the largest sum of squares; none if there is
+    /// only one frame.
     pub worst: Option<WorstFrame>,
-    /// The picture that was drawn.
+    /// The heat map, if one was drawn.
     pub heat_map: Option<HeatMap>,
 }
 
-/// Numbers of one frame, or of all. Units are those of the files.
+/// Statistics of one frame, or of all, in the units of the files.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistics {
     /// Whether nothing differs.
@@ -69,12 +69,12 @@ pub struct Statistics {
 pub struct WorstFrame {
     /// Its number, from 0.
     pub frame: usize,
-    /// What was found in it.
+    /// Its statistics.
     #[serde(flatten)]
     pub figures: Statistics,
 }
 
-/// Where a number is; all count from 0, rows from the top.
+/// Position of a number. All indices count from 0, rows from the top.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct PixelPosition {
     /// Frame.
@@ -158,7 +158,7 @@ impl Statistics {
 }
 
 impl Report {
-    /// For people.
+    /// The report as text.
     pub fn text(&self) -> String {
         let Self { frames, width, height, channels, samples, .. } = self;
         let mut text = format!("{frames} frame(s) of {width}x{height} pixels, {channels} channel(s) of {samples}\n");
@@ -184,7 +184,7 @@ impl Report {
     }
 }
 
-/// A number with six digits, as short as can be.
+/// A number with at most six digits.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&size) && value.fract() == 0.0 {

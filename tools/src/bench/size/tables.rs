@@ -9,10 +9,10 @@ use std::fmt::Write as _;
 
 const HEAD: &str = "\
 Every coder keeps every sample within tolerance x value range; every sample was compared. Sizes are those of whole
-files. *3d*: each frame by itself; *4d*: the whole series as one array. Times are seconds of one core, the least of all
-rounds, every conversion and decoding of wavesplat in a process of its own, in turns with the peers: *convert* from
-samples to bytes in memory, *values* back to samples in one array, *codes* to codes that are ready to be splatted.
-✗ marks a target that is missed, or a bound, be it by rounding alone.
+files. *3d*: each frame separately; *4d*: the whole series as one array. Times are seconds of one core, the least of all
+rounds. Every conversion and decoding of wavesplat ran in its own process, in turns with the peers: *convert* from
+samples to bytes in memory, *values* back to samples in one array, *codes* to codes that are ready for splatting.
+✗ marks a missed target, or a missed bound, even if only by rounding.
 ";
 
 /// The mark of what is missed.
@@ -20,7 +20,7 @@ const MISSED: &str = " ✗";
 
 pub(super) fn markdown(results: &Results) -> String {
     let coders = coders(&results.rows);
-    let mut text = format!("# Sizes and times beside other coders\n\n{}\n\n{HEAD}", made(results));
+    let mut text = format!("# Sizes and times compared with other coders\n\n{}\n\n{HEAD}", made(results));
     text += &targets(results);
     text += &section("Compression ratio", results, &coders, |row| format!("{:.1}", row.ratio));
     let of_bound = |row: &Row| format!("{:.4}{}", share(row), if row.holds() { "" } else { MISSED });
