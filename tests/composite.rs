@@ -194,7 +194,7 @@ fn scene_with_a_wall(grid: &Grid) -> Vec<f64> {
 }
 
 #[test]
-fn what_is_clear_or_hidden_is_not_read() {
+fn transparent_and_hidden_blocks_are_not_read() {
     let grid = Grid::unit([40, 64, 40]);
     let samples = scene_with_a_wall(&grid);
     let memory = archive(grid, SampleType::F32, &samples);
@@ -228,7 +228,7 @@ fn memory_changes_no_bit_of_a_composite() {
 }
 
 #[test]
-fn what_means_nothing_along_a_ray_is_refused() {
+fn options_without_meaning_along_a_ray_are_refused() {
     let samples = field(&GRID, FRAMES, 3);
     let file = exact(&samples, Basis::Haar);
     let mut scene = scene(&file);

@@ -180,7 +180,7 @@ fn a_region_is_splatted_alone_and_in_its_place() {
 }
 
 #[test]
-fn some_frames_are_the_same_as_in_all() {
+fn some_frames_equal_those_of_a_full_rendering() {
     let grid = SKEWED;
     let memory = archive(grid, SampleType::F32, &field(&grid, 40, 8));
     let config = looking(view(40.0, 20.0, [40, 30]), 0.1, Quantity::Mean, &grid, 40);

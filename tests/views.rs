@@ -67,7 +67,7 @@ fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
 }
 
 #[test]
-fn every_view_of_a_run_is_what_it_is_alone() {
+fn every_view_of_a_run_equals_the_view_rendered_alone() {
     let samples = field(&GRID, FRAMES, 5);
     let mut memory = archive(GRID, SampleType::F32, &samples);
     let haar = ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) };
