@@ -204,7 +204,7 @@ pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config
     for memory in [MEMORY, 32 << 20, 24 << 20, 18 << 20, 16 << 20, 14 << 20, 12 << 20, 11 << 20, 10 << 20, 9 << 20] {
         let config = RenderConfig { memory, ..config.clone() };
         let found = rendered_if_it_can_be(scene, &config);
-        if let Err(Error::Usage(_)) = found {
+        if let Err(Error::Setting { setting: "memory", .. }) = found {
             continue;
         }
         let (again, errors_again, _) = found.unwrap();

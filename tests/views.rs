@@ -52,7 +52,7 @@ fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
     let mut sufficed = 0;
     for memory in [MEMORY, 24 << 20, 16 << 20, 12 << 20, 10 << 20] {
         match by_view(scene, &RenderConfig { memory, ..config.clone() }) {
-            Err(Error::Usage(_)) => continue,
+            Err(Error::Setting { setting: "memory", .. }) => continue,
             Err(other) => panic!("{other}"),
             Ok((found, report)) => {
                 let same: Vec<bool> = found.iter().zip(&expected).map(|(a, b)| a == b).collect();
@@ -113,6 +113,6 @@ fn views_of_one_run_are_of_one_size() {
     let config = looking(view(0.0, 0.0, [70, 66]), 0.0, Quantity::Mean, &GRID, 1);
     for views in [vec![], vec![view(0.0, 0.0, [70, 66]), view(0.0, 0.0, [66, 70])]] {
         let refused = by_view(&mut direct(&memory, None), &RenderConfig { views, ..config.clone() });
-        assert!(matches!(refused, Err(Error::Usage(_))));
+        assert!(matches!(refused, Err(Error::Setting { setting: "views", .. })));
     }
 }

@@ -110,8 +110,8 @@ fn depths_beyond_an_exponential_are_right_or_refused() {
                 let kernel = Kernel::new(Some(sigma), depths / 99.0, &grid).unwrap();
                 let config = RenderConfig { kernel, region, certify: true, ..plain };
                 match render(&mut direct(&memory, None), &config, &Silent, &mut |_| Ok(())) {
-                    Err(Error::Usage(what)) => {
-                        assert!(what.contains("--tau"), "{what}");
+                    Err(Error::Setting { setting, .. }) => {
+                        assert!(setting == "tau" || setting == "kernel", "{setting}");
                         refused.push((sigma, depths, region.is_some()));
                         continue;
                     }

@@ -167,9 +167,9 @@ fn runs_are_not_resumed_with_other_frames_or_settings() {
     work.piped(args, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["what is finished is kept"]);
     for (settings, word) in [
         ("--window 16", "another window: 8, now 16"),
-        ("--window 8 --tolerance 0.02", "another --tolerance: 0.01, now 0.02"),
+        ("--window 8 --tolerance 0.02", "another tolerance: 0.01, now 0.02"),
         ("--window 8 --basis haar", "another basis: auto, now haar"),
-        ("--window 8 --bound rms", "another --bound"),
+        ("--window 8 --bound rms", "another bound: Pointwise, now Rms"),
         ("--window 8 --range 0,1", "another range: none, now 0.0,1.0"),
     ] {
         let run = work.piped(&format!("convert - -o a.wspl --resume {settings}"), &archive.npy());
