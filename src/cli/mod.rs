@@ -10,6 +10,7 @@ mod config;
 mod generate;
 mod input;
 mod lines;
+mod optional;
 mod program;
 mod terminal;
 mod values;

@@ -76,6 +76,13 @@ fn what_is_ambiguous_is_listed_and_chosen() {
 }
 
 #[test]
+fn a_filter_that_is_not_supported_is_named_with_the_command_that_removes_it() {
+    let source = input("hdf5/refused_lzf.h5");
+    let refused = Work::new().wavesplat(&format!("convert {source} -o a.wspl"));
+    refused.fails(3, &["refused_lzf.h5", "LZF", "h5repack -f GZIP=4 IN OUT"]);
+}
+
+#[test]
 fn info_tells_of_frames_and_how_large_they_would_become() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([50, 40, 30], 40).npy());
@@ -90,6 +97,16 @@ fn info_tells_of_frames_and_how_large_they_would_become() {
         let ratio = told["estimate"]["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
         assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");
     }
+    let estimate = |options: &str| {
+        let told = work.wavesplat(&format!("info --json {options}")).ok().json();
+        (told["estimate"]["tolerance"].as_f64(), told["frames"].as_u64())
+    };
+    assert_eq!(estimate("a.npy --estimate 0.1 --frames 0:4"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--estimate 0.1 --frames 0:4 a.npy"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--frames 0:4 --estimate a.npy"), (Some(0.01), Some(4)));
+    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate 1%", "no number", "type --estimate 0.01"]);
+    work.write("0.1", "a file with the name of a number");
+    work.wavesplat("info a.npy --estimate 0.1").fails(2, &["type --estimate=0.1", "./0.1"]);
     work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);
     work.piped("info - --estimate", &work.read("a.npy")).fails(2, &["standard input"]);
 }

@@ -16,7 +16,7 @@ Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
-  wavesplat info frames/ --estimate=0.001")]
+  wavesplat info frames/ --estimate 0.001")]
 pub(crate) struct InfoArgs {
     /// A coefficient file; or frames, as convert takes them
     #[arg(required = true)]

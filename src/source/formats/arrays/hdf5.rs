@@ -65,12 +65,12 @@ impl ArrayFile for Opened {
 
     fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
-        slice(&dataset, sample, ranges).map_err(|e| e.to_string())
+        slice(&dataset, sample, ranges).map_err(|e| reason(&e))
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
-        let numbers = dataset.read_array::<Number>().map_err(|e| format!("{path}: {e}"))?;
+        let numbers = dataset.read_array::<Number>().map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().map(|number| number.0).collect())
     }
 
@@ -78,6 +78,28 @@ impl ArrayFile for Opened {
         let group = self.0.group(path).and_then(|group| group.attributes());
         group.map(|all| attributes(&all)).unwrap_or_default()
     }
+}
+
+/// Plugin filters that files are often written with, by their registered numbers.
+const PLUGIN_FILTERS: [(u16, &str); 9] = [
+    (305, "LZO"),
+    (307, "BZIP2"),
+    (32000, "LZF"),
+    (32001, "Blosc"),
+    (32008, "Bitshuffle"),
+    (32013, "ZFP"),
+    (32015, "Zstandard"),
+    (32017, "SZ"),
+    (32026, "Blosc2"),
+];
+
+/// Why something cannot be read. A filter that is not supported is named, with the command that rewrites the file without it.
+pub(super) fn reason(error: &Hdf5Error) -> String {
+    let Hdf5Error::UnsupportedFilter(filter) = error else { return error.to_string() };
+    let Some(id) = filter.strip_prefix("filter id ") else { return error.to_string() };
+    let known = PLUGIN_FILTERS.iter().find(|(known, _)| id.parse() == Ok(*known));
+    let name = known.map_or_else(|| format!("filter {id}"), |(_, name)| format!("filter {name} ({id})"));
+    format!("{name} is not supported; rewrite the file where HDF5 has that filter: h5repack -f GZIP=4 IN OUT")
 }
 
 /// All arrays of a file.
@@ -233,5 +255,20 @@ impl H5Type for Number {
             Datatype::FixedPoint { size, .. } | Datatype::FloatingPoint { size, .. } => usize::from(*size),
             _ => 8,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_are_refused_by_name_with_the_command_that_removes_them() {
+        let refused = |id: &str| reason(&Hdf5Error::UnsupportedFilter(format!("filter id {id}")));
+        assert!(refused("32013").starts_with("filter ZFP (32013) is not supported"));
+        assert!(refused("999").starts_with("filter 999 is not supported"));
+        assert!(refused("999").ends_with("h5repack -f GZIP=4 IN OUT"));
+        let other = Hdf5Error::UnsupportedFilter("scaleoffset float E-scale".into());
+        assert_eq!(reason(&other), other.to_string());
     }
 }

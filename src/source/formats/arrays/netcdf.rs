@@ -6,6 +6,7 @@ use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use hdf5_reader::Hdf5File;
+use netcdf_reader::error::Error as NcError;
 use netcdf_reader::{NcAttrValue, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
 use std::ops::Range;
 use std::path::Path;
@@ -21,6 +22,14 @@ pub(super) fn open(path: &Path, how: How) -> Result<Box<dyn ArrayFile>> {
     let file = file.map_err(|e| Error::input(path, format!("is no NetCDF file that can be read: {e}")))?;
     let hdf5 = if file.as_classic().is_some() { None } else { Hdf5File::from_storage(storage).ok() };
     Ok(Box::new(Opened { file, hdf5 }))
+}
+
+/// Why something cannot be read.
+fn reason(error: &NcError) -> String {
+    match error {
+        NcError::Hdf5(error) => hdf5::reason(error),
+        error => error.to_string(),
+    }
 }
 
 struct Opened {
@@ -43,7 +52,7 @@ impl ArrayFile for Opened {
         let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };
         macro_rules! read {
             ($ty:ty) => {{
-                let numbers = self.file.read_variable_slice_parallel::<$ty>(path, &slice).map_err(|e| e.to_string())?;
+                let numbers = self.file.read_variable_slice_parallel::<$ty>(path, &slice).map_err(|e| reason(&e))?;
                 numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
             }};
         }
@@ -61,7 +70,7 @@ impl ArrayFile for Opened {
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
-        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {e}"))?;
+        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().collect())
     }
 }
