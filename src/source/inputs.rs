@@ -1,7 +1,7 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
 use super::file_header::Files;
-use super::formats::{self, Format, SUPPORTED, file_series, pvd};
+use super::formats::{self, Format, file_series, pvd};
 use super::{OpenOptions, numbering};
 use crate::base::error::{Error, Result};
 use crate::base::output::STANDARD;
@@ -158,8 +158,8 @@ fn visible_files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let Some(first) = files.first() else {
-        let what = format!("has no file of frames. Supported are {SUPPORTED} if --dims and --dtype say what it is");
-        return Err(Error::usage(format!("{}: {what}", folder.display())));
+        let remedy = formats::remedy();
+        return Err(Error::usage(format!("{}: has no file of frames; {remedy}", folder.display())));
     };
     let extension = formats::extension(first);
     if let Some(other) = files.iter().find(|p| formats::extension(p) != extension) {

@@ -27,7 +27,6 @@ use super::OpenOptions;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::file_header::{FileHeader, head};
-use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
@@ -65,17 +64,10 @@ pub fn extensions() -> impl Iterator<Item = &'static str> {
     EXTENSIONS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
 }
 
-/// What is supported, for messages.
-pub(in crate::source) const SUPPORTED: Supported = Supported;
-
-/// As [`SUPPORTED`].
-pub(in crate::source) struct Supported;
-
-impl Display for Supported {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        extensions().try_for_each(|ending| write!(f, ".{ending}, "))?;
-        write!(f, "and headerless data of any name")
-    }
+/// What to type for headerless data, then the formats that need no options: the end of a message about unknown files.
+pub(in crate::source) fn remedy() -> String {
+    let known: Vec<String> = extensions().map(|ending| format!(".{ending}")).collect();
+    format!("for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: {}", known.join(", "))
 }
 
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
@@ -204,8 +196,7 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
 }
 
 fn unknown(path: &Path) -> Error {
-    let what = "is of no known format. Headerless data needs --dims NXxNYxNZ and --dtype";
-    Error::usage(format!("{}: {what}. Supported are {SUPPORTED}", path.display()))
+    Error::usage(format!("{}: is of no known format; {}", path.display(), remedy()))
 }
 
 /// Options that would be ignored are refused, so that nobody thinks they had an effect.
@@ -244,8 +235,8 @@ mod tests {
         for (ending, format) in EXTENSIONS {
             assert_eq!(Format::by_name(Path::new(&format!("a.b.{}", ending.to_uppercase()))), Some(format));
         }
-        let supported = SUPPORTED.to_string();
-        assert!(supported.starts_with(".npy, .nrrd, ") && supported.contains(".hdf5, "), "{supported}");
-        assert!(!supported.contains("wspl") && extensions().all(|ending| supported.contains(ending)));
+        let remedy = remedy();
+        assert!(remedy.contains("Known formats: .npy, .nrrd, ") && remedy.contains(".hdf5, "), "{remedy}");
+        assert!(!remedy.contains("wspl") && extensions().all(|ending| remedy.contains(ending)));
     }
 }

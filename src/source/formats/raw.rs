@@ -111,6 +111,6 @@ mod tests {
         refused(&file, &of(&[2, 2, 2, usize::MAX]), "too large");
         refused(&file, &OpenOptions { sample: None, ..of(&[2, 2, 2]) }, "--dtype");
         refused(&file, &OpenOptions { variable: Some("a".into()), ..of(&[2, 2, 2]) }, "--variable");
-        refused(&file, &OpenOptions::default(), "Supported are .npy");
+        refused(&file, &OpenOptions::default(), "Known formats: .npy");
     }
 }
