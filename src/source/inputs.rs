@@ -25,6 +25,12 @@ pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files>
     Ok(files)
 }
 
+/// Whether the inputs are files that say themselves what they hold.
+pub(super) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
+    let files = expand(inputs, &options.for_headers());
+    files.is_ok_and(|files| formats::has_header(&files.paths[0]))
+}
+
 /// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case, no
 /// dot), those that match a pattern, or the one of that name, which need not exist.
 ///

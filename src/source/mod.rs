@@ -51,6 +51,9 @@ pub struct OpenOptions {
     pub big_endian: bool,
     /// Bytes before the first sample of each file; for headerless data alone.
     pub offset: u64,
+    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive: files with a header of their own need
+    /// them no more, and of headerless data the number of frames is counted anew.
+    pub dims_are_remembered: bool,
     /// Which array of a file is meant, or which component of one: `velocity[0]`.
     pub variable: Option<String>,
     /// What the axes of an array count, the slowest first: letters of t z y x, or another for an axis beside these.
@@ -74,6 +77,7 @@ impl Default for OpenOptions {
             sample: None,
             big_endian: false,
             offset: 0,
+            dims_are_remembered: false,
             variable: None,
             axes: None,
             spacing: None,
@@ -81,6 +85,13 @@ impl Default for OpenOptions {
             allow_gaps: false,
             memory: 256 << 20,
         }
+    }
+}
+
+impl OpenOptions {
+    /// Without what is for headerless data alone.
+    fn for_headers(&self) -> Self {
+        Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }
     }
 }
 
@@ -98,6 +109,13 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
     {
         return open_stream(std::io::stdin(), options);
     }
+    if options.dims_are_remembered && inputs::have_headers(inputs, options) {
+        return open_files(inputs, &options.for_headers());
+    }
+    open_files(inputs, options)
+}
+
+fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let files = inputs::expand(inputs, options)?;
     Ok(Box::new(series::Series::open(&files, options)?))
 }

@@ -103,6 +103,12 @@ impl Format {
         EXTENSIONS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
     }
 
+    /// By extension, or by what is in a folder.
+    fn of_file(path: &Path) -> Option<Self> {
+        let is_store = path.is_dir() && zarr_metadata(path).is_some();
+        if is_store { Some(Self::Zarr) } else { Self::by_name(path) }
+    }
+
     /// Whether a file of it holds frames, and says itself what they are.
     pub(in crate::source) fn holds_frames(self) -> bool {
         !matches!(self, Self::Pvd | Self::FileSeries | Self::Coefficients)
@@ -153,10 +159,14 @@ pub(in crate::source) fn extension(path: &Path) -> String {
     if own == "gz" && COMPRESSED.contains(&inner.as_str()) { format!("{inner}.gz") } else { own }
 }
 
+/// Whether a file says itself what it holds.
+pub(in crate::source) fn has_header(path: &Path) -> bool {
+    Format::of_file(path).is_some() || Format::by_content(path).is_ok_and(|format| format.is_some())
+}
+
 /// Reads the header of a file of frames and checks its size.
 pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let format = match Format::by_name(path) {
-        _ if path.is_dir() && zarr_metadata(path).is_some() => Some(Format::Zarr),
+    let format = match Format::of_file(path) {
         None if options.dims.is_none() => Format::by_content(path)?,
         format => format,
     };
