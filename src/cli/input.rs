@@ -7,7 +7,7 @@ use crate::base::output::part_of;
 use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
-use crate::source::{self, FrameSource, OpenOptions, Selection};
+use crate::source::{self, FrameSource, OpenOptions, Selection, Variable};
 use clap::{Args, ValueEnum};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -106,6 +106,11 @@ impl InputArgs {
     /// Opens an archive without a word.
     pub fn open_quietly(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
         source::open(inputs, &self.options(common))
+    }
+
+    /// The variables among which `--variable` must choose; none if an archive can be opened without that.
+    pub fn undecided(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Vec<Variable>> {
+        source::undecided(inputs, &self.options(common))
     }
 
     fn options(&self, common: &CommonArgs) -> OpenOptions {

@@ -19,6 +19,7 @@ mod series;
 mod stream;
 #[cfg(test)]
 mod testing;
+mod variables;
 
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
@@ -26,6 +27,7 @@ pub use file_header::Units;
 pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
 pub use select::{Selection, select};
+pub use variables::{Variable, VariableAxis};
 
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
@@ -118,6 +120,17 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
 fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let files = inputs::expand(inputs, options)?;
     Ok(Box::new(series::Series::open(&files, options)?))
+}
+
+/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A stream has one.
+///
+/// # Errors
+/// Files that are absent, damaged or of a format that is not supported.
+pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variable>> {
+    if options.variable.is_some() || options.dims.is_some() || inputs == [Path::new(STANDARD)] {
+        return Ok(Vec::new());
+    }
+    formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)
 }
 
 /// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`.

@@ -65,7 +65,6 @@ fn what_is_ambiguous_is_listed_and_chosen() {
     let (work, source) = (Work::new(), input("netcdf/several.nc"));
     let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
     work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
-    work.wavesplat(&format!("info {source}")).fails(3, &listed);
     work.wavesplat(&format!("convert {source} -o a.wspl --variable density")).ok();
     work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // it remembers which
     work.wavesplat(&format!("convert {source} -o b.wspl --variable nothing")).fails(3, &["has no variable nothing"]);
@@ -73,6 +72,36 @@ fn what_is_ambiguous_is_listed_and_chosen() {
     work.wavesplat(&format!("convert {order} -o c.wspl --axes xyzt")).ok();
     work.wavesplat(&format!("verify c.wspl --against {order}")).ok();
     work.wavesplat(&format!("convert {order} -o d.wspl --axes xyz")).fails(3, &["--axes xyz names 3"]);
+}
+
+#[test]
+fn info_lists_the_variables_of_which_one_must_be_chosen() {
+    let work = Work::new();
+    for (name, line) in [
+        ("netcdf/several.nc", "  density: i8 (time 4, z 3, y 5, x 7) in kg m-3\n"),
+        ("hdf5/several.h5", " (4, 3, 5, 7)"),
+        ("vti/several.vti", ": f32 (z 3, y 5, x 7)\n"),
+        ("vti/vector.vti", ", 3 components "),
+        ("nrrd/refused_vector.nrrd", "  samples[1]: "),
+        ("metaimage/refused_channels.mha", "  samples[1]: "),
+        ("nifti/refused_vector.nii", "[1]: "),
+    ] {
+        let told = work.wavesplat(&format!("info {}", input(name))).ok();
+        assert!(told.text().contains(line), "{name}: {}", told.text());
+        assert!(told.text().ends_with("choose one with --variable NAME\n"), "{name}: {}", told.text());
+        let told = work.wavesplat(&format!("info --json {}", input(name))).ok().json();
+        let first = &told["variables"][0];
+        let chosen = match first["components"].as_u64() {
+            Some(1) => first["name"].as_str().unwrap().into(),
+            _ => format!("{}[0]", first["name"].as_str().unwrap()),
+        };
+        let told = work.wavesplat(&format!("info --json {} --variable {chosen}", input(name))).ok().json();
+        assert_eq!(told["sample"], first["sample"], "{name}");
+        work.wavesplat(&format!("convert {} -o a.wspl", input(name))).fails(3, &["--variable"]);
+    }
+    for name in ["netcdf/era5.nc", "vti/active.vti", "vtk/several.vtk", "hdf5/gzip.h5", "nrrd/f32.nrrd"] {
+        assert!(work.wavesplat(&format!("info {}", input(name))).ok().text().starts_with("format "), "{name}");
+    }
 }
 
 #[test]

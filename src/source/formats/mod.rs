@@ -23,7 +23,7 @@ mod xml;
 
 pub use npy::{ArrayHeader, array_header};
 
-use super::OpenOptions;
+use super::{OpenOptions, Variable};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::file_header::{FileHeader, head};
@@ -166,16 +166,49 @@ pub(in crate::source) fn has_header(path: &Path) -> bool {
 
 /// Reads the header of a file of frames and checks its size.
 pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let format = match Format::of_file(path) {
-        None if options.dims.is_none() => Format::by_content(path)?,
-        format => format,
-    };
+    let format = format_of(path, options)?;
     if let Some(format) = format {
         refuse_options(path, format, options)?;
     }
     let described = of_format(format, path, options)?;
     Ok(FileHeader { format: format.map_or("headerless data", Format::name), ..described })
 }
+
+fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<Format>> {
+    match Format::of_file(path) {
+        None if options.dims.is_none() => Format::by_content(path),
+        format => Ok(format),
+    }
+}
+
+/// The variables of a file among which the user must choose; none if it is clear which one is meant.
+pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<Variable>> {
+    match format_of(path, options)? {
+        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.undecided(),
+        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.undecided(),
+        #[cfg(feature = "zarr")]
+        Some(Format::Zarr) => arrays::open_zarr(path, options)?.undecided(),
+        Some(Format::Vti) => vti::undecided(path),
+        Some(Format::Vtk) => vtk::undecided(path),
+        Some(Format::Nrrd | Format::Nifti | Format::MetaImage) => Ok(components(path, options)),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// The components of a file's only array, if it has several; none of a file that cannot be read.
+fn components(path: &Path, options: &OpenOptions) -> Vec<Variable> {
+    let component = |index: usize| {
+        let options = OpenOptions { variable: Some(format!("[{index}]")), ..options.clone() };
+        let header = describe(path, &options).ok()?;
+        let (name, shape) = (header.variable.unwrap_or_default(), header.shape);
+        Some(Variable { unit: header.units.samples, ..Variable::volume(&name, shape.sample().name(), shape.dims(), 1) })
+    };
+    let found: Vec<_> = (0..MOST_COMPONENTS).map_while(component).collect();
+    if found.len() > 1 { found } else { Vec::new() }
+}
+
+/// Components that are listed, where one array has several.
+const MOST_COMPONENTS: usize = 16;
 
 fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     match format {
@@ -185,10 +218,10 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
-        Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
-        Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
+        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options),
+        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.describe(options),
         #[cfg(feature = "zarr")]
-        Some(Format::Zarr) => arrays::describe_zarr(path, options),
+        Some(Format::Zarr) => arrays::open_zarr(path, options)?.describe(options),
         #[cfg(not(feature = "zarr"))]
         Some(Format::Zarr) => {
             let what = "Zarr is not built in; cargo build --release --features zarr does that";

@@ -2,6 +2,7 @@
 
 mod archive;
 mod coefficients;
+mod variables;
 
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -35,9 +36,12 @@ pub(crate) struct InfoArgs {
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {
     args.common.start()?;
-    match args.coefficients()? {
-        Some(file) => coefficients::run(&file, &args.common),
-        None => archive::run(args),
+    if let Some(file) = args.coefficients()? {
+        return coefficients::run(&file, &args.common);
+    }
+    match args.input.undecided(&args.inputs, &args.common)?.as_slice() {
+        [] => archive::run(args),
+        several => variables::run(several, &args.common),
     }
 }
 

@@ -21,7 +21,7 @@ use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
-use crate::source::{OpenOptions, Parsed, numbering};
+use crate::source::{self, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
 use places::Places;
@@ -127,18 +127,21 @@ struct How {
     memory: usize,
 }
 
+/// Opens a file of one format.
+type OpenFile = fn(&Path, How) -> Result<Box<dyn ArrayFile>>;
+
 /// What opens a file of arrays, as often as it is asked.
 #[derive(Clone)]
 struct Opener {
     path: PathBuf,
     how: How,
-    open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>,
+    open: OpenFile,
     /// The file, while frames are taken of any of its arrays.
     opened: Arc<Mutex<Option<Box<dyn ArrayFile>>>>,
 }
 
 impl Opener {
-    fn new(path: &Path, open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>, options: &OpenOptions) -> Self {
+    fn new(path: &Path, open: OpenFile, options: &OpenOptions) -> Self {
         let how = How { access: options.access, memory: options.memory / SHARE };
         Self { path: path.into(), how, open, opened: Arc::default() }
     }
@@ -164,62 +167,86 @@ impl Opener {
     }
 }
 
-/// Reads what an HDF5 file holds.
-pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let opener = Opener::new(path, hdf5::open, options);
-    let file = opener.open()?;
-    // What the NetCDF library wrote says so, whatever its name is.
-    match file.group("/").contains_key("_NCProperties") {
-        true => describe_netcdf(path, options),
-        false => describe(&opener, file.as_ref(), path, options),
-    }
+/// A file of arrays that was opened to see what it holds.
+pub(super) struct ArrayArchive {
+    opener: Opener,
+    file: Box<dyn ArrayFile>,
+    /// The file whose state says whether the archive was changed.
+    watched: PathBuf,
 }
 
-/// Reads what a NetCDF file holds.
-pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let opener = Opener::new(path, netcdf::open, options);
-    describe(&opener, opener.open()?.as_ref(), path, options)
+/// Opens an HDF5 file. One that the NetCDF library wrote is a NetCDF file, whatever its name is.
+pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
+    let archive = ArrayArchive::open(path, path, hdf5::open, options)?;
+    let is_netcdf = archive.file.group("/").contains_key("_NCProperties");
+    if is_netcdf { open_netcdf(path, options) } else { Ok(archive) }
 }
 
-/// Reads what a Zarr store, a folder, holds.
+/// Opens a NetCDF file.
+pub(super) fn open_netcdf(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
+    ArrayArchive::open(path, path, netcdf::open, options)
+}
+
+/// Opens a Zarr store, a folder.
 #[cfg(feature = "zarr")]
-pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
+pub(super) fn open_zarr(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    let opener = Opener::new(path, zarr::open, options);
-    describe(&opener, opener.open()?.as_ref(), &metadata, options)
+    ArrayArchive::open(path, &metadata, zarr::open, options)
 }
 
-/// Reads what is in a file that was opened; it changes when the file `watched` does.
-fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let (path, state) = (opener.path.as_path(), FileBytes::open(watched, Access::Read)?.state());
-    let refused = |e| Error::input(path, e);
-    let mut all = file.variables().map_err(refused)?;
-    let image = vtkhdf::Image::of(file, &all).map_err(refused)?;
-    if let Some(image) = &image {
-        all.clone_from(&image.variables);
+impl ArrayArchive {
+    fn open(path: &Path, watched: &Path, open: OpenFile, options: &OpenOptions) -> Result<Self> {
+        let opener = Opener::new(path, open, options);
+        Ok(Self { file: opener.open()?, opener, watched: watched.into() })
     }
-    let (choice, index) = match options.variable.as_deref() {
-        Some(name) => choose::named(&all, name),
-        None => choose::only(&all, image.as_ref().and_then(|i| i.active.as_deref())).map(|choice| (choice, None)),
+
+    /// All arrays, or those of an image in VTKHDF.
+    fn variables(&self) -> Parsed<(Vec<Variable>, Option<vtkhdf::Image>)> {
+        let all = self.file.variables()?;
+        let image = vtkhdf::Image::of(self.file.as_ref(), &all)?;
+        Ok((image.as_ref().map_or(all, |image| image.variables.clone()), image))
     }
-    .map_err(refused)?;
-    check_steps(path, &choice, options)?;
-    let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
-    let context = Context { file, all: &all, image, index, axes, spaced };
-    let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
-    let mut parts = Vec::new();
-    for found in &found {
-        let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), opener)?;
-        parts.push(found.part((watched, state), chunks).map_err(refused)?);
+
+    /// The variables among which the user must choose; none if it is clear which one is meant.
+    pub(super) fn undecided(&self) -> Result<Vec<source::Variable>> {
+        let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
+        Ok(choose::undecided(&all, active(image.as_ref())))
     }
-    let mut described = joined(found, parts).map_err(refused)?;
-    if let Some((times, are_seconds)) = openpmd::times(file, &choice) {
-        (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+
+    /// Reads what the variable that is meant says of its frames.
+    pub(super) fn describe(&self, options: &OpenOptions) -> Result<FileHeader> {
+        let (path, state) = (self.opener.path.as_path(), FileBytes::open(&self.watched, Access::Read)?.state());
+        let refused = |e| Error::input(path, e);
+        let (all, image) = self.variables().map_err(refused)?;
+        let (choice, index) = match options.variable.as_deref() {
+            Some(name) => choose::named(&all, name),
+            None => choose::only(&all, active(image.as_ref())).map(|choice| (choice, None)),
+        }
+        .map_err(refused)?;
+        check_steps(path, &choice, options)?;
+        let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
+        let context = Context { file: self.file.as_ref(), all: &all, image, index, axes, spaced };
+        let found =
+            choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
+        let mut parts = Vec::new();
+        for found in &found {
+            let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), &self.opener)?;
+            parts.push(found.part((&self.watched, state), chunks).map_err(refused)?);
+        }
+        let mut described = joined(found, parts).map_err(refused)?;
+        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice) {
+            (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+        }
+        if choice.arrays.len() > 1 {
+            described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path));
+        }
+        Ok(described)
     }
-    if choice.arrays.len() > 1 {
-        described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path));
-    }
-    Ok(described)
+}
+
+/// The name of the active array of an image.
+fn active(image: Option<&vtkhdf::Image>) -> Option<&str> {
+    image.and_then(|image| image.active.as_deref())
 }
 
 /// An error if steps are not numbered regularly.

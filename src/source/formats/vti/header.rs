@@ -95,6 +95,19 @@ impl Header {
         }
     }
 
+    /// The arrays by their names and numbers of components.
+    pub(super) fn names(&self) -> Vec<(&str, usize)> {
+        self.arrays().iter().map(|array| (array.name.as_str(), array.components)).collect()
+    }
+
+    /// Which of the arrays is the active one.
+    pub(super) fn active(&self) -> Option<usize> {
+        let place = |(of, name): &(Association, String)| {
+            self.arrays().iter().position(|array| array.of == *of && array.name == *name)
+        };
+        self.scalars.iter().find_map(place)
+    }
+
     fn element(&mut self, e: &BytesStart<'_>, text: u64) -> Parsed<()> {
         match e.name().as_ref() {
             "VTKFile" => self.file(e),

@@ -11,10 +11,10 @@ mod skeleton;
 use super::component::{self, Chosen};
 use super::directions::{Directions, Placed};
 use crate::base::error::{Error, Result};
-use crate::source::Parsed;
 use crate::source::file_header::{FileHeader, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::{Parsed, Variable};
 use extent::Extent;
 use header::{Array, Header};
 use image::{Image, sample_type};
@@ -33,6 +33,20 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(wanted.shape, vec![part]) })
 }
 
+/// The arrays among which the user must choose; none if it is clear which one is meant.
+pub(super) fn undecided(path: &Path) -> Result<Vec<Variable>> {
+    let header = Image::open(path)?.header;
+    let points = header.whole.points().map_err(|e| Error::input(path, e))?;
+    if !component::is_undecided(&header.names(), header.active()) {
+        return Ok(Vec::new());
+    }
+    let variable = |array: &Array| {
+        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        Variable::volume(&array.name, sample, array.of.dims(points), array.components)
+    };
+    Ok(header.arrays().iter().map(variable).collect())
+}
+
 /// The array that is meant.
 struct Wanted<'a> {
     array: &'a Array,
@@ -49,12 +63,8 @@ struct Wanted<'a> {
 
 impl<'a> Wanted<'a> {
     fn of(header: &'a Header, variable: Option<&str>) -> Parsed<Self> {
-        let arrays = header.arrays();
-        let names: Vec<_> = arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
-        let active =
-            header.scalars.iter().find_map(|(of, name)| arrays.iter().position(|a| a.of == *of && a.name == *name));
-        let chosen = component::choose(&names, active, variable)?;
-        let array = &arrays[chosen.array];
+        let chosen = component::choose(&header.names(), header.active(), variable)?;
+        let array = &header.arrays()[chosen.array];
         let points = header.whole.points()?;
         let Some(sample) = sample_type(&array.ty) else {
             let types = "UInt8 to Int32, Float32 and Float64 are";

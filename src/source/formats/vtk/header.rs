@@ -66,6 +66,11 @@ impl Header {
         Ok(header)
     }
 
+    /// The arrays by their names and numbers of components.
+    pub(super) fn names(&self) -> Vec<(&str, usize)> {
+        self.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect()
+    }
+
     /// Whether a line says something of the lattice, or what arrays are of.
     fn geometry(&mut self, words: &[&str]) -> Parsed<bool> {
         match (words[0].to_uppercase().as_str(), &words[1..]) {

@@ -10,10 +10,10 @@ use super::pieces::{Piece, Pieces};
 use super::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::source::Parsed;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::{Parsed, Variable};
 use header::{Array, Header, sample_type};
 use std::path::Path;
 
@@ -22,8 +22,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = Header::read(&file)?;
-    let arrays: Vec<_> = header.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
-    let chosen = component::choose(&arrays, header.scalars.first().copied(), variable).map_err(refused)?;
+    let chosen = component::choose(&header.names(), header.scalars.first().copied(), variable).map_err(refused)?;
     let array = &header.arrays[chosen.array];
     let (shape, stored) = stored(&header, array, chosen).map_err(refused)?;
     let at = if header.ascii { text(&file, array, shape) } else { DataLocation::Byte(array.start) };
@@ -34,6 +33,19 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     described.times = header.time.into_iter().collect();
     described.variable = Some(component::label(&array.name, array.components, chosen.component));
     Ok(described)
+}
+
+/// The arrays among which the user must choose; none if it is clear which one is meant.
+pub(super) fn undecided(path: &Path) -> Result<Vec<Variable>> {
+    let header = Header::read(&FileBytes::open(path, Access::Read)?)?;
+    if !component::is_undecided(&header.names(), header.scalars.first().copied()) {
+        return Ok(Vec::new());
+    }
+    let variable = |array: &Array| {
+        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        Variable::volume(&array.name, sample, array.of.dims(header.points), array.components)
+    };
+    Ok(header.arrays.iter().map(variable).collect())
 }
 
 /// An array as text: all of it is one piece.
