@@ -7,7 +7,7 @@ use crate::base::output::part_of;
 use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
-use crate::source::{self, FrameSource, OpenOptions, Selection, Variable};
+use crate::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
 use clap::{Args, ValueEnum};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -109,7 +109,7 @@ impl InputArgs {
     }
 
     /// The variables among which `--variable` must choose; none if an archive can be opened without that.
-    pub fn undecided(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Vec<Variable>> {
+    pub fn undecided(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Vec<VariableInfo>> {
         source::undecided(inputs, &self.options(common))
     }
 

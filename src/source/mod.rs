@@ -27,7 +27,7 @@ pub use file_header::Units;
 pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
 pub use select::{Selection, select};
-pub use variables::{Variable, VariableAxis};
+pub use variables::{VariableAxis, VariableInfo};
 
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
@@ -126,7 +126,7 @@ fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Frame
 ///
 /// # Errors
 /// Files that are absent, damaged or of a format that is not supported.
-pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variable>> {
+pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
     if options.variable.is_some() || options.dims.is_some() || inputs == [Path::new(STANDARD)] {
         return Ok(Vec::new());
     }

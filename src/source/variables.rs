@@ -8,7 +8,7 @@ const MOST_LISTED: usize = 20;
 
 /// A variable of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Variable {
+pub struct VariableInfo {
     /// Its name, as [`super::OpenOptions::variable`] takes it.
     pub name: String,
     /// The type of its samples; also one that is not supported.
@@ -32,7 +32,7 @@ pub struct VariableAxis {
     pub length: usize,
 }
 
-impl Variable {
+impl VariableInfo {
     /// One array of a volume with `dims` voxels along x, y, z.
     pub(super) fn volume(name: &str, sample: &str, dims: [usize; 3], components: usize) -> Self {
         let axis = |(name, length): (&str, usize)| VariableAxis { name: name.into(), length };
@@ -48,7 +48,7 @@ impl Display for VariableAxis {
     }
 }
 
-impl Display for Variable {
+impl Display for VariableInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axes: Vec<String> = self.axes.iter().map(ToString::to_string).collect();
         write!(f, "{}: {} ({})", self.name, self.sample, axes.join(", "))?;
@@ -64,7 +64,7 @@ impl Display for Variable {
 }
 
 /// Variables for a message, each on a line of its own.
-pub(super) fn listed(all: &[Variable]) -> String {
+pub(super) fn listed(all: &[VariableInfo]) -> String {
     let mut text = String::new();
     for variable in all.iter().take(MOST_LISTED) {
         let _ = write!(text, "\n  {variable}");
@@ -82,10 +82,10 @@ mod tests {
 
     #[test]
     fn a_list_says_name_type_size_and_unit_and_how_many_more() {
-        let vector = Variable { unit: Some("m s-1".into()), ..Variable::volume("v", "f32", [4, 3, 2], 3) };
+        let vector = VariableInfo { unit: Some("m s-1".into()), ..VariableInfo::volume("v", "f32", [4, 3, 2], 3) };
         assert_eq!(vector.to_string(), "v: f32 (z 2, y 3, x 4), 3 components v[0] to v[2] in m s-1");
         let unnamed = vec![VariableAxis { name: String::new(), length: 7 }];
-        let steps = Variable { axes: unnamed, steps: 5, ..Variable::volume("p", "i64", [1; 3], 1) };
+        let steps = VariableInfo { axes: unnamed, steps: 5, ..VariableInfo::volume("p", "i64", [1; 3], 1) };
         assert_eq!(steps.to_string(), "p: i64 (7), 5 steps");
         assert_eq!(listed(&[]), " none");
         assert!(listed(&vec![steps; 25]).ends_with("\n  and 5 more"));

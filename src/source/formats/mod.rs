@@ -23,7 +23,7 @@ mod xml;
 
 pub use npy::{ArrayHeader, array_header};
 
-use super::{OpenOptions, Variable};
+use super::{OpenOptions, VariableInfo};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::file_header::{FileHeader, head};
@@ -182,7 +182,7 @@ fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<Format>> {
 }
 
 /// The variables of a file among which the user must choose; none if it is clear which one is meant.
-pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<Variable>> {
+pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
     match format_of(path, options)? {
         Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.undecided(),
         Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.undecided(),
@@ -196,12 +196,15 @@ pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result
 }
 
 /// The components of a file's only array, if it has several; none of a file that cannot be read.
-fn components(path: &Path, options: &OpenOptions) -> Vec<Variable> {
+fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
     let component = |index: usize| {
         let options = OpenOptions { variable: Some(format!("[{index}]")), ..options.clone() };
         let header = describe(path, &options).ok()?;
         let (name, shape) = (header.variable.unwrap_or_default(), header.shape);
-        Some(Variable { unit: header.units.samples, ..Variable::volume(&name, shape.sample().name(), shape.dims(), 1) })
+        Some(VariableInfo {
+            unit: header.units.samples,
+            ..VariableInfo::volume(&name, shape.sample().name(), shape.dims(), 1)
+        })
     };
     let found: Vec<_> = (0..MOST_COMPONENTS).map_while(component).collect();
     if found.len() > 1 { found } else { Vec::new() }

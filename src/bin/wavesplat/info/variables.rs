@@ -3,15 +3,15 @@
 use serde::Serialize;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
-use wavesplat::source::Variable;
+use wavesplat::source::VariableInfo;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]
 struct Info<'a> {
-    variables: &'a [Variable],
+    variables: &'a [VariableInfo],
 }
 
-pub(super) fn run(variables: &[Variable], common: &CommonArgs) -> Result<()> {
+pub(super) fn run(variables: &[VariableInfo], common: &CommonArgs) -> Result<()> {
     if common.json {
         return common.report(&Info { variables }, false);
     }

@@ -28,11 +28,11 @@ impl<'a> Choice<'a> {
         self.arrays[0].name()
     }
 
-    /// What users are told of it.
-    fn told(&self) -> source::Variable {
+    /// Name, size, type and unit for users.
+    fn info(&self) -> source::VariableInfo {
         let first = self.arrays[0];
         let axis = |(length, name): (&usize, &String)| VariableAxis { name: name.clone(), length: *length };
-        source::Variable {
+        source::VariableInfo {
             name: self.path.clone(),
             sample: first.sample.as_ref().map_or_else(Clone::clone, ToString::to_string),
             axes: first.lengths.iter().zip(&first.dims).map(axis).collect(),
@@ -74,9 +74,9 @@ pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Parsed<Choi
 }
 
 /// The variables among which the user must choose; none if [`only`] finds the one.
-pub(super) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::Variable> {
+pub(super) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::VariableInfo> {
     let volumes = volumes(all, active);
-    if volumes.len() > 1 { volumes.iter().map(Choice::told).collect() } else { Vec::new() }
+    if volumes.len() > 1 { volumes.iter().map(Choice::info).collect() } else { Vec::new() }
 }
 
 /// The variables that can be an archive, or of several the one that is `active`.
@@ -141,7 +141,7 @@ fn is_volume(variable: &Variable, least: usize) -> bool {
 }
 
 fn listed(all: &[Choice<'_>]) -> String {
-    variables::listed(&all.iter().map(Choice::told).collect::<Vec<_>>())
+    variables::listed(&all.iter().map(Choice::info).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -121,20 +121,20 @@ trait ArrayFile: Send {
 
 /// How a file is read.
 #[derive(Debug, Clone, Copy)]
-struct How {
+struct ReadConfig {
     access: Access,
     /// Bytes that reading may take.
     memory: usize,
 }
 
 /// Opens a file of one format.
-type OpenFile = fn(&Path, How) -> Result<Box<dyn ArrayFile>>;
+type OpenFile = fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>>;
 
 /// What opens a file of arrays, as often as it is asked.
 #[derive(Clone)]
 struct Opener {
     path: PathBuf,
-    how: How,
+    how: ReadConfig,
     open: OpenFile,
     /// The file, while frames are taken of any of its arrays.
     opened: Arc<Mutex<Option<Box<dyn ArrayFile>>>>,
@@ -142,7 +142,7 @@ struct Opener {
 
 impl Opener {
     fn new(path: &Path, open: OpenFile, options: &OpenOptions) -> Self {
-        let how = How { access: options.access, memory: options.memory / SHARE };
+        let how = ReadConfig { access: options.access, memory: options.memory / SHARE };
         Self { path: path.into(), how, open, opened: Arc::default() }
     }
 
@@ -208,7 +208,7 @@ impl ArrayArchive {
     }
 
     /// The variables among which the user must choose; none if it is clear which one is meant.
-    pub(super) fn undecided(&self) -> Result<Vec<source::Variable>> {
+    pub(super) fn undecided(&self) -> Result<Vec<source::VariableInfo>> {
         let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
         Ok(choose::undecided(&all, active(image.as_ref())))
     }
@@ -259,7 +259,7 @@ fn check_steps(path: &Path, choice: &Choice<'_>, options: &OpenOptions) -> Resul
 }
 
 /// One archive of the arrays of all steps.
-fn joined(mut found: Vec<Found>, parts: Vec<Part>) -> Parsed<FileHeader> {
+fn joined(mut found: Vec<ResolvedArray>, parts: Vec<Part>) -> Parsed<FileHeader> {
     let first = found.swap_remove(0);
     if let Some(other) = found.iter().find(|other| other.layout.dims() != first.layout.dims()) {
         let (a, b) = (&first.variable, &other.variable);
@@ -288,7 +288,7 @@ struct Context<'a> {
 }
 
 /// What an array is.
-struct Found {
+struct ResolvedArray {
     variable: Variable,
     name: String,
     counts: Vec<Counts>,
@@ -301,7 +301,7 @@ struct Found {
 }
 
 impl Context<'_> {
-    fn found(&self, variable: &Variable) -> Parsed<Found> {
+    fn found(&self, variable: &Variable) -> Parsed<ResolvedArray> {
         let mesh = openpmd::Mesh::of(self.file, variable);
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
@@ -331,7 +331,7 @@ impl Context<'_> {
             None => variable.name().to_string(),
         };
         let values = Values::of(&variable, sample)?;
-        Ok(Found { name, counts, layout, order, places, values, variable })
+        Ok(ResolvedArray { name, counts, layout, order, places, values, variable })
     }
 
     /// What VTKHDF says of places, and the order of frames.
@@ -347,7 +347,7 @@ impl Context<'_> {
     }
 }
 
-impl Found {
+impl ResolvedArray {
     /// The frames of this array.
     fn part(&self, (path, state): (&Path, State), chunks: Chunks) -> Parsed<Part> {
         let stored = Stored { packing: self.values.packing.clone(), ..chunks.stored(&self.layout)? };

@@ -1,6 +1,6 @@
 //! NetCDF files, classic and version 4, as [`super::ArrayFile`].
 
-use super::{ArrayFile, Attribute, Attributes, How, Variable, hdf5};
+use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable, hdf5};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
@@ -15,13 +15,13 @@ use std::path::Path;
 const UNWRITTEN: f64 = 9.969_209_968_386_869e36;
 
 /// Opens a file.
-pub(super) fn open(path: &Path, how: How) -> Result<Box<dyn ArrayFile>> {
+pub(super) fn open(path: &Path, how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
     let storage = hdf5::storage(FileBytes::open(path, how.access)?);
     let options = NcOpenOptions { chunk_cache_bytes: 0, max_chunk_bytes: how.memory, ..NcOpenOptions::default() };
     let file = NcFile::from_storage_with_options(storage.clone(), options);
     let file = file.map_err(|e| Error::input(path, format!("is no NetCDF file that can be read: {e}")))?;
     let hdf5 = if file.as_classic().is_some() { None } else { Hdf5File::from_storage(storage).ok() };
-    Ok(Box::new(Opened { file, hdf5 }))
+    Ok(Box::new(NetCdfArrayFile { file, hdf5 }))
 }
 
 /// Why something cannot be read.
@@ -32,13 +32,13 @@ fn reason(error: &NcError) -> String {
     }
 }
 
-struct Opened {
+struct NetCdfArrayFile {
     file: NcFile,
     /// The same file, of version 4: it knows of chunks.
     hdf5: Option<Hdf5File>,
 }
 
-impl ArrayFile for Opened {
+impl ArrayFile for NetCdfArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
         let mut all = Vec::new();
         self.add(self.file.root_group().map_err(|e| e.to_string())?, "", &mut all);
@@ -75,7 +75,7 @@ impl ArrayFile for Opened {
     }
 }
 
-impl Opened {
+impl NetCdfArrayFile {
     fn add(&self, group: &NcGroup, path: &str, all: &mut Vec<Variable>) {
         for variable in &group.variables {
             all.push(self.variable(variable, format!("{path}{}", variable.name())));
