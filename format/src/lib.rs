@@ -25,6 +25,7 @@ mod salvage;
 mod sample;
 mod section;
 mod segments;
+mod storage;
 mod structure;
 #[cfg(test)]
 mod testing;
@@ -50,55 +51,7 @@ pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
 pub use salvage::{Salvage, Salvaged};
 pub use sample::SampleType;
+pub use storage::{ReadAhead, Storage, read_joined};
 pub use unfinished::Unfinished;
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};
-
-use std::io;
-
-/// Where a file's bytes are: something of known length from which bytes are copied out.
-pub trait Storage {
-    /// Length in bytes.
-    fn len(&self) -> u64;
-
-    /// Whether there are no bytes.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Copies `out.len()` bytes from `offset`; an error if they are not all there.
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
-}
-
-impl Storage for [u8] {
-    fn len(&self) -> u64 {
-        <[u8]>::len(self) as u64
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        let bytes = usize::try_from(offset).ok().and_then(|o| self.get(o..)?.get(..out.len()));
-        let Some(bytes) = bytes else { return Err(io::ErrorKind::UnexpectedEof.into()) };
-        out.copy_from_slice(bytes);
-        Ok(())
-    }
-}
-
-impl Storage for Vec<u8> {
-    fn len(&self) -> u64 {
-        Storage::len(self.as_slice())
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.as_slice().read_at(offset, out)
-    }
-}
-
-impl<S: Storage + ?Sized> Storage for &S {
-    fn len(&self) -> u64 {
-        S::len(self)
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        S::read_at(self, offset, out)
-    }
-}

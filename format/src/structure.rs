@@ -24,8 +24,8 @@ impl<S: Storage> Reader<S> {
             note(self.check_section(Owner::Window(window), at, &begin), found)?;
             note(self.check_section(Owner::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
-        note(check_padding(self.storage(), self.footer.metadata.end()), found)?;
-        note(check_padding(self.storage(), self.footer.root.end()), found)
+        note(check_padding(self.storage(), self.footer().metadata.end()), found)?;
+        note(check_padding(self.storage(), self.footer().root.end()), found)
     }
 
     /// Checks the headers of a leaf's blocks, of these entries, and all padding between them.
