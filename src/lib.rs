@@ -64,6 +64,10 @@
 //! 8. A transform is one replaceable part: [`wavelet::TimeBasis`] is all that the rest knows of it, and a
 //!    [`render::Scene`] turns blocks into amounts of voxels and planes into frames, whatever they are made of.
 
+pub use base::error::{Error, Result};
+pub use base::grid::{Grid, Region};
+pub use base::sample::SampleType;
+
 pub mod base;
 pub mod source;
 pub mod colour;

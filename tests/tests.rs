@@ -21,6 +21,7 @@ mod images;
 mod inputs;
 mod lattice;
 mod layering;
+mod library;
 mod left_out;
 mod partial;
 mod python;

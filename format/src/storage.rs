@@ -106,7 +106,10 @@ pub fn read_joined(
         let (joined, count) = joined(ranges, rest, gap);
         let bytes = read(joined.clone())?;
         if bytes.len() != length(&joined)? {
-            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, format!("bytes {joined:?}: {} read", bytes.len())));
+            return Err(io::Error::new(
+                io::ErrorKind::UnexpectedEof,
+                format!("bytes {joined:?}: {} read", bytes.len()),
+            ));
         }
         let base = ranges[*first].start;
         for i in &rest[..count] {

@@ -4,6 +4,7 @@
 //! order of axes (`layout`). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
+mod array;
 mod colour_transform;
 mod file_header;
 mod formats;
@@ -20,6 +21,7 @@ mod stream;
 #[cfg(test)]
 mod testing;
 
+pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;

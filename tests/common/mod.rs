@@ -39,8 +39,8 @@ pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
 
 /// Pointwise, missing samples kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
-    let plain = ConvertConfig::new(basis, window, tolerance, MEMORY);
-    ConvertConfig { missing: MissingPolicy::Mask, level: 1, ..plain }
+    let (coding, missing) = (basis.into(), MissingPolicy::Mask);
+    ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..ConvertConfig::new(tolerance) }
 }
 
 /// A coefficient file in a folder of its own.
@@ -55,7 +55,7 @@ impl Stored {
     }
 
     pub(crate) fn open(&self) -> CoefficientFile {
-        CoefficientFile::open(&self.path(), Access::Read).unwrap()
+        CoefficientFile::open_with(&self.path(), Access::Read).unwrap()
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {

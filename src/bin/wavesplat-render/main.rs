@@ -317,7 +317,7 @@ impl Cli {
             }
             self.input.refuse_for_coefficients()?;
             self.along.check(false, self.colour.is_asked())?;
-            let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
+            let file = CoefficientFile::open_with(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
             let unit = setting(file.metadata(), "time-units").map(String::from);

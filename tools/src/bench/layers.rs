@@ -10,9 +10,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, convert};
+use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render,
@@ -122,8 +121,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
 pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
     let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
     let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
-    let settings =
-        ConvertConfig { range: Some(task.range), ..ConvertConfig::new(SchemeConstraint::AUTO, 32, FINE, MEMORY) };
+    let settings = ConvertConfig { range: Some(task.range), memory: MEMORY, ..ConvertConfig::new(FINE) };
     let mut bytes = Vec::new();
     convert(open()?.as_mut(), &settings, &task.file, &mut bytes, &Silent)?;
     fs::write(&task.file, bytes).map_err(|e| Error::io(&task.file, "writing", e))?;
@@ -131,7 +129,7 @@ pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
     let limits = measures.into_iter().flat_map(|m| task.tolerances.iter().map(move |t| Some((*t, m))));
     let (mut rows, mut whole) = (Vec::new(), RenderReport::default());
     for limit in std::iter::once(None).chain(limits) {
-        let file = CoefficientFile::open(&task.file, Access::Map)?;
+        let file = CoefficientFile::open(&task.file)?;
         let mut scene = CoefficientScene::new(file, SplatSource::Coefficients);
         let allowed = limit.map(|(tolerance, (_, limit))| (tolerance * (task.range.1 - task.range.0), limit));
         let (found, report) = pictures(&mut scene, task, SPLAT, allowed)?;

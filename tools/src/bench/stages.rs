@@ -10,7 +10,6 @@ use std::io::BufReader;
 use std::path::Path;
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
@@ -34,8 +33,13 @@ pub(super) fn convert(step: &Convert) -> Result<Converted> {
     let unknown = || Error::usage(format!("bench-step: there is no {} or no {}", step.basis, step.bound));
     let basis = BASES.iter().find(|b| b.name == step.basis).ok_or_else(unknown)?;
     let bound = BOUNDS.iter().find(|b| b.name == step.bound).ok_or_else(unknown)?;
-    let plain = ConvertConfig::new(basis.basis, basis.window, step.tolerance, MEMORY);
-    let config = ConvertConfig { bound: bound.bound, ..plain };
+    let config = ConvertConfig {
+        coding: basis.basis.into(),
+        window: basis.window,
+        bound: bound.bound,
+        memory: MEMORY,
+        ..ConvertConfig::new(step.tolerance)
+    };
     let clock = Instant::now();
     let mut frames = open_frames(&step.frames, step.count)?;
     let mut out = Output::create(&step.output, true)?;
@@ -98,7 +102,7 @@ impl Method {
         let frames = || open_frames(&step.input, step.frames);
         Ok(match step.way {
             Way::Coefficients => {
-                let file = CoefficientFile::open(&step.input, Access::Map)?;
+                let file = CoefficientFile::open(&step.input)?;
                 Self::Library(Box::new(CoefficientScene::new(file, SplatSource::Coefficients)))
             }
             Way::Shared => Self::Library(Box::new(FrameScene::new(frames()?, None))),

@@ -11,7 +11,6 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::{Grid, Region};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, Scene, SplatSource, render};
@@ -129,7 +128,7 @@ impl Opened {
     fn new(view: &View) -> Result<Self> {
         let frames = || source::open(std::slice::from_ref(&view.input), &OpenOptions::default());
         let file = |what| {
-            let file = CoefficientFile::open(&view.input, Access::Map)?;
+            let file = CoefficientFile::open(&view.input)?;
             Ok(Self::Library(Box::new(CoefficientScene::new(file, what))))
         };
         match view.method {
