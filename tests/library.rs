@@ -1,17 +1,20 @@
 //! What another program uses: arrays in, files in any storage, regions out.
 
 use crate::common::memory::Memory;
-use crate::common::{extracted, settings, stored};
+use crate::common::{extracted, pictures, settings, stored};
 use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use wavesplat::colour::Scale;
 use wavesplat::convert::{Basis, ConvertConfig, MissingPolicy, SchemeConstraint, convert_to_file};
 use wavesplat::extract::read_region;
 use wavesplat::file::CoefficientFile;
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig, render_png};
 use wavesplat::source::ArraySource;
+use wavesplat::view::camera::View;
 use wavesplat::{Grid, Region, SampleType};
-use wavesplat_format::{Storage, read_joined};
+use wavesplat_format::{BlockId, Storage, read_joined};
 
 const DIMS: [usize; 3] = [20, 14, 9];
 const FRAMES: usize = 12;
@@ -37,11 +40,23 @@ fn config() -> ConvertConfig {
 }
 
 /// A storage far away: counts requests, and joins those that are near.
+#[derive(Clone, Default)]
 struct Remote {
     bytes: Vec<u8>,
     single: Arc<AtomicUsize>,
     many: Arc<AtomicUsize>,
     joined: Arc<AtomicUsize>,
+}
+
+impl Remote {
+    fn of(bytes: Vec<u8>) -> Self {
+        Self { bytes, ..Self::default() }
+    }
+
+    /// Requests so far: of one range, of many, and what the latter were joined to.
+    fn counts(&self) -> [usize; 3] {
+        [&self.single, &self.many, &self.joined].map(|count| count.load(Relaxed))
+    }
 }
 
 impl Storage for Remote {
@@ -123,20 +138,57 @@ fn a_file_opens_from_any_storage() {
 fn blocks_of_a_remote_file_are_read_together() {
     let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
     let stored = stored(&mut source, &config());
-    let [single, many, joined] = std::array::from_fn(|_| Arc::new(AtomicUsize::new(0)));
-    let remote = Remote { bytes: stored.bytes(), single: single.clone(), many: many.clone(), joined: joined.clone() };
-    let file = CoefficientFile::from_storage("https://example.org/a.wspl", remote).unwrap();
-    let opened = single.load(Relaxed);
-    let frames = extracted(&file);
-    assert_eq!(frames, extracted(&stored.open()));
+    let remote = Remote::of(stored.bytes());
+    let file = CoefficientFile::from_storage("https://example.org/a.wspl", remote.clone()).unwrap();
+    let [opened, ..] = remote.counts();
+    assert_eq!(extracted(&file), extracted(&stored.open()));
     let leaves = file.metadata().windows.len();
-    let read = single.load(Relaxed) - opened;
-    assert!(read <= leaves, "besides leaves everything comes in batches: {read}");
-    assert!(many.load(Relaxed) > 0 && joined.load(Relaxed) == many.load(Relaxed), "neighbours are joined");
+    let [single, many, joined] = remote.counts();
+    assert!(single - opened <= leaves, "besides leaves everything comes in batches: {}", single - opened);
+    assert!(many > 0 && joined == many, "neighbours are joined");
     let blocks = file.blocks.len() * leaves;
     let threads = std::thread::available_parallelism().unwrap().get();
-    assert!(many.load(Relaxed) <= blocks.div_ceil(threads) + leaves);
+    assert!(many <= blocks.div_ceil(threads) + leaves);
     assert!(file.bytes_read() < 2 * file.bytes());
+}
+
+#[test]
+fn pictures_of_a_remote_file_are_the_same_and_take_few_requests() {
+    let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
+    let stored = stored(&mut source, &config());
+    let remote = Remote::of(stored.bytes());
+    let file = CoefficientFile::from_storage("far", remote.clone()).unwrap();
+    let (mut local, mut far) = (CoefficientScene::from(stored.open()), CoefficientScene::from(file));
+    let view = View { size: [60, 50], ..View::new(30.0, 20.0) };
+    let plain = RenderConfig::new(&far, view);
+    for mode in [Mode::Projection, Mode::Mip { slabs: None }] {
+        let config = RenderConfig { mode, ..plain.clone() };
+        let before = remote.counts();
+        let ((near, _), (far, report)) = (pictures(&mut local, &config), pictures(&mut far, &config));
+        assert!(near.iter().zip(&far).all(|(a, b)| a.to_bits() == b.to_bits()));
+        let after = remote.counts();
+        assert!(after[1] > before[1] && ((after[1] - before[1]) as u64) < report.blocks_read);
+        assert!(after[0] - before[0] <= 16, "single requests are for leaves alone: {:?}", (before, after));
+    }
+}
+
+#[test]
+fn whole_blocks_are_read_by_number() {
+    let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
+    let stored = stored(&mut source, &config());
+    let remote = Remote::of(stored.bytes());
+    let file = CoefficientFile::from_storage("far", remote.clone()).unwrap();
+    let ids = [(0, 3), (0, 7), (1, 0), (1, 3), (0, 1)].map(|(window, block)| BlockId { window, block, channel: 0 });
+    for file in [&file, &stored.open()] {
+        for (id, bytes) in ids.iter().zip(file.read_blocks(&ids).unwrap()) {
+            let region = file.blocks.region(id.block as usize);
+            let expected = read_region(file, file.window_range(id.window), &region).unwrap();
+            let found = bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
+            assert!(found.zip(expected).all(|(a, b)| a == b || b.is_nan() && a == MISSING as f32), "{id}");
+        }
+    }
+    assert!(file.read_blocks(&[BlockId { block: file.blocks.len() as u32, ..ids[0] }]).is_err());
+    assert!(file.read_blocks(&[BlockId { window: 9, ..ids[0] }]).is_err());
 }
 
 #[test]
@@ -146,8 +198,26 @@ fn a_batch_of_damaged_blocks_names_the_place() {
     let sound = CoefficientFile::from_storage("sound", bytes.clone()).unwrap();
     let entry = sound.leaf(&sound.leaves(0)[0]).unwrap()[3].clone();
     bytes[entry.parts[0].offset as usize] ^= 1;
-    let [single, many, joined] = std::array::from_fn(|_| Arc::new(AtomicUsize::new(0)));
-    let file = CoefficientFile::from_storage("far", Remote { bytes, single, many, joined }).unwrap();
+    let file = CoefficientFile::from_storage("far", Remote::of(bytes)).unwrap();
     let error = read_region(&file, 0..1, &file.grid.whole()).unwrap_err();
     assert!(error.to_string().contains(&entry.id.to_string()), "{error}");
+}
+
+#[test]
+fn pictures_of_all_views_become_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
+    let file = stored(&mut source, &config());
+    let mut scene = CoefficientScene::from(file.open());
+    let view = View { size: [40, 30], ..View::new(30.0, 20.0) };
+    let views = vec![view, View { azimuth: 60.0, ..view }];
+    let config = RenderConfig { views, frames: vec![2, 11], ..RenderConfig::new(&scene, view) };
+    let colours = Scale::named("viridis", (-1.0, 1.0)).unwrap();
+    for _ in 0..2 {
+        render_png(&mut scene, &config, &colours, folder.path().join("v%v_%02d.png")).unwrap();
+    }
+    for name in ["v0_02.png", "v0_11.png", "v1_02.png", "v1_11.png"] {
+        assert!(std::fs::read(folder.path().join(name)).unwrap().starts_with(b"\x89PNG"), "{name}");
+    }
+    assert!(render_png(&mut scene, &config, &colours, folder.path().join("%02d.png")).is_err());
 }

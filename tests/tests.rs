@@ -23,6 +23,7 @@ mod lattice;
 mod layering;
 mod library;
 mod left_out;
+mod own_scene;
 mod partial;
 mod python;
 mod real;

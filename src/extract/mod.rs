@@ -190,7 +190,8 @@ fn read_piece(
     for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let batch = file.batch(&codec, entries, &wanted)?;
-            let decode = |entry: &BlockEntry| batch.block(entry).map(|b| (b.samples(&codec), b.bytes_read));
+            let decode =
+                |entry: &BlockEntry| batch.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);

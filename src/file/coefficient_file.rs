@@ -6,7 +6,6 @@ use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::file::batch::BlockBatch;
 use crate::file::counted::Counted;
 use crate::source::scan::join_ranges;
 use crate::source::{CHANNELS, ColourTransform};
@@ -21,7 +20,7 @@ use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader,
 #[derive(Debug)]
 pub struct CoefficientFile {
     path: PathBuf,
-    reader: Reader<Counted>,
+    pub(super) reader: Reader<Counted>,
     /// The state of a local file when it was opened.
     state: Option<State>,
     /// The lattice.
@@ -266,24 +265,6 @@ impl CoefficientFile {
         self.block_from(&self.reader, codec, entry, wanted)
     }
 
-    /// Blocks of these directory entries, to be decoded one by one; of their coefficients those that `wanted` marks.
-    ///
-    /// Where the storage prefers batches, this reads their bytes in one call of [`Storage::read_many`].
-    pub fn batch<'a>(
-        &'a self,
-        codec: &'a WindowCodec,
-        entries: &[BlockEntry],
-        wanted: &'a [bool],
-    ) -> Result<BlockBatch<'a>> {
-        let ahead = if self.reader.storage().prefers_batches() {
-            let parts = entries.iter().flat_map(|entry| Block::parts(codec, entry, wanted));
-            Some(self.reader.read_ahead(parts).map_err(|e| self.failed(e))?)
-        } else {
-            None
-        };
-        Ok(BlockBatch { file: self, codec, wanted, ahead })
-    }
-
     /// Reads a block by way of `reader`.
     pub(super) fn block_from<S: Storage>(
         &self,
@@ -350,7 +331,7 @@ impl CoefficientFile {
         self.failed(wavesplat_format::Error::Invalid(what))
     }
 
-    fn failed(&self, source: wavesplat_format::Error) -> Error {
+    pub(super) fn failed(&self, source: wavesplat_format::Error) -> Error {
         Error::CoefficientFile { path: self.path.clone(), source }
     }
 }

@@ -11,5 +11,5 @@ pub mod verify;
 pub mod recover;
 pub mod resume;
 
-pub use batch::BlockBatch;
+pub(crate) use batch::BlockBatch;
 pub use coefficient_file::{CoefficientFile, setting};

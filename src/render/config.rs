@@ -79,36 +79,35 @@ impl Mode {
     }
 }
 
-/// How to render.
+/// How to render. [`RenderConfig::new`] has the defaults; change others by struct update.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
-    /// What becomes of what lies along a ray.
+    /// What becomes of what lies along a ray. Default: a projection.
     pub mode: Mode,
-    /// From where; pictures of all views are equally large.
+    /// From where, one view or more; pictures of all views are equally large.
     pub views: Vec<View>,
-    /// The kernel.
+    /// The kernel. Default: of 0.75 of the largest distance of voxels, without attenuation.
     pub kernel: Kernel,
-    /// What a pixel means.
+    /// What a pixel means. Default: the mean.
     pub quantity: Quantity,
-    /// Which frames, ascending.
+    /// Which frames, ascending. Default: all.
     pub frames: Vec<usize>,
-    /// Which voxels; by default all.
+    /// Which voxels; none means all. Default: none.
     pub region: Option<Region>,
     /// What splatting may add to the error: of an emission relative to the image of the largest |v| at the brightest
     /// place of the plane of the picture, of a mean relative to the value range where weights sum to as much as there, and
-    /// elsewhere in inverse proportion to that sum. 0 asks for the exact method.
+    /// elsewhere in inverse proportion to that sum. 0 asks for the exact method. Default: half of
+    /// [`Scene::tolerance`](super::Scene::tolerance), at most 1e-3.
     pub splat_error: f64,
     /// How far off the picture may be, in the unit of samples, so that less is read and splatted; none: as near as the
-    /// file is. Of an emission: as far as where all samples are off by so much.
+    /// file is. Of an emission: as far as where all samples are off by so much. Default: none.
     pub allowed: Option<f64>,
-    /// Which error that limits.
+    /// Which error that limits. Default: the certified one.
     pub limited: Limit,
-    /// Whether each picture comes with a bound on the error of every pixel.
+    /// Whether each picture comes with a bound on the error of every pixel. Default: no.
     pub certify: bool,
-    /// Bytes that may be allocated.
+    /// Bytes that may be allocated, besides what takes the pictures. Default: 512 MiB.
     pub memory: usize,
-    /// Bytes of these that the sink takes for itself.
-    pub reserved: usize,
 }
 
 /// An error that can be limited.

@@ -1,12 +1,12 @@
 //! The planes of a frame batch: which sums a view keeps for each pixel, and in which order.
 
-/// The planes of a group, one after another: coefficients, then values of single frames, then weights of what is
+/// The planes of a batch, one after another: coefficients, then values of single frames, then weights of what is
 /// missing in single frames and of what is missing in all of them, then errors, and last lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Planes of coefficients.
     pub coefficients: usize,
-    /// Frames of the group.
+    /// Frames of the batch.
     pub frames: usize,
     /// Whether values are splatted into single frames.
     pub values: bool,
@@ -21,6 +21,12 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// One plane of values for each of `frames` frames, and nothing else.
+    pub fn of_values(frames: usize) -> Self {
+        let (coefficients, error_planes, order) = (0, 0, Order::Pixels);
+        Self { coefficients, frames, values: true, absent: false, error_planes, lengths: false, order }
+    }
+
     /// The plane of the values of a frame.
     pub fn value(&self, frame: usize) -> usize {
         self.coefficients + frame

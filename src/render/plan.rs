@@ -50,7 +50,7 @@ impl<'a> Budget<'a> {
         let ([width, height], mib) = (config.size(), least.div_ceil(1 << 20));
         let threads = rayon::current_num_threads();
         Err(Error::usage(format!(
-            "--memory: pictures of {width}x{height} pixels of this volume need at least {mib}MiB with {threads} thread(s)"
+            "--memory: pictures of {width}x{height} pixels of this volume need at least {mib}MiB with {threads} thread(s), besides what writing them takes"
         )))
     }
 
@@ -176,7 +176,7 @@ fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
         (Mode::Projection, _) => setups.len() * width * height * WEIGHT_BYTES,
         (_, setup) => setup.map_or(0, |setup| slabs::bytes(setup, config)),
     };
-    memory::FIXED + config.reserved + more
+    memory::FIXED + more
 }
 
 /// An upper bound of the planes that some frames of a batch need.

@@ -1,20 +1,20 @@
-//! What a block adds to the planes of a picture, as amounts of its voxels and one plane at a time.
+//! What a block adds to the planes of a picture: a value for each of its voxels, one plane at a time.
 
 use crate::base::error::Result;
 use crate::base::sample::{SampleType, load_as};
 use crate::codec::field::Plane;
 use crate::codec::real::Real;
 
-/// The amounts of a block's voxels in one plane.
+/// The values of a block's voxels in one plane.
 #[derive(Debug, Clone, Copy)]
 pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
-    /// One for each voxel, x fastest.
+    /// One for each voxel: x fastest, then y, z.
     Single(&'a [f32]),
     /// As [`Self::Single`].
     Double(&'a [f64]),
-    /// Those that are not zero: (voxel, amount).
+    /// Those that are not zero, ascending: (place of the voxel in the block's array, value).
     Few(&'a [(u32, f64)]),
 }
 
@@ -58,25 +58,33 @@ impl<'a> From<Plane<'a>> for PlaneValues<'a> {
     }
 }
 
-/// A block that has been read.
+/// A block that has been read, or is read plane by plane.
 pub trait BlockPlanes: Send + Sync {
-    /// Voxels of the block.
+    /// Number of voxels of the block.
     fn voxels(&self) -> usize;
 
-    /// The amounts of a plane, which may be in `room`.
+    /// The values of a plane (0 to [`Layout::planes`](super::Layout::planes)), which may lie in `room`.
+    ///
+    /// # Errors
+    /// Whatever keeps the block from being read; it ends the rendering.
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
-    /// Nonzero coefficients, and stored bytes that were read for them.
+    /// Number of nonzero coefficients, and of stored bytes that were read for them; for the report.
     fn held(&self) -> [u64; 2];
 }
 
 /// Where blocks come from.
 pub(super) trait BlockSource: Sync {
+    /// Prepares for these blocks, which are read next.
+    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
+        Ok(())
+    }
+
     /// Reads a block.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
 
-/// Room for the amounts of a plane while they are made.
+/// Room for the values of a plane while they are made; each worker has its own.
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(super) bytes: Vec<u8>,
@@ -85,6 +93,12 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// Room for one value of each of so many voxels; its content is of an earlier block.
+    pub fn room(&mut self, voxels: usize) -> &mut [f64] {
+        self.double.resize(voxels, 0.0);
+        &mut self.double
+    }
+
     /// The samples that lie in `bytes`, of which none is missing.
     pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();

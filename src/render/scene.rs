@@ -1,20 +1,28 @@
-//! What is splatted: a scene gives the terms of its blocks, whatever they are made of.
+//! What is splatted: a scene gives the values of its blocks, whatever they are made of.
 //!
-//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of amounts in planes, and a
+//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of values in planes, and a
 //! linear map from planes to frames. That is all the rest of the renderer knows of them.
 
-use super::config::RenderConfig;
+use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
 use super::layout::Layout;
 use super::plane_values::BlockPlanes;
 use crate::base::error::Result;
-use crate::base::grid::{BlockGrid, Grid};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::memory;
+use crate::view::camera::View;
+use crate::view::footprint::Kernel;
 use crate::wavelet::Lane;
 use serde::Serialize;
 
-/// Something to render.
+/// Something to render: a lattice of voxels with values in every frame, read block by block.
+///
+/// [`super::CoefficientScene`] and [`super::FrameScene`] come with the library. Another program implements this trait for
+/// data of its own, with three types: the scene, a [`FrameBatch`] of it, and a block of that ([`BlockPlanes`]). A scene
+/// whose planes are the values of its frames takes [`Layout::of_values`], [`Selection::of_any_values`], and an inverse that
+/// copies.
 pub trait Scene {
-    /// The lattice.
+    /// The lattice of voxels in the world.
     fn grid(&self) -> &Grid;
 
     /// How the lattice is cut into blocks.
@@ -28,17 +36,56 @@ pub trait Scene {
     /// Number of frames, if it is known before they are read.
     fn frames(&self) -> Option<usize>;
 
+    /// What samples may be off by, as a share of their value range, if that is known; the default splat error follows it.
+    fn tolerance(&self) -> Option<f64> {
+        None
+    }
+
     /// One past the last frame that can be rendered together with `frame`.
     fn batch_end(&self, frame: usize) -> usize;
 
-    /// An upper bound of the planes that `frames` frames of a group need.
+    /// An upper bound of the planes that `frames` frames of a batch need.
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
 
-    /// An upper bound of the bytes that one block takes.
+    /// An upper bound of the bytes that one block takes while it is read.
     fn block_bytes(&self) -> usize;
 
     /// Opens one channel of some frames, and decides which blocks are read.
+    ///
+    /// # Errors
+    /// Whatever keeps the scene from reading them; it ends the rendering.
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>>;
+}
+
+impl RenderConfig {
+    /// Means of all frames of a scene from one view, and the defaults of all else.
+    ///
+    /// ```
+    /// use wavesplat::render::{FrameScene, Quantity, RenderConfig};
+    /// use wavesplat::source::ArraySource;
+    /// use wavesplat::view::camera::View;
+    ///
+    /// let source = ArraySource::from_f32([8, 8, 8], &[1.0; 2 * 8 * 8 * 8])?;
+    /// let scene = FrameScene::new(Box::new(source), None);
+    /// let emission = RenderConfig { quantity: Quantity::Emission, ..RenderConfig::new(&scene, View::new(30.0, 20.0)) };
+    /// assert_eq!(emission.frames, [0, 1]);
+    /// # Ok::<(), wavesplat::Error>(())
+    /// ```
+    pub fn new(scene: &dyn Scene, view: View) -> Self {
+        Self {
+            mode: Mode::Projection,
+            views: vec![view],
+            kernel: Kernel::of_grid(scene.grid()),
+            quantity: Quantity::Mean,
+            frames: (0..scene.frames().unwrap_or(0)).collect(),
+            region: None,
+            splat_error: default_splat_error(scene.tolerance()),
+            allowed: None,
+            limited: Limit::Certified,
+            certify: false,
+            memory: memory::DEFAULT,
+        }
+    }
 }
 
 /// Frames that are to be rendered together.
@@ -54,7 +101,7 @@ pub struct BatchRequest<'a> {
     pub views: &'a [Expectation<'a>],
 }
 
-/// Some frames that are rendered together.
+/// Some frames that are rendered together. Several threads read its blocks.
 pub trait FrameBatch: Sync {
     /// How the planes are used.
     fn layout(&self) -> Layout;
@@ -62,21 +109,32 @@ pub trait FrameBatch: Sync {
     /// The blocks that are read.
     fn selection(&self) -> &Selection;
 
+    /// Prepares for these blocks, which [`Self::planes`] is asked for next: scenes far away read them together. By default
+    /// nothing is done.
+    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
+        Ok(())
+    }
+
     /// What a block adds to the planes.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 
-    /// What gives the frames at some pixels from their planes, of which all but `used` are zero: the inverse transform (eq 8).
+    /// A function from planes to frames at some pixels, for planes of which all but `used` are zero: the inverse transform
+    /// (eq 8). It is given [`Layout::planes`] lanes or more, each with one plane's sums at [`LANES`](super::LANES) pixels, and
+    /// fills [`Layout::frames`] lanes.
     fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
 
     /// How far the samples may be from the source's, besides what the terms in error planes say.
     fn errors(&self) -> &SampleErrors;
 
-    /// What was found on the way; an error if what was read changed meanwhile.
+    /// What was found on the way.
+    ///
+    /// # Errors
+    /// The data changed while they were read.
     fn finish(&self) -> Result<BatchOutcome>;
 }
 
-/// The frames at some pixels from all planes. Overwrites these.
-pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
+/// Frames at some pixels (second argument) from all planes there (first argument, which it may overwrite).
+pub type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
 /// What reading a batch found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +163,23 @@ pub struct Selection {
     pub certified: f64,
     /// For each view of the request, the mean square over its pixels that the samples' errors are expected to come to.
     pub expected: Vec<f64>,
+}
+
+impl Selection {
+    /// All blocks that touch the region of a request, for scenes that know no values before they read them.
+    pub fn of_any_values(blocks: BlockGrid, request: &BatchRequest<'_>) -> Self {
+        let region = request.config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
+        let touching: Vec<usize> = blocks.touching(&region).collect();
+        let any = (f64::NEG_INFINITY, f64::INFINITY);
+        let ranged = if request.config.mode.is_projection() { &[][..] } else { &touching };
+        Self {
+            ranges: ranged.iter().map(|block| (*block, any)).collect(),
+            empty: (blocks.len() - touching.len()) as u64,
+            blocks: touching,
+            expected: vec![0.0; request.views.len()],
+            ..Self::default()
+        }
+    }
 }
 
 /// What need not be read of blocks.

@@ -111,8 +111,7 @@ pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
 
 /// All samples of one of its channels.
 pub(crate) fn extracted_channel(file: &CoefficientFile, channel: usize) -> Vec<u8> {
-    let config =
-        ExtractConfig { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel, memory: MEMORY };
+    let config = ExtractConfig { channel, memory: MEMORY, ..ExtractConfig::new(file) };
     let mut out = Vec::new();
     extract(file, &config, Path::new("out"), &mut out, &Silent).unwrap();
     out
@@ -133,7 +132,6 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         limited: Default::default(),
         certify: false,
         memory: MEMORY,
-        reserved: 0,
         mode: Default::default(),
     }
 }

@@ -9,8 +9,8 @@ use crate::codec::field::Field;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 
 /// A block of a file that has been read.
-pub(super) struct CodedBlock<'a> {
-    batch: &'a CoefficientBatch<'a>,
+pub(super) struct CodedBlock<'b, 'a> {
+    batch: &'b CoefficientBatch<'a>,
     block: Block,
     /// What its samples may be off by, for each error plane.
     errors: Vec<f64>,
@@ -29,9 +29,9 @@ enum Dense {
     Coefficients(Option<Field<'static>>),
 }
 
-impl<'a> CodedBlock<'a> {
+impl<'b, 'a> CodedBlock<'b, 'a> {
     /// Of a block of a batch whose samples may be off by so much.
-    pub(super) fn new(batch: &'a CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
+    pub(super) fn new(batch: &'b CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
         let codec = &batch.codec;
         if block.exact.is_some() || batch.what == SplatSource::Samples {
             let dense = Dense::Samples(block.samples(codec));
@@ -74,7 +74,7 @@ impl<'a> CodedBlock<'a> {
     }
 }
 
-impl BlockPlanes for CodedBlock<'_> {
+impl BlockPlanes for CodedBlock<'_, '_> {
     fn voxels(&self) -> usize {
         self.block.voxels
     }

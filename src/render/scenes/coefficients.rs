@@ -7,7 +7,7 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::file::CoefficientFile;
+use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
 use crate::render::layout::{Layout, Order};
@@ -41,6 +41,13 @@ impl CoefficientScene {
     }
 }
 
+impl From<CoefficientFile> for CoefficientScene {
+    /// Splats the file's coefficients.
+    fn from(file: CoefficientFile) -> Self {
+        Self::new(file, SplatSource::Coefficients)
+    }
+}
+
 impl Scene for CoefficientScene {
     fn grid(&self) -> &Grid {
         &self.file.grid
@@ -56,6 +63,10 @@ impl Scene for CoefficientScene {
 
     fn frames(&self) -> Option<usize> {
         Some(self.file.frames())
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        Some(self.file.metadata().tolerance)
     }
 
     fn batch_end(&self, frame: usize) -> usize {
@@ -155,6 +166,8 @@ pub(super) struct CoefficientBatch<'a> {
     errors: SampleErrors,
     /// The leaf that was read last: blocks come in order.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
+    /// The blocks that were read together last, where the file prefers that.
+    fetched: Mutex<Option<Arc<BlockBatch<'a>>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
@@ -183,6 +196,7 @@ impl<'a> CoefficientBatch<'a> {
             selection: Selection::default(),
             errors: SampleErrors::default(),
             leaf: Mutex::default(),
+            fetched: Mutex::default(),
         };
         batch.select(config)?;
         Ok(batch)
@@ -316,11 +330,21 @@ impl<'a> CoefficientBatch<'a> {
         Ok(last.clone())
     }
 
+    /// What is read of a block, by its number.
+    fn kept(&self, block: usize) -> Result<KeptParts> {
+        let leaf = self.leaf_of(block as u32)?;
+        Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
+    }
+
     /// Reads a block, and what its samples may be off by.
     fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
-        let leaf = self.leaf_of(block as u32)?;
-        let KeptParts { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        Ok((self.file.block(&self.codec, &entry, &self.wanted)?, errors))
+        let KeptParts { entry, errors, .. } = self.kept(block)?;
+        let fetched = self.fetched.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let block = match fetched {
+            Some(fetched) => fetched.block(&self.codec, &entry, &self.wanted)?,
+            None => self.file.block(&self.codec, &entry, &self.wanted)?,
+        };
+        Ok((block, errors))
     }
 }
 
@@ -331,6 +355,16 @@ impl FrameBatch for CoefficientBatch<'_> {
 
     fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        if self.file.prefers_batches() {
+            let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
+            let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
+            let batch = Arc::new(self.file.batch(&self.codec, &entries, &self.wanted)?);
+            *self.fetched.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+        }
+        Ok(())
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

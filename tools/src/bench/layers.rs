@@ -13,9 +13,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render,
-};
+use wavesplat::render::{CoefficientScene, FrameScene, Limit, RenderConfig, RenderReport, Scene, SplatSource, render};
 use wavesplat::source::{self, OpenOptions};
 use wavesplat::view::footprint::Kernel;
 
@@ -151,18 +149,13 @@ fn pictures(
     allowed: Option<(f64, Limit)>,
 ) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        views: vec![Look::first(task.dims, SIZE).view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
-        quantity: Quantity::Mean,
         frames: (0..task.frames).collect(),
-        region: None,
         splat_error,
         allowed: allowed.map(|(allowed, _)| allowed),
         limited: allowed.map(|(_, limit)| limit).unwrap_or_default(),
-        certify: false,
         memory: MEMORY,
-        reserved: 0,
-        mode: Default::default(),
+        ..RenderConfig::new(scene, Look::first(task.dims, SIZE).view())
     };
     let (mut found, mut best) = (Vec::new(), RenderReport { seconds: f64::INFINITY, ..RenderReport::default() });
     for _ in 0..if splat_error > 0.0 { REPEATS } else { 1 } {

@@ -14,7 +14,7 @@ use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, SplatSource};
+use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
 
@@ -141,18 +141,12 @@ fn by_library(
     sink: &mut dyn FnMut(wavesplat::render::Rendered<'_>),
 ) -> Result<Viewed> {
     let config = RenderConfig {
-        views: vec![look.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
-        quantity: Quantity::Mean,
         frames: (0..step.frames).collect(),
-        region: None,
         splat_error: step.splat_error,
-        allowed: None,
-        limited: Default::default(),
         certify,
         memory: MEMORY,
-        reserved: 0,
-        mode: Default::default(),
+        ..RenderConfig::new(scene, look.view())
     };
     let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered);
