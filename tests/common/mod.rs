@@ -55,7 +55,7 @@ impl Stored {
     }
 
     pub(crate) fn open(&self) -> CoefficientFile {
-        CoefficientFile::open_with(&self.path(), Access::Read).unwrap()
+        CoefficientFile::open_with(self.path(), Access::Read).unwrap()
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {
