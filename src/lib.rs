@@ -78,4 +78,11 @@ pub mod convert;
 pub mod view;
 pub mod render;
 pub mod extract;
+#[cfg(feature = "args")]
 pub mod cli;
+
+#[doc = include_str!("method.md")]
+#[allow(rustdoc::private_intra_doc_links, reason = "it links to the modules that implement it, public or not")]
+pub mod method {}
+#[doc = include_str!("bibliography.md")]
+pub mod bibliography {}

@@ -1,4 +1,4 @@
-//! The promise of method.md section 5, searched for series that break it. Nothing here calls the library's own bound.
+//! The error bounds (eq 21-23), searched for series that break them. Nothing here calls the library's own bound.
 
 use crate::common::exact::Limit;
 use crate::common::memory::Memory;
@@ -27,14 +27,14 @@ pub(crate) struct Case {
     pub(crate) bound: Bound,
     pub(crate) tolerance: f64,
     pub(crate) frames: usize,
-    /// log2 of the window's length, or of one less.
+    /// log2 of the window's length, or of the length minus one.
     pub(crate) window: u32,
     pub(crate) edge: usize,
     pub(crate) dims: [usize; 3],
     pub(crate) seed: u64,
 }
 
-/// What was converted, and what came back of it.
+/// An archive, and the samples that came back from its file.
 pub(crate) struct Trial {
     pub(crate) case: Case,
     pub(crate) file: CoefficientFile,
@@ -85,7 +85,7 @@ impl Case {
 }
 
 impl Trial {
-    /// Compares everything, and returns the number of series: of a voxel in a window.
+    /// Compares all samples. Returns the number of series; a series is a voxel in a window.
     pub(crate) fn check(&self) -> usize {
         (0..self.file.metadata().windows.len() as u32).map(|w| self.window(w)).sum()
     }
@@ -93,7 +93,7 @@ impl Trial {
     fn window(&self, window: u32) -> usize {
         let frames = self.file.window_range(window);
         let voxels = self.file.grid.whole().voxels();
-        let Some(limit) = self.limit(window) else { return voxels }; // all missing so far
+        let Some(limit) = self.limit(window) else { return voxels }; // all samples so far are missing
         let record = &self.file.metadata().windows[window as usize];
         assert!(limit.holds(record.delta, 0.0), "delta {} for {limit:?}", record.delta);
         assert!(!self.of_samples() || record.reached <= record.delta);
@@ -109,14 +109,14 @@ impl Trial {
         voxels
     }
 
-    /// Whether the bound is one of every sample.
+    /// Whether the bound applies to every single sample.
     fn of_samples(&self) -> bool {
         matches!(self.case.bound, Bound::Pointwise | Bound::Relative { .. })
     }
 
-    /// What the window's delta may be at most; none if all samples so far are missing. The tolerance times the range of
-    /// all samples up to its end; or times its own largest magnitude; or the number that was estimated, which another test
-    /// compares with its definition.
+    /// The largest delta that the window may have; none if all samples so far are missing. It is the tolerance times
+    /// the range of all samples up to the window's end, or times the window's own largest magnitude. For a sampled
+    /// bound it is the estimated number, which another test compares with its definition.
     fn limit(&self, window: u32) -> Option<Limit> {
         let (frames, voxels) = (self.file.window_range(window), self.file.grid.whole().voxels());
         let present =
@@ -135,8 +135,8 @@ impl Trial {
         }
     }
 
-    /// `found` has a value for every sample of the archive; `places` are those of the series, which may use a `share` of
-    /// its bound.
+    /// `found` has a value for every sample of the archive. `places` are the samples of the series, which may use a
+    /// `share` of its bound.
     fn series(&self, limit: &Limit, share: f64, places: &[usize], found: &[f64], what: &str) {
         let present = places.iter().filter(|i| !self.missing[**i]);
         let pairs: Vec<(f64, f64)> = present.map(|i| (found[*i], self.source[*i])).collect();
@@ -151,7 +151,8 @@ impl Trial {
         assert!(holds, "{what}, sample {}: outside {share} of {limit:?}: (found, source) {pairs:?}", places[0]);
     }
 
-    /// What the renderer splats: coefficients not rounded to the samples' type, and what overrides them.
+    /// The values that the renderer splats: decoded coefficients before rounding to the sample type, with outliers and
+    /// missing samples in place.
     fn splatted(&self, window: u32, limit: &Limit) {
         let codec = self.file.codec(window).unwrap();
         let mut found = self.found.clone(); // right for missing and exact samples
@@ -186,7 +187,7 @@ impl Trial {
         }
     }
 
-    /// Where the samples of a block are in the archive.
+    /// Positions of a block's samples in the archive.
     fn places(&self, codec: &WindowCodec, window: u32, block: u32) -> Vec<usize> {
         let (whole, region) = (self.file.grid.whole(), self.file.blocks.region(block as usize));
         let first = self.file.window_range(window).start;
@@ -197,7 +198,7 @@ impl Trial {
 
 pub(crate) const TOLERANCES: [f64; 12] = [0.0, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 4e-3, 0.02, 0.1, 0.3, 0.5];
 
-/// All that can be promised.
+/// Every kind of bound.
 pub(crate) const BOUNDS: [Bound; 6] = [
     Bound::Pointwise,
     Bound::Rms,
@@ -226,7 +227,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 mask,
                 basis: BASES[basis],
                 bound: BOUNDS[bound],
-                tolerance: TOLERANCES[tolerance] * share, // with all digits in use
+                tolerance: TOLERANCES[tolerance] * share, // a tolerance with all digits in use
                 frames,
                 window,
                 edge,
@@ -237,7 +238,7 @@ fn cases() -> impl Strategy<Value = Case> {
     )
 }
 
-/// Runs `check`, which returns a number of series, on `cases` random `values` times [`times`]; returns the sum.
+/// Runs `check`, which returns a number of series, on `cases` random `values` times [`times`]. Returns the sum.
 pub(crate) fn search<S: Strategy>(cases: usize, values: S, check: impl Fn(S::Value) -> usize) -> usize {
     let series = Cell::new(0);
     let cases = (cases * times()) as u32;

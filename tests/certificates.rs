@@ -1,7 +1,7 @@
-//! Certified pictures (method.md section 5): no pixel is further from the truth than its certificate says.
+//! Certified pictures (eq 26): no pixel is further from the truth than its certificate says.
 //!
-//! The truth is brute force over the samples of the source, with a kernel that is never cut. Nothing is allowed beyond
-//! the certificate itself.
+//! The reference is brute force over the samples of the source with an uncut kernel. The comparison allows nothing
+//! beyond the certificate itself.
 
 use crate::coefficients::{Trial, doubles, views};
 use crate::common::random::Random;
@@ -18,7 +18,7 @@ use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 
-/// The truth of one view, against which several pictures are held.
+/// The reference pictures of one view, with which several pictures are compared.
 struct Truth<'a> {
     trial: &'a Trial,
     config: RenderConfig,
@@ -27,7 +27,7 @@ struct Truth<'a> {
 }
 
 impl<'a> Truth<'a> {
-    /// All frames; the kernel's sigma may be other than the default.
+    /// Renders all frames by brute force; the kernel's sigma may differ from the default.
     fn new(trial: &'a Trial, (view, tau): (View, f64), sigma: Option<f64>) -> Self {
         let samples = values(&trial.memory, trial.ty());
         let missing: Vec<bool> =
@@ -41,7 +41,8 @@ impl<'a> Truth<'a> {
         Self { trial, config, images, masked: missing.contains(&true) }
     }
 
-    /// Every pixel of both quantities for ever coarser splats; the largest share of its certificate that any uses.
+    /// Compares every pixel of both quantities for coarser and coarser splats. Returns the largest share of a
+    /// certificate that any pixel uses.
     fn check(&self, scene: &mut dyn Scene, allowed: Option<f64>) -> f64 {
         let mut used = 0.0_f64;
         for splat_error in [0.0, 1e-3, 0.02, 2.0] {
@@ -72,7 +73,8 @@ impl<'a> Truth<'a> {
         used
     }
 
-    /// What is missing is splatted with the cut, so that the border of the background moves by what lies beyond.
+    /// Missing samples are splatted with the cut kernel, so the border of the background moves by the part beyond the
+    /// cut.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let share = self.images.weight[at] / self.images.largest_weight;
         self.masked && (share - BACKGROUND).abs() < report.views[0].stated_splat_error
@@ -139,7 +141,7 @@ fn certificates_are_tighter_where_blocks_did_better() {
     assert!(small * 4 > inside.len(), "{small} of {} pixels", inside.len());
 }
 
-/// A block large enough to have its levels in parts of their own, and a flat one that is smaller.
+/// One block is large enough to have each level in a part of its own; a smaller one is flat.
 fn in_levels(bound: Bound) -> Trial {
     let grid = Grid::unit([36, 32, 32]);
     let noise = field(&grid, 32, 4);
@@ -151,7 +153,7 @@ fn in_levels(bound: Bound) -> Trial {
     Trial { name: "in levels", memory, config, file }
 }
 
-/// What leaving out adds to every sample, from the directory alone: `[block][frame]`.
+/// The change of every sample when parts are omitted, computed from the directory alone: `[block][frame]`.
 fn added(trial: &Trial, allowed: f64) -> Vec<Vec<f64>> {
     let file = trial.file.open();
     let codec = file.codec(0).unwrap();
@@ -176,7 +178,7 @@ fn added(trial: &Trial, allowed: f64) -> Vec<Vec<f64>> {
     file.leaves(0).iter().flat_map(|l| file.leaf(l).unwrap()).map(of_block).collect()
 }
 
-/// The emission of what leaving out adds to every sample.
+/// The emission of the change of every sample when parts are omitted.
 fn growth(trial: &Trial, config: &RenderConfig, scale: f64, allowed: f64) -> Vec<f64> {
     let (grid, blocks) = (trial.grid(), trial.file.open().blocks);
     let mut amounts = vec![0.0; 32 * grid.whole().voxels()];
@@ -202,7 +204,7 @@ fn a_certificate_grows_by_just_what_is_left_out() {
             assert!((1..5).contains(&seen.left_out.parts), "{:?}", seen.left_out);
             let growth = growth(&trial, &config, report.views[0].scale, allowed);
             for ((error, whole), growth) in errors.iter().zip(&whole).zip(&growth) {
-                // Certificates are singles, rounded up, and hold the rounding of their pixels.
+                // Certificates are `f32`, rounded up, and include the rounding of their pixels.
                 let off = (f64::from(*error) - f64::from(*whole) - growth).abs();
                 assert!(off <= 1e-6 * f64::from(*error) + 1e-5, "{error} after {whole}: {growth} more");
             }
@@ -259,7 +261,7 @@ fn memory_changes_no_bit_of_a_certificate() {
     }
 }
 
-/// A picture whose only shown voxels are missing within the cut and present beyond it.
+/// A picture in which all visible voxels within the cut are missing, and those beyond the cut are present.
 fn masked_within_the_cut() -> Trial {
     let grid = Grid::unit([21, 40, 1]);
     let mut random = Random(4);
@@ -286,7 +288,8 @@ fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
                 for ((found, error), expected) in found.iter().zip(&errors).zip(&truth.images.mean) {
                     assert_eq!(found.is_nan(), error.is_nan());
                     let off = (f64::from(*found) - expected).abs();
-                    // The brightest place is far outside of the picture, so that the cut may leave out all that there is.
+                    // The largest weight lies far outside of the picture, so the cut may omit everything in the
+                    // picture.
                     assert!(found.is_nan() || expected.is_nan() || off <= f64::from(*error), "{found} for {expected}");
                 }
             }

@@ -1,4 +1,4 @@
-//! Files of colours: every channel within its bound of the colours of the samples, and pictures of them.
+//! Files of colours: every channel is within its bound of the samples' colours, and so are pictures of the channels.
 
 use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
@@ -18,10 +18,10 @@ use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 use wavesplat::wavelet::Basis;
 
-/// What a colour's rounding to an `f32` may come to, by both ways of computing it.
+/// Largest rounding error of a colour as `f32`, for either way of computing it.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 
-/// Slopes, a step, two steps at one place, a flat piece, and a channel that is dark for half of the values.
+/// Slopes, a step, two steps at one value, a flat piece, and a channel that is dark for half of the values.
 const SHARES: [Point; 7] = [
     (0.0, [0.0, 1.0, 0.0]),
     (0.3, [1.0, 0.75, 0.0]),
@@ -32,12 +32,12 @@ const SHARES: [Point; 7] = [
     (1.0, [0.7, 0.3, 1.0]),
 ];
 
-/// An archive in colours, and what the reference makes of it.
+/// An archive of colours and the reference's result for it.
 struct Painted {
     memory: Memory,
     config: ConvertConfig,
     missing: Vec<bool>,
-    /// `channels[channel][sample]`; 0 where a sample is missing.
+    /// `channels[channel][sample]`; 0 if a sample is missing.
     channels: [Vec<f64>; 3],
 }
 
@@ -75,7 +75,7 @@ impl Painted {
         FrameScene::coloured(Box::new(self.memory.clone()), self.config.missing_value, colours)
     }
 
-    /// Compares every channel of a file with the colours; how many samples were off by any amount.
+    /// Compares every channel of a file with the colours. Returns how many samples differ at all.
     fn check(&self, name: &str) -> usize {
         let stored = self.file();
         let (file, voxels, mut off) = (stored.open(), self.grid().whole().voxels(), 0);
@@ -201,14 +201,14 @@ fn pictures_of_colours_are_within_the_bound_of_those_by_the_conventional_method_
     }
 }
 
-/// Pictures of frames, of coefficients and of decoded samples, against one another and against brute force.
+/// Compares pictures of frames, of coefficients and of decoded samples with each other and with brute force.
 fn check(quantity: Quantity, [a, b, c]: [Vec<f32>; 3], truth: &Images) {
     let mean = quantity == Quantity::Mean;
     let expected = if mean { &truth.mean } else { &truth.emission };
     let most = 1e-6 * largest(expected);
     for at in 0..a.len() {
         let weight = if mean { 1.0 } else { truth.weight[at] };
-        let left = if mean { 0.0 } else { 1e-14 * truth.largest_weight }; // of what is subtracted again where it is missing
+        let left = if mean { 0.0 } else { 1e-14 * truth.largest_weight }; // rounding left over after missing samples are subtracted
         assert_eq!((a[at].is_nan(), b[at].is_nan()), (expected[at].is_nan(), a[at].is_nan()));
         if a[at].is_nan() {
             continue;
@@ -252,7 +252,7 @@ fn no_number_of_a_coloured_pixel_is_beyond_its_certificate() {
     }
 }
 
-/// How far off samples, or pixels, may be under a looser tolerance.
+/// How far samples, or pixels, may deviate under a looser tolerance.
 const ALLOWED: f64 = 0.2;
 
 #[test]
@@ -262,7 +262,7 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
     let wave = |[x, y, z]: [usize; 3], t: usize| (0.1 * (x + 2 * y) as f64 - 0.2 * t as f64).sin() + 0.01 * z as f64;
     let samples: Vec<f64> = (0..16).flat_map(|t| grid.whole().iter().map(move |voxel| wave(voxel, t))).collect();
     let mut painted = Painted::new(archive(grid, SampleType::F32, &samples), config);
-    let points = vec![(-1.0, [0.0, 0.2, 1.0]), (1.2, [1.0, 0.8, 0.0])]; // steps leave nothing to leave out
+    let points = vec![(-1.0, [0.0, 0.2, 1.0]), (1.2, [1.0, 0.8, 0.0])]; // a map with steps would allow no omission
     painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
     let file = painted.file();
     let plain = looking(view(40.0, 20.0, [60, 50]), 0.0, Quantity::Mean, &grid, 16);

@@ -1,4 +1,4 @@
-//! What `--basis pyramid` chooses, against every scheme there is to choose from.
+//! Compares the choice of `--basis pyramid` with every available scheme.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -32,7 +32,7 @@ fn long_along(axis: usize) -> Vec<f64> {
     (0..FRAMES).flat_map(|t| grid.whole().iter().map(|[x, y, z]| value([x, y, z, t])).collect::<Vec<_>>()).collect()
 }
 
-/// Bytes of all level parts.
+/// Total bytes of all level parts.
 fn size<'a>(parts: impl IntoIterator<Item = &'a EncodedPart>) -> usize {
     parts.into_iter().map(|part| part.stored.len()).sum()
 }

@@ -1,4 +1,4 @@
-//! Pictures from coefficients: equal to those of the decoded samples, and within the bound of those of the source.
+//! Pictures from coefficients equal those of the decoded samples, and are within the bound of those of the source.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -49,7 +49,7 @@ impl Trial {
     }
 }
 
-/// 1e9 in one half, on which the bound is near a unit in the last place; 1 in the other.
+/// Half of the volume is 1e9, where the bound is near a unit in the last place; the other half is 1.
 fn hard(grid: Grid) -> Memory {
     let mut random = Random(9);
     let height = |voxel: usize| if voxel % grid.dims[0] < 4 { 1.0 } else { 1e9 };
@@ -68,7 +68,7 @@ fn masked(grid: Grid) -> Memory {
     archive(grid, SampleType::F64, &samples)
 }
 
-/// Some voxels are within the bound of the value that means missing, 0, which some of their samples have.
+/// Some voxels are within the bound of 0, the value that marks missing samples. Some of their samples have that value.
 fn near_the_missing_value(grid: Grid) -> Memory {
     let mut samples = field(&grid, FRAMES, 6);
     let (voxels, mut random) = (grid.whole().voxels(), Random(3));
@@ -78,7 +78,7 @@ fn near_the_missing_value(grid: Grid) -> Memory {
     archive(grid, SampleType::F64, &samples)
 }
 
-/// Doubles, so that decoded samples are what is splatted.
+/// Samples are `f64`, so the decoded samples are exactly the splatted values.
 pub(crate) fn doubles() -> Vec<Trial> {
     let grid = SKEWED;
     let plain = || archive(grid, SampleType::F64, &field(&grid, FRAMES, 2));
@@ -120,7 +120,7 @@ pub(crate) fn doubles() -> Vec<Trial> {
     ]
 }
 
-/// Leaves a bound of a few units in the last place of 1e9.
+/// The tolerance gives a bound of a few units in the last place of 1e9.
 const HARD: f64 = 2.5e-16;
 
 pub(crate) fn views() -> [(View, f64); 3] {
@@ -159,9 +159,9 @@ fn coefficients_show_what_the_decoded_samples_show() {
     }
 }
 
-/// Both pictures come from the same splat, so nothing is allowed beyond the bound but half a unit in the last place of
-/// each pixel's own `f32`; and where samples are missing, what the sums in `f64` leave of an emission that is subtracted
-/// again. Weights are the reference's.
+/// Both pictures come from the same splat. So the comparison allows only the bound and half a unit in the last place
+/// of each pixel's own `f32`. With missing samples it also allows the rounding that `f64` sums leave after an emission
+/// is subtracted again. Weights are the reference's.
 fn check_within_the_bound(trial: &Trial, region: Option<Region>) {
     let samples = values(&trial.memory, trial.ty());
     let missing: Vec<bool> = samples.iter().map(|v| !v.is_finite() || Some(*v) == trial.config.missing_value).collect();

@@ -1,4 +1,4 @@
-//! Colour and opacity along the ray, and the largest value: against brute force, and as slabs become thinner.
+//! Colour and opacity along the ray, and largest values: compared with brute force, and as slabs become thinner.
 
 use crate::common::views::{archive, field, of_reference, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored};
@@ -16,7 +16,7 @@ use wavesplat::wavelet::Basis;
 const FRAMES: usize = 5;
 const GRID: Grid = Grid { dims: [13, 9, 11], spacing: [1.0, 0.8, 1.2], origin: [5.0, -2.0, 100.0] };
 
-/// From blue and clear at -1 over green to red at 4.
+/// From transparent blue at -1 over green to red at 4.
 const COLOURS: [(f64, [f64; 3]); 3] = [(-1.0, [0.1, 0.2, 1.0]), (1.5, [0.2, 1.0, 0.1]), (4.0, [1.0, 0.1, 0.0])];
 const OPACITIES: [(f64, f64); 3] = [(0.0, 0.0), (2.0, 0.3), (3.5, 0.9)];
 const UNIT: f64 = 1.5;
@@ -25,7 +25,7 @@ fn transfer() -> TransferFunction {
     TransferFunction::of_points(COLOURS.to_vec(), ColourSpace::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
 }
 
-/// What the transfer function is, in the reference's own words.
+/// The transfer function in the reference's terms.
 fn medium(value: f64) -> [f64; 4] {
     let linear = |points: &[(f64, f64)]| {
         let mut found = points[0].1;
@@ -57,7 +57,7 @@ fn views() -> [View; 3] {
     ]
 }
 
-/// The largest difference of any number of any pixel of all frames from what `expected(slabs of the frame, pixel)` says.
+/// The largest difference of any component of any pixel in all frames from `expected(slabs of the frame, pixel)`.
 fn largest_difference(
     found: &[f32],
     (grid, config, slabs): (&Grid, &RenderConfig, usize),
@@ -83,7 +83,7 @@ fn largest_difference(
     largest
 }
 
-/// Exactly stored, so that nothing but splatting is approximate; blocks are small, so that there are many.
+/// All samples are stored exactly, so that only splatting is approximate. Blocks are small, so that there are many.
 fn exact(samples: &[f64], coding: impl Into<SchemeConstraint>) -> Stored {
     let config = ConvertConfig { block: Some(5), coding: coding.into(), ..settings(Basis::Haar, 4, 0.0) };
     stored(&mut archive(GRID, SampleType::F64, samples), &config)
@@ -103,7 +103,7 @@ fn with_holes(mut samples: Vec<f64>) -> Vec<f64> {
     samples
 }
 
-/// But for what no 8-bit picture shows: what is behind where less than 1/2048 of the light comes through.
+/// Ignores what no 8-bit picture shows: contributions behind a point where less than 1/2048 of the light passes.
 #[test]
 fn slabs_are_blended_as_by_brute_force() {
     for (n, view) in views().into_iter().enumerate() {
@@ -128,7 +128,7 @@ fn slabs_are_blended_as_by_brute_force() {
     }
 }
 
-/// README says how the error falls.
+/// The README states how the error falls with the thickness.
 #[test]
 fn thinner_slabs_come_nearer_to_the_integral_along_the_ray() {
     let grid = Grid { dims: [9, 8, 7], ..GRID };
@@ -164,7 +164,7 @@ fn the_largest_value_is_that_of_the_slabs() {
     }
 }
 
-/// A mean is off by no more than its samples, so the largest of some means is, too.
+/// The error of a mean is at most that of its samples, and so is the error of the largest of several means.
 #[test]
 fn the_bound_holds_for_the_largest_value() {
     let samples = field(&GRID, FRAMES, 9);
@@ -183,7 +183,7 @@ fn the_bound_holds_for_the_largest_value() {
     }
 }
 
-/// Something small in nothing, in front of a wall that hides what is behind.
+/// A small object in an empty volume, in front of a wall that hides everything behind it.
 fn scene_with_a_wall(grid: &Grid) -> Vec<f64> {
     let value = |[x, y, z]: [usize; 3], t: usize| match y {
         y if y > grid.dims[1] - 25 => 0.0,

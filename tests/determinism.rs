@@ -1,4 +1,4 @@
-//! The same input gives the same bytes and pixels, whatever the number of threads and the memory.
+//! The same input gives the same bytes and pixels for any number of threads and any memory budget.
 
 use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
@@ -50,9 +50,9 @@ fn threads_change_no_byte_and_no_pixel() {
     }
 }
 
-/// Digests of files, samples and pictures, of every scheme: the same with every kind of vector code (`--features portable` has none),
-/// and on every machine. They change with what a file holds (the program's and zstd's version among that) and how it is
-/// splatted, and then have to be written anew.
+/// Digests of files, samples and pictures of every scheme. They are the same with every kind of vector code
+/// (`--features portable` has none) and on every machine. They change when the content of files changes (which
+/// includes the versions of the program and of zstd) or when splatting changes, and must then be updated.
 #[test]
 fn files_and_pictures_are_those_of_every_machine() {
     let sample = |i: usize| {
@@ -75,7 +75,7 @@ fn files_and_pictures_are_those_of_every_machine() {
     assert_eq!(found, DIGESTS);
 }
 
-/// Frames as they are; then of each basis its file, samples and pictures.
+/// Digests of the frames, then for each basis of its file, samples and pictures.
 #[rustfmt::skip]
 const DIGESTS: [u64; 13] = [
     0x7763_790b_0f46_3517,
@@ -110,7 +110,7 @@ fn memory_changes_no_byte_of_a_file() {
     }
 }
 
-/// The stages of a conversion work in the program's own pool, which only the program can size.
+/// The stages of a conversion run in the program's own thread pool, which only the program can size.
 #[test]
 fn the_program_writes_the_same_bytes_with_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();

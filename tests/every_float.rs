@@ -1,6 +1,7 @@
-//! Every bit pattern that an `f32` can have, through conversion into a file and back.
+//! Every bit pattern of an `f32`, converted into a file and back.
 //!
-//! Nothing here calls the library's own bound: decoded samples are compared with the patterns themselves, exactly.
+//! Nothing here calls the library's own bound: the test compares decoded samples with the patterns themselves,
+//! exactly.
 
 use crate::common::computed::{Computed, Sampled};
 use crate::common::exact::Limit;
@@ -18,23 +19,23 @@ use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, Reader};
 
-/// Voxels a side of a block. A row of blocks along z holds consecutive patterns.
+/// Voxels along the edge of a block. A row of blocks along z holds consecutive patterns.
 const EDGE: usize = 64;
 const BLOCKS: usize = 16;
 const GRID: Grid = Grid { dims: [EDGE, EDGE, EDGE * BLOCKS], spacing: [1.0; 3], origin: [0.0; 3] };
 const VOXELS: usize = EDGE * EDGE * EDGE * BLOCKS;
 
-/// The archive of the patterns of some places, `frame * VOXELS + voxel` of all.
+/// The archive of a range of patterns, indexed by `frame * VOXELS + voxel`.
 fn patterns(places: Range<u64>, pattern: fn(u64) -> u32) -> Computed<4, impl Sampled<4>> {
     let frames = (places.end - places.start) as usize / VOXELS;
     let sample = move |frame, voxel| pattern(places.start + (frame * VOXELS + voxel) as u64).to_le_bytes();
     Computed::new(GRID, SampleType::F32, frames, sample)
 }
 
-/// What came back.
+/// Counts of the comparison.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Seen {
-    /// Finite samples, and those among them that did not come back bit for bit.
+    /// Finite samples, and those of them that did not come back bit for bit.
     finite: u64,
     changed: u64,
     missing: u64,
@@ -52,10 +53,10 @@ impl Add for Seen {
     }
 }
 
-/// Given with `--range 0,1`, it is the bound of every sample.
+/// With `--range 0,1`, the tolerance is the bound of every sample.
 const TOLERANCE: f64 = 1e-3;
 
-/// Converts the patterns into a file in memory, decodes it, and compares.
+/// Converts the patterns into a file in memory, decodes it and compares.
 fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -> Seen {
     let config = ConvertConfig { range: Some((0.0, 1.0)), block: Some(EDGE), ..settings(basis, window, TOLERANCE) };
     let mut file = Vec::new();
@@ -81,7 +82,7 @@ fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -
     windows.iter().enumerate().map(of_window).fold(Seen::default(), Add::add)
 }
 
-/// Samples of a block and frame against the bits that they stand for.
+/// Compares the samples of a block and frame with their bit patterns.
 fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Seen {
     let limit = Limit::range(TOLERANCE, 0.0, 1.0);
     let mut seen = Seen::default();
@@ -93,7 +94,7 @@ fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Seen {
             continue;
         }
         let (a, b) = (f32::from_bits(found), f32::from_bits(expected));
-        // Below 0.999 of the bound no rounding decides.
+        // Below 0.999 of the bound, rounding cannot decide the comparison.
         let clear = (f64::from(a) - f64::from(b)).abs() < 0.999 * TOLERANCE;
         assert!(clear || a.is_finite() && limit.holds(a.into(), b.into()), "{a} for {b} ({expected:#x})");
         seen.finite += 1;
@@ -102,7 +103,7 @@ fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Seen {
     seen
 }
 
-/// Patterns that are worked on at a time.
+/// Number of patterns per batch.
 const CHUNK: u64 = 1 << 26;
 
 fn consecutive(place: u64) -> u32 {
@@ -119,7 +120,7 @@ fn every_pattern_of_32_bits_comes_back_within_the_bound() {
     assert!(seen.changed > 1 << 31, "few were coded: {seen:?}");
 }
 
-/// Numbers from 2^-12 to 4 in any order, of both signs: what is coded at this step, and not all zero.
+/// Numbers from 2^-12 to 4 of both signs in any order: these get codes at this step, and not all are zero.
 fn shuffled(place: u64) -> u32 {
     const FIRST: u32 = 0x3980_0000;
     const END: u32 = 0x4080_0000;

@@ -1,4 +1,5 @@
-//! The expected error of pictures: an estimate, held against the truth for every basis, several kinds of data and views.
+//! The expected error of pictures, an estimate, compared with the true error for every basis and several kinds of data
+//! and views.
 
 use crate::common::memory::Memory;
 use crate::common::views::{archive, field, view};
@@ -12,7 +13,7 @@ use wavesplat::wavelet::Basis;
 const FRAMES: usize = 16;
 const GRID: Grid = Grid { dims: [36, 33, 24], spacing: [1.0; 3], origin: [0.0; 3] };
 
-/// Bumps that drift, in a volume of which most is near zero.
+/// Drifting bumps in a volume that is mostly near zero.
 fn drifting() -> Vec<f64> {
     let value = |t: usize, v: [usize; 3]| -> f64 {
         let bump = |i: usize| {
@@ -34,13 +35,13 @@ fn decaying() -> Vec<f64> {
     (0..FRAMES).flat_map(|t| GRID.whole().iter().map(move |v| value(t, v))).collect()
 }
 
-/// A view of an archive as it is.
+/// A view of the unchanged archive.
 struct View {
     config: RenderConfig,
     truth: Vec<f32>,
-    /// Which pixels are not background.
+    /// The pixels that are not background.
     shown: Vec<bool>,
-    /// The root mean square of what an error of 1 in every sample comes to.
+    /// The root mean square error of pixels if every sample had an error of 1.
     unit: f64,
 }
 
@@ -79,7 +80,7 @@ fn conversions() -> Vec<(String, ConvertConfig)> {
     plain.into_iter().chain([("Learned alone".into(), alone)]).collect()
 }
 
-/// The smallest and the largest share of what is expected that is true.
+/// The smallest and the largest ratio of the true to the expected error.
 fn spread(data: &str, ty: SampleType, values: &[f64]) -> (f64, f64) {
     let memory = archive(GRID, ty, values);
     let looks = [(25.0, 35.0, 0.02), (0.0, 0.0, 0.0), (-60.0, 10.0, 0.1)];

@@ -1,4 +1,4 @@
-//! Files that earlier versions wrote: read to the same bits for ever.
+//! Files written by earlier versions must read to the same bits forever.
 
 use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
@@ -16,14 +16,14 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
 use wavesplat::file::verify::verify;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::{Metadata, Unfinished};
+use wavesplat_format::{CompletePrefix, Metadata};
 use xxhash_rust::xxh3::xxh3_64;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
 }
 
-/// Their names and the digests of their samples.
+/// The files' names and the digests of their samples.
 fn digests() -> Vec<(String, u64)> {
     let text = fs::read_to_string(folder().join("digests.txt")).unwrap();
     let line = |line: &str| {
@@ -54,7 +54,7 @@ fn golden_files_are_read_to_the_same_bits() {
     }
 }
 
-/// The features: a name, a type of samples and how they are coded.
+/// The features: a name, a sample type and a coding.
 fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
     use SampleType::*;
     let mut found = Vec::new();
@@ -90,7 +90,7 @@ fn window(basis: Basis) -> usize {
     if basis == Basis::Multi { 9 } else { 8 }
 }
 
-/// What a feature's golden file was made from.
+/// The source of a feature's golden file.
 fn source(seed: usize, (ty, kind, mask): (SampleType, Kind, Mask)) -> Memory {
     let grid = Grid { dims: [11, 7, 6], spacing: [1.0, 0.5, 2.0], origin: [0.0, -1.0, 3.0] };
     Memory::new(grid, ty, volume(kind, ty, mask, grid.whole().voxels(), 20, seed as u64))
@@ -102,7 +102,7 @@ fn golden_files_are_continued_under_their_own_id() {
     for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
         let config = ConvertConfig { block: Some(6), ..config };
         let golden = fs::read(folder().join(format!("{name}.wspl"))).unwrap();
-        let unfinished = Unfinished::read(&&golden[..golden.len() * 2 / 3]).unwrap();
+        let unfinished = CompletePrefix::read(&&golden[..golden.len() * 2 / 3]).unwrap();
         let (id, windows) = (unfinished.id(), unfinished.metadata().windows.clone());
         let kept = golden[..unfinished.bytes() as usize].to_vec();
         assert!(!windows.is_empty(), "{name}: whole windows are left");
@@ -129,7 +129,7 @@ fn a_file_id_follows_from_the_encoded_start_and_the_first_digest() {
     assert_eq!(file.id().0, xxhash_rust::xxh3::xxh3_128(&bytes).to_le_bytes());
 }
 
-/// Writes what is not there yet, and nothing else.
+/// Writes the missing golden files, and changes no others.
 #[test]
 #[ignore = "writes golden files of new features"]
 fn golden_files_are_made() {
@@ -176,7 +176,7 @@ fn what_a_later_version_needs_is_refused_by_name() {
     file[10] = 7; // the minor version
     file[24] = 0xFF; // optional features
     assert_eq!(refused(&mut file), None);
-    file[16] = 0b100; // a required one
+    file[16] = 0b100; // a required feature
     file[48..48 + 20].copy_from_slice(b"bases by wavesplat 3");
     let (code, message) = refused(&mut file).unwrap();
     assert!(code == 3 && message.contains("required feature bit 2 (bases by wavesplat 3)"), "{message}");

@@ -1,4 +1,4 @@
-//! Pictures of single frames against brute force (method.md section 2).
+//! Pictures of single frames against brute force (eq 4 and 12).
 
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{MEMORY, direct, looking, pictures, rendered, rendered_if_it_can_be};
@@ -111,7 +111,7 @@ fn a_narrow_kernel_on_a_turned_lattice_keeps_the_stated_error() {
             (config.kernel.sigma, config.splat_error) = (sigma, error);
             let (found, report) = pictures(&mut direct(&memory, None), &config);
             let truth = truth(&grid, &config, report.views[0].scale, &[1.0; 4], None);
-            // The brightest place is a voxel's own, whatever pixels are near it.
+            // The largest weight is at a voxel itself, whatever pixels are near it.
             let brightest = 1.0 / (2.0 * std::f64::consts::PI * sigma * sigma);
             for (found, expected) in found.iter().zip(&truth.emission) {
                 let off = (f64::from(*found) - expected).abs();
@@ -173,7 +173,7 @@ fn a_region_is_splatted_alone_and_in_its_place() {
     }
     let (mean, _) = pictures(&mut direct(&memory, None), &RenderConfig { quantity: Quantity::Mean, ..config });
     for ((found, e), w) in mean.iter().zip(&truth.emission).zip(&truth.weight) {
-        // Background is where the region's own weights are few.
+        // Pixels are background where the region's own weights are small.
         assert_eq!(found.is_nan(), *w < BACKGROUND * largest(&truth.weight));
         assert!(found.is_nan() || (f64::from(*found) - e / w).abs() <= 1e-6 * largest(&samples));
     }
@@ -196,7 +196,8 @@ pub(crate) fn bits(picture: &[f32]) -> Vec<u32> {
     picture.iter().map(|v| v.to_bits()).collect()
 }
 
-/// The pictures under ever less memory, down to where it is refused; how many budgets sufficed.
+/// Compares the pictures under smaller and smaller memory budgets until rendering is refused. Returns how many budgets
+/// sufficed.
 pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config: &RenderConfig) -> usize {
     let (first, errors, _) = rendered(scene, config);
     let mut count = 0;

@@ -1,10 +1,10 @@
-//! Archives as the field's own software writes them: `tests/golden/inputs`, whose README says what is in there.
+//! Archives written by other programs: `tests/golden/inputs`, whose README describes the files.
 
 use crate::common::random::Random;
 use crate::common::times;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::Result;
+use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::load;
@@ -50,7 +50,7 @@ fn folder() -> PathBuf {
     }
 }
 
-/// Cases of a format, and what is wrong with how they are read.
+/// The cases of a format, and the errors found in reading them.
 fn check_all(format: &str) {
     let text = std::fs::read_to_string(folder().join("manifest.json")).unwrap();
     let cases: Vec<Case> = serde_json::from_str(&text).unwrap();
@@ -62,11 +62,12 @@ fn check_all(format: &str) {
 }
 
 impl Case {
-    /// By map and by read, in memory and, where it must be decoded, out of it.
+    /// Reads with and without a memory map, in memory and, if the file must be decoded, spooled to disk.
     fn check(&self) -> std::result::Result<(), String> {
         for (access, memory) in [(Access::Map, 1 << 20), (Access::Read, 1600)] {
             let opened = self.open(access, memory);
-            let needs_more = opened.as_ref().err().is_some_and(|e| e.to_string().contains("--memory"));
+            let needs_more =
+                opened.as_ref().err().is_some_and(|e| matches!(e, Error::Setting { setting: "memory", .. }));
             let found = match (if needs_more { self.open(access, 1 << 20) } else { opened }, self.refused) {
                 (Ok(_), true) => return Err("was read".into()),
                 (Err(e), true) => return if e.to_string().len() > 40 { Ok(()) } else { Err(e.to_string()) },
@@ -86,7 +87,7 @@ impl Case {
         let options = OpenOptions { access, memory, variable, axes: self.axes.clone(), ..OpenOptions::default() };
         let mut source = open(&[folder().join(&self.path)], &options)?;
         if self.refused {
-            source.window(0, 1)?; // what is wrong may be seen only there
+            source.window(0, 1)?; // some errors appear only here
         }
         Ok(source)
     }
@@ -123,7 +124,7 @@ impl Case {
         of("unit", format!("{:?}", units.samples), format!("{:?}", self.units), same)
     }
 
-    /// Frames in windows of two, read as boxes.
+    /// Reads frames in windows of two, as boxes.
     fn check_samples(&self, mut source: Box<dyn FrameSource>) -> std::result::Result<(), String> {
         let (archive, whole) = (source.archive().clone(), Grid::unit(self.dims).whole());
         let is_missing = |v: f64| v.is_nan() || archive.missing.is_some_and(|m| m == v);
@@ -151,7 +152,7 @@ impl Case {
     }
 }
 
-/// The files that a case's path stands for.
+/// The files that a case's path refers to.
 fn files(path: &Path) -> Vec<PathBuf> {
     match std::fs::read_dir(path) {
         Ok(entries) => entries.flat_map(|entry| files(&entry.unwrap().path())).collect(),
@@ -168,7 +169,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Every file of a format with some bytes changed, cut or repeated: read, or refused, but nothing else.
+/// Changes, cuts or repeats some bytes of every file of a format. Each file must be read or refused without a panic.
 fn check_damaged(format: &str) {
     let work = tempfile::tempdir().unwrap();
     copy(&folder().join(format), work.path());

@@ -1,4 +1,4 @@
-//! What is splatted on the lattice of the view, against footprints: coefficients of deep volumes, and frames.
+//! Splatting on the lattice of the view compared with footprints: coefficients of deep volumes, and frames.
 
 use crate::common::views::{archive, field, largest, rounding, truth, view};
 use crate::common::{direct, looking, pictures, settings, stored};
@@ -13,7 +13,7 @@ use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 9;
 
-/// Nearly along the longest axis.
+/// A view nearly along the longest axis.
 fn scenes() -> [(Grid, View, f64); 3] {
     let near = |azimuth, elevation, scale| View { scale: Some(scale), ..view(azimuth, elevation, [50, 45]) };
     [
@@ -34,7 +34,7 @@ fn a_lattice_keeps_the_error_that_it_states() {
     let mut found = 0;
     for (n, (grid, view, tau)) in scenes().into_iter().enumerate() {
         let mut samples = field(&grid, FRAMES, n as u64);
-        samples.iter_mut().for_each(|v| *v += 20.0); // means must not suffer from an offset
+        samples.iter_mut().for_each(|v| *v += 20.0); // an offset must not make means worse
         let scale = view.scale.unwrap();
         for (i, convert) in configs().into_iter().enumerate() {
             let mut memory = archive(grid, SampleType::F64, &samples);
@@ -55,7 +55,7 @@ fn a_lattice_keeps_the_error_that_it_states() {
     assert!(found >= 4, "{found} were splatted on a lattice");
 }
 
-/// Whether it was on a lattice.
+/// Whether splatting used a lattice.
 fn keeps_its_error(
     scene: &mut dyn Scene,
     [exact, quick]: [&RenderConfig; 2],
@@ -77,7 +77,7 @@ fn keeps_its_error(
     usize::from(report.views[0].method == "lattice")
 }
 
-/// Along an axis, nearly so, along a diagonal, and where two axes are as much along the view.
+/// Views along an axis, nearly along an axis, along a diagonal, and with two axes equally close to the view.
 const DIRECTIONS: [(f64, f64); 8] = [
     (0.0, 0.0),
     (90.0, 0.0),
@@ -111,7 +111,7 @@ fn frames_on_a_lattice_keep_the_error_that_they_state() {
                 found += keeps_its_error(&mut direct(&memory, None), [&exact, &quick], (largest, &seen), &what);
             }
         }
-        // What is missing is missing in both sums.
+        // A missing sample is missing in both sums.
         let missing = |i: usize| i % 7 == 3 || i % 35 < 12;
         memory = archive(grid, SampleType::F64, &masked(&samples, missing));
         let emission = RenderConfig { splat_error: 1e-3, ..plain };
@@ -177,7 +177,7 @@ fn what_is_too_deep_to_be_seen_is_left_out_within_the_stated_error() {
 
 #[test]
 fn parts_of_other_frames_are_counted_and_not_read() {
-    // Nothing predicts in space; along time, what is between two frames.
+    // No prediction in space; only the frames between two others are predicted along time.
     let grid = Grid::unit([32, 33, 34]);
     let (places, noise) = (field(&grid, 1, 5), field(&grid, 16, 6));
     let value = |i: usize| {

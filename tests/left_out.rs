@@ -1,4 +1,4 @@
-//! What the directory says of the level parts of a pyramid: how far leaving them out moves a sample.
+//! The directory's statement about the level parts of a pyramid: how far omitting them moves a sample.
 
 use crate::common::memory::Memory;
 use crate::common::samples::bytes;
@@ -20,7 +20,7 @@ fn entries(file: &CoefficientFile) -> Vec<BlockEntry> {
     file.leaves(0).iter().flat_map(|leaf| file.leaf(leaf).unwrap()).collect()
 }
 
-/// All coefficients of a block, of which only the level parts below `end` are there.
+/// All coefficients of a block decoded from only the level parts below `end`.
 fn coefficients(file: &CoefficientFile, codec: &WindowCodec, entry: &BlockEntry, end: u8) -> Vec<f64> {
     let mut entry = entry.clone();
     entry.parts.retain(|p| !matches!(p.kind, PartKind::Level(level) if level >= end));

@@ -47,7 +47,7 @@ impl Scene for Formula {
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
-        let selection = Selection::of_any_values(self.blocks(), request);
+        let selection = Selection::of_all(self.blocks(), request);
         Ok(Box::new(Batch { scene: self, frames: request.frames, selection, errors: SampleErrors::default() }))
     }
 }
@@ -95,8 +95,8 @@ impl BlockPlanes for Block<'_> {
         self.region.voxels()
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        let values = room.room(self.voxels());
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+        let values = scratch.values(self.voxels());
         values.iter_mut().zip(self.region.iter()).for_each(|(out, voxel)| *out = value(self.frames[plane], voxel));
         Ok(PlaneValues::Double(values))
     }

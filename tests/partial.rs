@@ -1,4 +1,4 @@
-//! What is asked for of a file is nearly all that is read of it.
+//! Reading part of a file reads little more than that part's bytes.
 
 use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
@@ -18,14 +18,14 @@ use wavesplat_format::{
 const DIMS: [usize; 3] = [96, 80, 64];
 const FRAMES: usize = 64;
 
-/// Four windows of 8 x 7 x 6 blocks and more.
+/// Four windows of 8 x 7 x 6 blocks, plus clipped ones.
 fn file() -> crate::common::Stored {
     let data = volume(Kind::Wave, SampleType::F32, Mask::None, DIMS.iter().product(), FRAMES, 5);
     let config = ConvertConfig { block: Some(12), ..settings(Basis::Haar, 16, 1e-3) };
     stored(&mut Memory::new(Grid::unit(DIMS), SampleType::F32, data), &config)
 }
 
-/// What reading some frames of a region reads of the file, opening it included.
+/// The bytes that are read from the file for some frames of a region, including opening it.
 fn reading(of: &crate::common::Stored, frames: Vec<usize>, region: Region) -> ExtractReport {
     let file = of.open();
     let config = ExtractConfig { frames, region, channel: 0, memory: MEMORY };
@@ -82,7 +82,7 @@ fn one_level_is_read_without_the_others() {
     }
 }
 
-/// Bytes, and how many of them were read.
+/// Bytes that count how many of them were read.
 struct Counted {
     bytes: Vec<u8>,
     read: std::sync::atomic::AtomicU64,
@@ -114,7 +114,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
     let small = file().open().metadata().clone();
     let mut metadata = small.start();
     (metadata.dims, metadata.block_edge) = ([2000, 1000, 1000], 10);
-    let (mut window, number) = (small.windows[0].with(&WindowEnd::of_nothing(0)), 0);
+    let (mut window, number) = (small.windows[0].with_totals(&WindowEnd::empty(0)), 0);
     (window.frames, window.coefficients, window.levels) = (2, 2, vec![2]);
     let mut writer = Writer::new(Vec::new(), FileId([6; 16]), &metadata).unwrap();
     writer.begin_window(WindowRecord { number, window, times: Vec::new() }).unwrap();
@@ -126,7 +126,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
         let parts = vec![part.clone()];
         writer.append(&EncodedBlock { id: BlockId { window: 0, block, channel: 0 }, stats, parts }).unwrap();
     }
-    writer.end_window(&WindowEnd { missing: 2_000_000, ..WindowEnd::of_nothing(0) }).unwrap();
+    writer.end_window(&WindowEnd { missing: 2_000_000, ..WindowEnd::empty(0) }).unwrap();
     let (file, summary) = writer.finish().unwrap();
     let counted = Counted::of(file);
     let reader = Reader::open(&counted).unwrap();

@@ -1,4 +1,4 @@
-//! The decoder in Python, written from `FORMAT.md` alone, gives the same bytes.
+//! The Python decoder, written from `FORMAT.md` alone, gives the same bytes.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -18,7 +18,7 @@ use wavesplat::wavelet::Basis;
 
 const FILES: usize = 300;
 
-/// Runs the decoder on files beside each of which it writes `NAME.out`; what it says of each.
+/// Runs the decoder on files; it writes `NAME.out` beside each. Returns its message for each file.
 fn decode(python: &str, work: &Path, files: &[PathBuf]) -> Vec<String> {
     let line = |file: &PathBuf| format!("{}\t{}\n", file.display(), file.with_extension("out").display());
     let list = work.join("list");
@@ -30,7 +30,7 @@ fn decode(python: &str, work: &Path, files: &[PathBuf]) -> Vec<String> {
     said.lines().map(str::to_string).collect()
 }
 
-/// A file of anything.
+/// A random file.
 fn random_file(random: &mut Random) -> Vec<u8> {
     let dims = [0; 3].map(|_| 1 + random.below(20));
     let ty = SampleType::ALL[random.below(SampleType::ALL.len())];
@@ -47,7 +47,7 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let plain = settings(Basis::Haar, window, [0.0, 0.2, 0.02, 1e-3, 1e-6][random.below(5)]);
     let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor: 0.1 }][random.below(3)];
     let rainbow = TransferFunction::open("rainbow").unwrap();
-    let colours = (random.below(8) == 0).then_some(rainbow); // of which most values are beyond the ends
+    let colours = (random.below(8) == 0).then_some(rainbow); // most values lie beyond the ends of the map
     let block = Some(1 + random.below(24));
     let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()

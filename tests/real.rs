@@ -1,4 +1,4 @@
-//! The solver's frames (eddy currents in a plate), where they are at hand.
+//! The solver's frames (eddy currents in a plate), where they are available.
 
 use crate::common::views::{rounding, view};
 use crate::common::{looking, pictures, settings, stored};

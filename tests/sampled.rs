@@ -1,4 +1,5 @@
-//! The sampled bound: what it is, and where it is not enough while the others hold (an estimate, not a guarantee).
+//! The sampled bound: its definition, and cases in which it fails while the other bounds hold (it is an estimate, not
+//! a guarantee).
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -18,10 +19,10 @@ use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::wavelet::Basis;
 
-/// The library cuts the kernel at six standard deviations and adds in another order.
+/// The library cuts the kernel at six standard deviations and adds in a different order.
 const ROUNDING: f64 = 1e-6;
 
-/// Every window's delta is that of the reference at the same pixels.
+/// Every window's delta equals the reference's delta at the same pixels.
 fn check(memory: &Memory, ty: SampleType, bound: (u32, u64), window: usize, tolerance: f64) {
     let (samples, seed) = bound;
     let config = ConvertConfig { bound: Bound::Sampled { samples, seed }, ..settings(Basis::Haar, window, tolerance) };
@@ -71,7 +72,7 @@ const GRID: Grid = Grid { dims: [38, 38, 10], spacing: [1.0; 3], origin: [0.0; 3
 const FRAMES: usize = 32;
 const TOLERANCE: f64 = 0.02;
 
-/// One half bright, one dim; the dim one changes as `dim` says.
+/// One half is bright, the other dim; the dim half changes as `dim` says.
 fn halves(dim: impl Fn(usize) -> f64) -> Memory {
     let mut random = Random(5);
     let mut values = Vec::new();
@@ -84,8 +85,8 @@ fn halves(dim: impl Fn(usize) -> f64) -> Memory {
     archive(GRID, SampleType::F64, &values)
 }
 
-/// In the three views along the axes, of all pixels that are not background: the share with |g^ - g| > tolerance * g,
-/// the largest |g^ - g| / (tolerance * g), and the largest |g^ - g| / delta, without what rounding to `f32` may take.
+/// For all pixels that are not background in the three views along the axes: the share with |g^ - g| > tolerance * g,
+/// the largest |g^ - g| / (tolerance * g), and the largest |g^ - g| / delta, without the rounding to `f32`.
 fn errors_of_pixels(memory: &Memory, bound: Bound) -> [f64; 3] {
     let config = ConvertConfig { bound, ..settings(Basis::Haar, FRAMES, TOLERANCE) };
     let file = stored(&mut memory.clone(), &config);
@@ -121,13 +122,13 @@ fn check_scene(name: &str, memory: &Memory) {
     assert!(pointwise[2] <= 1.0, "{name}: {pointwise:?}");
 }
 
-/// The estimate takes a mean over pixels, so dim pixels get a bright one's tolerance.
+/// The estimate takes a mean over pixels, so dim pixels get the tolerance of bright ones.
 #[test]
 fn a_dim_oscillation_beside_a_bright_half_is_lost_to_the_estimate_alone() {
     check_scene("oscillation", &halves(|t| 0.01 * (1.0 + 0.2 * (t as f64 * 0.9).sin())));
 }
 
-/// And it bounds a sum over time, so one frame may take all of it.
+/// The estimate bounds a sum over time, so one frame may use all of it.
 #[test]
 fn a_flash_in_a_dim_half_is_lost_to_the_estimate_alone() {
     check_scene("flash", &halves(|t| if t == 13 { 0.05 } else { 0.01 }));

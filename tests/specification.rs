@@ -1,4 +1,4 @@
-//! The decoder against one that follows `format/FORMAT.md` to the letter, bit by bit.
+//! Compares the decoder bit by bit with a reference that follows `format/FORMAT.md` literally.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -19,14 +19,14 @@ use wavesplat_format::{BlockEntry, Outliers, PartKind};
 
 const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::T];
 
-/// As the reference has it.
+/// Converts a pyramid to the reference's type.
 fn spelled_out(pyramid: &wavesplat_format::Pyramid) -> Pyramid {
     let order = pyramid.order.iter().map(|axis| AXES.iter().position(|a| a == axis).unwrap()).collect();
     let cubic = pyramid.stencil == Stencil::Cubic;
     Pyramid { order, cubic, growth: pyramid.growth, most: pyramid.most, single: pyramid.single }
 }
 
-/// Any axes in any order.
+/// A random choice of axes in random order.
 fn random_order(random: &mut Random) -> Vec<Axis> {
     let mut left = AXES.to_vec();
     (0..random.below(5)).map(|_| left.swap_remove(random.below(left.len()))).collect()
@@ -40,7 +40,7 @@ fn random_pyramid(random: &mut Random) -> wavesplat_format::Pyramid {
     wavesplat_format::Pyramid { order, stencil, growth, most, single: random.below(2) == 0 }
 }
 
-/// Mostly small or zero, or of any size.
+/// Random codes: mostly small or zero, sometimes of any magnitude.
 fn random_codes(count: usize, random: &mut Random) -> Vec<i32> {
     let zeros = random.below(4);
     let code = |random: &mut Random| match random.below(16) {
@@ -93,7 +93,7 @@ fn pyramids_decode_to_the_specified_bits() {
     assert!(nodes >= 1_000_000 * times());
 }
 
-/// The inverse of a basis, one series at a time.
+/// The inverse of a basis, applied to one series at a time.
 fn series(kind: Basis, functions: &[Vec<f64>], coefficients: &[f64], frames: usize) -> Vec<f64> {
     let mut series = match kind {
         Basis::Haar => haar(coefficients),
@@ -105,7 +105,7 @@ fn series(kind: Basis, functions: &[Vec<f64>], coefficients: &[f64], frames: usi
     series
 }
 
-/// Functions of which some are zero, the same, or nearly sums of others.
+/// Random functions, some of which are zero, equal, or nearly sums of others.
 fn random_functions(frames: usize, random: &mut Random) -> Vec<i16> {
     let mut functions: Vec<Vec<i16>> = Vec::new();
     for _ in 0..random.below(frames + 1) {
@@ -152,7 +152,7 @@ fn transforms_along_time_give_the_specified_bits() {
     }
 }
 
-/// The coefficients of a block that has any, in 64-bit floats.
+/// The coefficients of a block in 64-bit floats, if it has any.
 fn coefficients(window: &Window, block: &Block) -> Vec<f64> {
     let [x, y, z] = block.size;
     let extents = [x, y, z, window.coefficients as usize];
@@ -199,7 +199,8 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(u32, &BlockEntry
     }
 }
 
-/// The level parts of a block say how many codes they have, and what leaving them and all finer ones out changes.
+/// Checks what the level parts of a block state: their number of codes, and the change when they and all finer ones
+/// are omitted.
 fn check_parts(window: &Window, entry: &BlockEntry, block: &Block) {
     let Some(pyramid) = window.pyramid.as_ref().map(spelled_out) else { return };
     if block.codes.is_empty() {
@@ -223,7 +224,7 @@ fn check_parts(window: &Window, entry: &BlockEntry, block: &Block) {
     }
 }
 
-/// Every sample of the file, by the reference; how many blocks have coefficients.
+/// Compares every sample of the file with the reference. Returns how many blocks have coefficients.
 fn check_file(stored: &Stored) -> usize {
     let (file, mut coded) = (stored.open(), 0);
     let ty = file.sample();
@@ -288,7 +289,7 @@ fn files_decode_as_specified() {
     assert!(coded >= 3_500);
 }
 
-/// What four roundings of numbers a few times as large as the largest sample add.
+/// The error of four roundings of numbers a few times as large as the largest sample.
 const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Tests.
+//! The integration tests, by topic.
 #![allow(missing_docs, reason = "tests are read through their names")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::needless_range_loop, reason = "the reference spells formulas out with their indices")]
@@ -23,6 +23,7 @@ mod lattice;
 mod layering;
 mod library;
 mod left_out;
+mod literature;
 mod own_scene;
 mod partial;
 mod python;

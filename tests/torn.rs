@@ -1,5 +1,5 @@
-//! What a power failure leaves of an unfinished file: pages that were not yet on the disk are old, zero or torn. Whatever is
-//! left, only what is whole is gone on with.
+//! Power failures during writing: pages that had not reached the disk are old, zero or torn. Resuming uses only
+//! complete windows, whatever is left.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -9,14 +9,14 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::wavelet::Basis;
-use wavesplat_format::Unfinished;
+use wavesplat_format::CompletePrefix;
 
 const DISKS: usize = 20_000;
 
-/// What a disk writes at once.
+/// Number of bytes that a disk writes at once.
 const PAGE: usize = 512;
 
-/// The file after a failure, when all after `synced` was still on its way.
+/// The file after a power failure, when everything after `synced` had not reached the disk.
 fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
     let mut left = file[..synced + random.below(file.len() - synced + 1)].to_vec();
     let torn = random.below(4);
@@ -24,7 +24,7 @@ fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
         let (start, end) = ((page * PAGE).max(synced), ((page + 1) * PAGE).min(left.len()));
         match random.below(8) {
             0 => left[start..end].fill(0),
-            1 => left[start..end].fill_with(|| random.bits() as u8), // what was there before
+            1 => left[start..end].fill_with(|| random.bits() as u8), // the disk's earlier content
             2 => left[start..start + random.below(end - start)].fill(0),
             3 if page > synced / PAGE => left.copy_within(start - PAGE..end - PAGE, start),
             _ => {}
@@ -39,14 +39,14 @@ fn after_a_power_failure_whole_windows_alone_are_gone_on_with() {
     let data = volume(Kind::Wave, SampleType::F32, Mask::Special, dims.iter().product(), 40, 3);
     let config = ConvertConfig { block: Some(5), ..settings(Basis::Samples, 8, 0.05) };
     let file = stored(&mut Memory::new(Grid::unit(dims), SampleType::F32, data), &config).bytes();
-    let whole = Unfinished::read(&file).unwrap();
+    let whole = CompletePrefix::read(&file).unwrap();
     let (mut random, mut kept) = (Random(11), [0; 6]);
-    let start = Unfinished::read(&file[..700].to_vec()).unwrap().bytes() as usize;
+    let start = CompletePrefix::read(&file[..700].to_vec()).unwrap().bytes() as usize;
     for _ in 0..DISKS * times() {
         let synced = start + random.below(file.len() - start);
-        let before = Unfinished::read(&file[..synced].to_vec()).unwrap();
+        let before = CompletePrefix::read(&file[..synced].to_vec()).unwrap();
         let left = failed(&file, synced, &mut random);
-        let found = Unfinished::read(&left).unwrap();
+        let found = CompletePrefix::read(&left).unwrap();
         let (bytes, windows) = (found.bytes() as usize, found.metadata().windows.len());
         assert!(windows >= before.metadata().windows.len(), "what was on the disk is not lost");
         assert_eq!(found.metadata().windows, whole.metadata().windows[..windows]);

@@ -1,8 +1,9 @@
-//! How near the library's choice of coefficients comes to the fewest possible (method.md section 4), on tiny series.
+//! How near the library's choice of coefficients (eq 7) comes to the fewest possible, on tiny series.
 //!
-//! The library quantises, so its codes may do with fewer coefficients than exact values need. What rounding to codes
-//! moves is at most the bound, so it never has fewer than exact values need for TWICE the bound; and with Haar under rms,
-//! where rounding can only add to the error, never fewer than they need for the bound itself.
+//! The library quantises, so its codes may need fewer coefficients than exact values. Rounding to codes moves a sample
+//! by at most the bound. So the library never uses fewer coefficients than exact values need for TWICE the bound. With
+//! Haar under rms, rounding can only add to the error, so there it never uses fewer than they need for the bound
+//! itself.
 
 use crate::common::memory::Memory;
 use crate::common::random::Random;
@@ -18,7 +19,7 @@ use wavesplat::wavelet::Basis;
 
 const VOXELS: usize = 64;
 
-/// All voxels are of one kind; time is slowest.
+/// All voxels have the same kind of series; time is the slowest axis.
 fn archive(kind: &str, frames: usize) -> Vec<f64> {
     let mut random = Random(kind.len() as u64);
     let mut out = vec![0.0; VOXELS * frames];
@@ -58,8 +59,8 @@ fn kept(values: &[f64], config: &ConvertConfig) -> (Vec<usize>, f64, Matrix) {
     ((0..VOXELS).map(of_voxel).collect(), codec.promise.delta, codec.synthesis)
 }
 
-/// Mean number of coefficients: the library's, and the fewest for the bound. A basis without analysis and synthesis is
-/// orthonormal, and its functions are those of the file.
+/// Mean numbers of coefficients: the library's, and the fewest for the bound. A basis without analysis and synthesis
+/// matrices is orthonormal, and its functions come from the file.
 fn compare(kind: &str, frames: usize, config: &ConvertConfig, known: Option<&[Matrix; 2]>) -> [f64; 2] {
     let values = archive(kind, frames);
     let measure = if config.bound == Bound::Rms { Measure::Rms } else { Measure::Largest };
@@ -71,7 +72,7 @@ fn compare(kind: &str, frames: usize, config: &ConvertConfig, known: Option<&[Ma
         let series: Vec<f64> = values.iter().skip(voxel).step_by(VOXELS).copied().collect();
         let number = |delta| fewest(&analysis, &synthesis, &series, measure, delta).unwrap().indices.len();
         let within = number(delta);
-        // The reference's own sums are rounded too.
+        // The reference's sums are rounded, too.
         let least = number(if exact { delta * (1.0 + 1e-12) } else { 2.0 * delta * (1.0 + 1e-12) });
         assert!(config.bound == Bound::Rms && !exact || count >= least, "{kind}, voxel {voxel}: {count} for {least}");
         assert!(within > 0 || count == 0, "{kind}, voxel {voxel}: within the bound of zero, but {count} kept");

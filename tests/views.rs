@@ -14,7 +14,7 @@ use wavesplat::wavelet::Basis;
 const GRID: Grid = Grid { dims: [20, 21, 90], spacing: [1.0, 0.9, 1.1], origin: [5.0, 0.0, -3.0] };
 const FRAMES: usize = 11;
 
-/// Along the longest axis and across, near and far, and a part.
+/// Views along the longest axis and across it, near and far, and of a part.
 fn views() -> Vec<View> {
     let at = |azimuth, elevation, scale| View { scale, ..view(azimuth, elevation, [70, 66]) };
     vec![
@@ -26,7 +26,7 @@ fn views() -> Vec<View> {
     ]
 }
 
-/// The bits of the pictures of each view.
+/// The bits of each view's pictures.
 fn by_view(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Vec<u32>>, RenderReport)> {
     let mut pictures = vec![Vec::new(); config.views.len()];
     let mut last = vec![None; config.views.len()];
@@ -40,8 +40,8 @@ fn by_view(scene: &mut dyn Scene, config: &RenderConfig) -> Result<(Vec<Vec<u32>
     Ok((pictures, report))
 }
 
-/// Compares every view with itself alone, and what is said of its errors, under less and less memory; how many budgets
-/// sufficed.
+/// Compares every view, and its reported errors, with the same view rendered alone, under smaller and smaller memory
+/// budgets. Returns how many budgets sufficed.
 fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
     let alone = |view: &View| {
         let config = RenderConfig { views: vec![*view], ..config.clone() };

@@ -1,10 +1,10 @@
-//! The transforms against the matrices of method.md section 3.
+//! The transforms against the matrices of `reference::transform` (eq 17-19).
 
 use crate::common::random::Random;
 use crate::reference::transform::{Matrix, apply, ghm_matrix, haar_matrix, inverse, transpose};
 use wavesplat::wavelet::{Basis, LANES, Lane, TimeBasis, basis};
 
-/// Relative to the largest number that takes part.
+/// The tolerance, relative to the largest number involved.
 const CLOSE: f64 = 1e-12;
 
 fn lane_of(lanes: &[Lane], lane: usize) -> Vec<f64> {
@@ -23,12 +23,13 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
-/// Random, and so scaled that lanes differ by orders of magnitude.
+/// Random values, scaled so that lanes differ by orders of magnitude.
 fn random_lanes(n: usize, random: &mut Random) -> Vec<Lane> {
     (0..n).map(|_| std::array::from_fn(|l| random.signed() * 10f64.powi(3 * l as i32 - 9))).collect()
 }
 
-/// Forward is `analysis` after the series is continued by its last sample; inverse the first rows of `synthesis`.
+/// The forward transform is `analysis` of the series, continued by its last sample. The inverse is the first rows of
+/// `synthesis`.
 fn check(basis: &dyn TimeBasis, analysis: &Matrix, synthesis: &Matrix, random: &mut Random) {
     let (n, k) = (basis.frames(), basis.coefficients());
     assert_eq!(k, analysis.len());

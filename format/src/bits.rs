@@ -1,8 +1,8 @@
-//! Numbers of any width in bits, and numbers whose length depends on their size.
+//! Bit strings, and numbers of variable length.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 
-/// Appends numbers bit by bit, the lowest bit first into the lowest free bit.
+/// Appends numbers of any bit width, lowest bit first.
 pub(crate) struct BitWriter<'a> {
     out: &'a mut Vec<u8>,
     held: u64,
@@ -14,7 +14,7 @@ impl<'a> BitWriter<'a> {
         Self { out, held: 0, count: 0 }
     }
 
-    /// Appends the lowest `bits` (0 to 32) of a number that has no others.
+    /// Appends a number of `bits` bits (0 to 32). Its higher bits must be zero.
     pub(crate) fn put(&mut self, value: u32, bits: u32) {
         self.held |= u64::from(value) << self.count;
         self.count += bits;
@@ -33,7 +33,7 @@ impl<'a> BitWriter<'a> {
     }
 }
 
-/// Takes numbers bit by bit; past the end there are zeros, which [`BitReader::end`] finds out.
+/// Reads numbers of any bit width. Past the end it reads zeros; [`BitReader::end`] then fails.
 pub(crate) struct BitReader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -44,7 +44,7 @@ impl<'a> BitReader<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// The next `bits`, 0 to 32.
+    /// Reads the next `bits` bits, 0 to 32.
     pub(crate) fn take(&mut self, bits: u32) -> u32 {
         let ahead = self.bytes.get(self.at / 8..).unwrap_or(&[]);
         let word = ahead.first_chunk().map_or_else(|| short_word(ahead), |word| u64::from_le_bytes(*word));
@@ -53,8 +53,8 @@ impl<'a> BitReader<'a> {
         value as u32
     }
 
-    /// The bytes after the one that the last number ends in, whose bits left over must be zero.
-    pub(crate) fn end(self) -> Check<&'a [u8]> {
+    /// Returns the bytes after the last byte read, whose unread bits must be zero.
+    pub(crate) fn end(self) -> ParseResult<&'a [u8]> {
         let (used, rest) = self.bytes.split_at_checked(self.at.div_ceil(8)).ok_or("ends within its bits")?;
         let padding = if self.at.is_multiple_of(8) { 0 } else { used.last().map_or(0, |last| last >> (self.at % 8)) };
         ensure(padding == 0, || "padding bits are not zero".into())?;
@@ -62,12 +62,12 @@ impl<'a> BitReader<'a> {
     }
 }
 
-/// Fewer than 8 bytes, zeros behind them.
+/// Fewer than 8 bytes as a word, padded with zeros.
 fn short_word(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte))
 }
 
-/// Appends a number, 7 bits a byte from the lowest; the highest bit of a byte says that more follow.
+/// Appends a number in 7-bit groups, the lowest first. The highest bit of a byte says that another byte follows.
 pub(crate) fn put_varint(mut value: usize, out: &mut Vec<u8>) {
     while value > 0x7F {
         out.push(value as u8 | 0x80);
@@ -76,24 +76,24 @@ pub(crate) fn put_varint(mut value: usize, out: &mut Vec<u8>) {
     out.push(value as u8);
 }
 
-/// Takes a number of at most 5 bytes, as few as hold it.
-pub(crate) fn take_varint(bytes: &mut &[u8]) -> Check<usize> {
+/// Reads a number of at most 5 bytes. Fails if fewer bytes could hold it.
+pub(crate) fn take_varint(bytes: &mut &[u8]) -> ParseResult<usize> {
     let mut value = 0u64;
     for shift in 0..5 {
         let (&byte, rest) = bytes.split_first().ok_or("ends within a number")?;
         *bytes = rest;
         value |= u64::from(byte & 0x7F) << (7 * shift);
         if byte < 0x80 {
-            ensure(byte > 0 || shift == 0, || "a number is longer than it has to be".into())?;
+            ensure(byte > 0 || shift == 0, || "a number is longer than necessary".into())?;
             return usize::try_from(value).map_err(|_| "a number is too large".into());
         }
     }
     Err("a number is too long".into())
 }
 
-/// Takes `count` bytes.
-pub(crate) fn take_bytes<'a>(bytes: &mut &'a [u8], count: usize) -> Check<&'a [u8]> {
-    let short = || format!("{} bytes are left where {count} should be", bytes.len());
+/// Reads `count` bytes.
+pub(crate) fn take_bytes<'a>(bytes: &mut &'a [u8], count: usize) -> ParseResult<&'a [u8]> {
+    let short = || format!("{} bytes are left, {count} expected", bytes.len());
     let (head, rest) = bytes.split_at_checked(count).ok_or_else(short)?;
     *bytes = rest;
     Ok(head)

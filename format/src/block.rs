@@ -1,11 +1,12 @@
-//! One block: its name, its parts, and the compressor that makes a part.
+//! Blocks and their parts before they are written, and the compressor that makes a part.
 
 use crate::limits::MAX_PART_RAW;
 use crate::{Error, Result};
 use std::cmp::Ordering;
 use std::fmt;
 
-/// One window x one box of voxels x one channel. Ordered as in a file: by window, then channel, then block.
+/// Identifies a block: one box of voxels in one window and one channel. The order is that of the file: by window, then
+/// channel, then block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockId {
     /// Number of the window, from 0.
@@ -35,21 +36,21 @@ impl fmt::Display for BlockId {
     }
 }
 
-/// What a part of a block holds. Ordered as in a file.
+/// The kind of a part. The order is that of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum PartKind {
-    /// Quantised coefficients of one group of temporal levels, 0 the coarsest.
+    /// Quantised coefficients of one group of levels; 0 is the coarsest.
     Level(u8),
-    /// Samples that are stored exactly because the coefficients miss them by more than the bound.
+    /// Samples stored exactly, because the error of their decoded values would exceed the bound.
     Outliers,
-    /// Which samples are missing, and their bytes.
+    /// A mask of the missing samples, and their bytes.
     Missing,
-    /// Every sample, exactly; instead of levels and outliers.
+    /// The exact values of all samples, in place of levels and outliers.
     Exact,
 }
 
 impl PartKind {
-    /// Kind and level as bytes in a file.
+    /// Kind and level as stored in a file.
     pub(crate) fn code(self) -> [u8; 2] {
         match self {
             Self::Level(level) => [0, level],
@@ -59,7 +60,7 @@ impl PartKind {
         }
     }
 
-    /// The kind of these bytes in a file.
+    /// The kind that these stored bytes stand for.
     pub(crate) fn from_code(code: [u8; 2]) -> Option<Self> {
         match code {
             [0, level] => Some(Self::Level(level)),
@@ -82,24 +83,24 @@ impl fmt::Display for PartKind {
     }
 }
 
-/// What skipping needs to know about a part.
+/// Statistics of a part, from which a reader decides whether to skip it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartStats {
-    /// Nonzero coefficients, outliers, missing samples, or samples; at least 1.
+    /// Number of nonzero coefficients, outliers, missing samples or samples; at least 1.
     pub count: u64,
-    /// Sum of squares of the coefficients in the part; with a pyramid of the changes of all coefficients where this part
-    /// and all finer ones are left out; 0 without coefficients; may overflow to infinity.
+    /// Sum of squares of the coefficients in the part. With a pyramid: of the changes of all coefficients if this part and
+    /// all finer ones are omitted. 0 for parts without coefficients; may overflow to infinity.
     pub energy: f64,
-    /// Largest |coefficient| in the part; with a pyramid the largest such change; finite; 0 without coefficients.
+    /// Largest |coefficient| in the part; with a pyramid, the largest such change. Finite; 0 for parts without coefficients.
     pub largest: f64,
 }
 
-/// A part ready to be written.
+/// A compressed part, ready to be written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedPart {
-    /// What it holds.
+    /// The kind of its content.
     pub kind: PartKind,
-    /// What skipping needs to know.
+    /// Statistics for skipping.
     pub stats: PartStats,
     /// Bytes before compression.
     pub raw_len: u32,
@@ -107,35 +108,35 @@ pub struct EncodedPart {
     pub stored: Vec<u8>,
 }
 
-/// What skipping and reports need to know about a block, in the units of the samples.
+/// Statistics of a block, for skipping and reports, in the units of the samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockStats {
     /// Quantisation step: a coefficient is its code times this; finite, not negative.
     pub step: f64,
-    /// Smallest decoded finite sample; infinity when there is none.
+    /// Smallest decoded finite sample; infinity if there is none.
     pub min: f64,
-    /// Largest decoded finite sample; minus infinity when there is none.
+    /// Largest decoded finite sample; minus infinity if there is none.
     pub max: f64,
     /// Largest error of a sample, rounded up.
     pub reached: f64,
     /// Sum of the squared errors of the samples; may overflow to infinity.
     pub squared_error: f64,
-    /// Energy dropped or lost by quantisation, in coefficients; may overflow to infinity.
+    /// Energy of coefficients lost by dropping and quantisation; may overflow to infinity.
     pub dropped: f64,
 }
 
-/// A block ready to be written; parts ascend by kind, and a part that would hold only zeros is absent.
+/// A block ready to be written. Parts ascend by kind; a part that would hold only zeros is omitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EncodedBlock {
-    /// Which block.
+    /// The block's identity.
     pub id: BlockId,
-    /// What skipping needs to know.
+    /// Statistics for skipping.
     pub stats: BlockStats,
     /// Its parts in order.
     pub parts: Vec<EncodedPart>,
 }
 
-/// Compresses parts; one per worker, reused. The bytes depend on the input and the level alone.
+/// Compresses parts. Each worker reuses one compressor. The compressed bytes depend only on the input and the level.
 pub struct Compressor {
     inner: zstd::bulk::Compressor<'static>,
 }
@@ -147,7 +148,10 @@ impl fmt::Debug for Compressor {
 }
 
 impl Compressor {
-    /// A compressor at a zstd level; an error if zstd refuses it.
+    /// A compressor with a zstd level.
+    ///
+    /// # Errors
+    /// zstd refuses the level or runs out of memory.
     pub fn new(level: i32) -> Result<Self> {
         let mut inner = zstd::bulk::Compressor::new(level)?;
         inner.include_checksum(true)?;
@@ -155,7 +159,10 @@ impl Compressor {
         Ok(Self { inner })
     }
 
-    /// Compresses the payload `raw` of a part; [`Error::TooLarge`] over the limit of a part.
+    /// Compresses the payload `raw` of a part.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if the payload exceeds the limit for parts.
     pub fn part(&mut self, kind: PartKind, stats: PartStats, raw: &[u8]) -> Result<EncodedPart> {
         let size = raw.len() as u64;
         let raw_len = u32::try_from(size).ok().filter(|_| size <= MAX_PART_RAW);

@@ -1,17 +1,17 @@
-//! Little-endian fields, read with bounds and written in order.
+//! Reads and writes little-endian fields; reads are bounds-checked.
 
-/// What a check or a parser of bytes says: the reason in words; the caller adds the place.
-pub(crate) type Check<T = ()> = std::result::Result<T, String>;
+/// The result of a check or parser. The error is the reason; the caller adds the place in the file.
+pub(crate) type ParseResult<T = ()> = std::result::Result<T, String>;
 
-/// Fails with `what()` unless `ok`.
-pub(crate) fn ensure(ok: bool, what: impl FnOnce() -> String) -> Check {
+/// Returns the error `what()` unless `ok`.
+pub(crate) fn ensure(ok: bool, what: impl FnOnce() -> String) -> ParseResult {
     if ok { Ok(()) } else { Err(what()) }
 }
 
-/// The fields of a record, taken one after another.
-pub(crate) struct Fields<'a>(&'a [u8]);
+/// Reads the fields of a record in order.
+pub(crate) struct FieldReader<'a>(&'a [u8]);
 
-impl<'a> Fields<'a> {
+impl<'a> FieldReader<'a> {
     pub(crate) fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
@@ -20,7 +20,7 @@ impl<'a> Fields<'a> {
         self.0.len()
     }
 
-    pub(crate) fn array<const N: usize>(&mut self) -> Check<[u8; N]> {
+    pub(crate) fn array<const N: usize>(&mut self) -> ParseResult<[u8; N]> {
         let Some((head, tail)) = self.0.split_first_chunk::<N>() else {
             return Err(format!("ends {} bytes early", N - self.0.len()));
         };
@@ -28,36 +28,36 @@ impl<'a> Fields<'a> {
         Ok(*head)
     }
 
-    pub(crate) fn u16(&mut self) -> Check<u16> {
+    pub(crate) fn u16(&mut self) -> ParseResult<u16> {
         Ok(u16::from_le_bytes(self.array()?))
     }
 
-    pub(crate) fn u32(&mut self) -> Check<u32> {
+    pub(crate) fn u32(&mut self) -> ParseResult<u32> {
         Ok(u32::from_le_bytes(self.array()?))
     }
 
-    pub(crate) fn u64(&mut self) -> Check<u64> {
+    pub(crate) fn u64(&mut self) -> ParseResult<u64> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
-    pub(crate) fn f64(&mut self) -> Check<f64> {
+    pub(crate) fn f64(&mut self) -> ParseResult<f64> {
         Ok(f64::from_le_bytes(self.array()?))
     }
 
-    /// `N` bytes that must be zero.
-    pub(crate) fn reserved<const N: usize>(&mut self) -> Check {
+    /// Skips `N` reserved bytes; fails unless they are zero.
+    pub(crate) fn reserved<const N: usize>(&mut self) -> ParseResult {
         let bytes = self.array::<N>()?;
         ensure(bytes.iter().all(|&b| b == 0), || "reserved bytes are not zero".into())
     }
 
-    /// Fails if anything is left.
-    pub(crate) fn end(&self) -> Check {
+    /// Fails if bytes remain.
+    pub(crate) fn end(&self) -> ParseResult {
         ensure(self.0.is_empty(), || format!("{} bytes too many", self.0.len()))
     }
 }
 
 /// Appends fields to a record.
-pub(crate) trait Put {
+pub(crate) trait FieldWriter {
     fn put(&mut self, bytes: &[u8]);
 
     fn put_u16(&mut self, value: u16) {
@@ -77,8 +77,23 @@ pub(crate) trait Put {
     }
 }
 
-impl Put for Vec<u8> {
+impl FieldWriter for Vec<u8> {
     fn put(&mut self, bytes: &[u8]) {
         self.extend_from_slice(bytes);
     }
+}
+
+/// Whether the value is a possible sum of squares, which may overflow: not negative and not NaN.
+pub(crate) fn is_amount(value: f64) -> bool {
+    value >= 0.0
+}
+
+/// Whether the value is finite and not negative.
+pub(crate) fn finite_amount(value: f64) -> bool {
+    value >= 0.0 && value.is_finite()
+}
+
+/// Whether the range is finite and in order, or the empty range: infinity to minus infinity.
+pub(crate) fn is_range(min: f64, max: f64) -> bool {
+    min.is_finite() && max.is_finite() && min <= max || min == f64::INFINITY && max == f64::NEG_INFINITY
 }

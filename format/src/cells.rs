@@ -1,5 +1,9 @@
-//! Quantised codes on lattices, packed by their neighbourhood: cells of 2 x 2 x 2 codes, each with a byte that says
-//! which are not zero, the bytes sorted by how busy the cells before them are, the values by both.
+//! Quantised codes on lattices, packed by contexts.
+//!
+//! A cell is 2 x 2 x 2 codes. A byte says which of them are not zero. Neighbours predict how many: the activity of a
+//! cell is the number of nonzero codes in the cells before it along x, y, z and t. Bytes of cells with similar activity
+//! go to one stream, and nonzero codes to streams by the activity around and in their cell. Every stream is then packed
+//! by rANS with frequencies of its own (eq 38). `FORMAT.md`, section 7, specifies the bytes.
 
 mod pack;
 #[cfg(test)]
@@ -13,28 +17,29 @@ pub use unpack::unpack_cells;
 
 use crate::segments::max_segments;
 
-/// Streams of significance bytes, by the activity around a cell.
+/// Number of streams of significance bytes, chosen by the activity around a cell.
 const CLASSES: usize = 5;
 
-/// Streams of values, by the activity around and in a cell.
+/// Number of streams of values, chosen by the activity around and in a cell.
 const SCALES: usize = 4;
 
-/// Activities: up to 8 of 8 codes in each of 4 neighbours; rounded up to a power of two, that lookups need no check.
+/// Number of activities: up to 8 codes in each of 4 neighbours, rounded up to a power of two so that lookups need no bounds
+/// check.
 const ACTIVITIES: usize = 64;
 
-/// Symbols below are values; the others say the length of a value in bits and its highest bits.
+/// Smaller symbols are values. The others give the length of a value in bits and its highest bits.
 const LONG: u32 = 128;
 
-/// Value symbols are below.
+/// Number of value symbols.
 const SYMBOLS: u32 = LONG + 4 * (32 - 8) + 4;
 
-/// Class by activity.
+/// Stream of significance bytes for each activity.
 static CLASS_OF: [u8; ACTIVITIES] = classes([1, 3, 8, 16]);
 
-/// Scale by twice the nonzero codes of a cell plus half the activity.
+/// Stream of values, by twice the number of nonzero codes in a cell plus half the activity.
 static SCALE_OF: [u8; ACTIVITIES] = classes([4, 10, 20, ACTIVITIES]);
 
-/// How many thresholds each activity reaches.
+/// The number of thresholds that each activity reaches.
 const fn classes(thresholds: [usize; 4]) -> [u8; ACTIVITIES] {
     let mut table = [0; ACTIVITIES];
     let mut i = 0;
@@ -45,7 +50,7 @@ const fn classes(thresholds: [usize; 4]) -> [u8; ACTIVITIES] {
     table
 }
 
-/// Ones in each byte: a processor's own count is not there on all.
+/// Number of ones in each byte: not every processor has an instruction for this.
 static ONES: [u8; 256] = {
     let mut table = [0; 256];
     let mut i = 1;
@@ -56,9 +61,9 @@ static ONES: [u8; 256] = {
     table
 };
 
-/// Upper bound of the packed bytes of boxes with these extents.
+/// Upper bound on the packed bytes of boxes with these extents.
 ///
-/// At most a symbol for each cell, a symbol and 29 bits for each code, and a few numbers.
+/// That is a symbol for each cell, a symbol and 29 bits for each code, and a few numbers.
 pub fn max_packed(boxes: &[[usize; 4]]) -> usize {
     let sum = |each: fn(&[usize; 4]) -> usize| boxes.iter().map(each).fold(0, usize::saturating_add);
     let (codes, cells) = (sum(volume), sum(cells));
@@ -68,12 +73,12 @@ pub fn max_packed(boxes: &[[usize; 4]]) -> usize {
     max_segments(symbols, CLASSES + SCALES).saturating_add(raw).saturating_add(lengths)
 }
 
-/// Codes of a box.
+/// Number of codes in a box.
 fn volume(extents: &[usize; 4]) -> usize {
     extents.iter().fold(1, |product, &extent| product.saturating_mul(extent))
 }
 
-/// Cells of a box.
+/// Number of cells in a box.
 fn cells(&[x, y, z, t]: &[usize; 4]) -> usize {
     volume(&[x.div_ceil(2), y.div_ceil(2), z.div_ceil(2), t])
 }
@@ -84,21 +89,22 @@ struct Grid {
     extents: [usize; 4],
     /// Cells along x, y, z.
     cells: [usize; 3],
-    /// Nonzero codes of each cell of the latest frame, with a row of zeros before each plane and a plane before all.
+    /// Number of nonzero codes in each cell of the latest frame. A row of zeros precedes each plane, and a plane of zeros
+    /// precedes all.
     counts: Vec<u8>,
-    /// Those of the neighbours at y-1, z-1, t-1 of each cell of a row, together; then 8 that are not zero.
+    /// Sum of the counts of the neighbours at y-1, z-1, t-1 for each cell of a row, followed by 8 nonzero values.
     around: Vec<u8>,
 }
 
-/// A row of cells: where it is.
+/// Position of a row of cells.
 #[derive(Clone, Copy)]
 struct Row {
-    /// Its place along y.
+    /// Its index along y.
     y: usize,
-    /// Its first code in the box, and its first count.
+    /// Index of its first code in the box, and of its first count.
     code: usize,
     count: usize,
-    /// Whether its cells have a second half along y and along z.
+    /// Whether its cells extend to a second code along y and along z.
     whole: [bool; 2],
 }
 
@@ -109,7 +115,7 @@ impl Grid {
         Self { extents, cells: [x, y, z], counts: vec![0; counts], around: vec![1; x + 8] }
     }
 
-    /// All rows in their order.
+    /// All rows, in order.
     fn rows(&self) -> impl Iterator<Item = Row> + use<> {
         let ([sx, sy, sz, st], [cx, cy, cz]) = (self.extents, self.cells);
         let st = if self.counts.is_empty() { 0 } else { st };
@@ -122,7 +128,7 @@ impl Grid {
         (0..st).flat_map(move |t| (0..cz).flat_map(move |z| (0..cy).map(move |y| row(t, z, y))))
     }
 
-    /// Sums the neighbours of a row; returns them, and the counts to replace (those at t-1).
+    /// Sums the counts of a row's neighbours. Returns the sums and the row's counts at t-1, which the caller replaces.
     fn around(&mut self, row: Row) -> (&[u8], &mut [u8]) {
         let [cx, cy, _] = self.cells;
         let (before, here) = self.counts.split_at_mut(row.count);

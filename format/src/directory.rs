@@ -1,67 +1,67 @@
-//! The directory's entries of blocks and parts: their bytes, and what must be true of them.
+//! The directory's entries of blocks and parts: their bytes and checks.
 
 use crate::block::{BlockId, BlockStats, PartKind, PartStats};
-use crate::bytes::{Check, Fields, Put, ensure};
-use crate::header::FileId;
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
+use crate::file_id::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
-use crate::section::{FRAME, Owner, read};
+use crate::section::{FRAME, SectionId, read};
 use crate::{Result, Storage};
 
-/// Bytes of a block's entry without its parts.
+/// Bytes of a block's entry without its part entries.
 pub(crate) const BLOCK_ENTRY: usize = 64;
 
 /// Bytes of a part's entry.
 pub(crate) const PART_ENTRY: usize = 56;
 
-/// Where a part is and what skipping needs to know about it.
+/// A part's entry in the directory: position, checksum and statistics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartEntry {
-    /// What it holds.
+    /// The kind of its content.
     pub kind: PartKind,
-    /// What skipping needs to know.
+    /// Statistics for skipping.
     pub stats: PartStats,
-    /// Of its zstd frame, absolute.
+    /// Offset of its zstd frame in the file.
     pub offset: u64,
     /// Bytes of its zstd frame.
     pub stored_len: u32,
-    /// Bytes once decompressed.
+    /// Bytes after decompression.
     pub raw_len: u32,
     /// xxh3-64 of the stored bytes, seeded by file, block and kind.
     pub checksum: u64,
 }
 
-/// A block's line in the directory.
+/// A block's entry in the directory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockEntry {
-    /// Which block.
+    /// The block's identity.
     pub id: BlockId,
-    /// What skipping needs to know.
+    /// Statistics for skipping.
     pub stats: BlockStats,
     /// Its parts, ascending by kind.
     pub parts: Vec<PartEntry>,
-    /// Its data were gone when the file was recovered from a damaged one: nothing is known of its samples.
+    /// Whether its data were missing when the file was recovered from a damaged one, so that its samples are unknown.
     pub lost: bool,
 }
 
 impl BlockEntry {
-    /// Of a block of which nothing is known.
-    pub fn of_lost(id: BlockId) -> Self {
+    /// The entry of a lost block.
+    pub fn lost(id: BlockId) -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         let stats = BlockStats { step: 0.0, min, max, reached: 0.0, squared_error: 0.0, dropped: 0.0 };
         Self { id, stats, parts: Vec::new(), lost: true }
     }
 
-    /// The part of a kind, if the block has it.
+    /// The block's part of a kind, if it has one.
     pub fn part(&self, kind: PartKind) -> Option<&PartEntry> {
         self.parts.iter().find(|part| part.kind == kind)
     }
 
-    /// Whether every sample is stored as it was.
+    /// Whether the block stores all its samples exactly.
     pub fn is_exact(&self) -> bool {
         self.part(PartKind::Exact).is_some()
     }
 
-    /// Bytes of its parts in the file, without the block's header and padding.
+    /// Bytes of its parts in the file, without header and padding.
     pub fn stored_len(&self) -> u64 {
         self.parts.iter().map(|part| u64::from(part.stored_len)).sum()
     }
@@ -82,18 +82,18 @@ impl BlockEntry {
         self.parts.iter().for_each(|part| part.encode(out));
     }
 
-    /// Its bytes, which also tell 0 from -0.
+    /// The encoded bytes; comparing these also distinguishes 0 from -0.
     pub(crate) fn encoded(&self) -> Vec<u8> {
         let mut out = Vec::new();
         self.encode(&mut out);
         out
     }
 
-    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
         let count = usize::from(fields.u16()?);
         let lost = fields.u32()?;
-        ensure(lost <= 1, || format!("lost: {lost}"))?;
+        ensure(lost <= 1, || format!("the field lost is {lost} instead of 0 or 1"))?;
         let stats = BlockStats {
             step: fields.f64()?,
             min: fields.f64()?,
@@ -102,30 +102,32 @@ impl BlockEntry {
             squared_error: fields.f64()?,
             dropped: fields.f64()?,
         };
-        ensure(count <= MAX_PARTS && count * PART_ENTRY <= fields.remaining(), || format!("{count} parts"))?;
-        let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<Check<_>>()?;
+        ensure(count <= MAX_PARTS && count * PART_ENTRY <= fields.remaining(), || {
+            format!("invalid number of parts, {count}")
+        })?;
+        let parts = (0..count).map(|_| PartEntry::decode(fields)).collect::<ParseResult<_>>()?;
         Ok(Self { id, stats, parts, lost: lost == 1 })
     }
 
-    /// What must be true of any block, whatever the metadata.
-    pub(crate) fn check(&self) -> Check {
+    /// Checks that do not depend on the metadata.
+    pub(crate) fn check(&self) -> ParseResult {
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
         ensure(finite_amount(step) && finite_amount(reached), || "a step or an error out of range".into())?;
         ensure(is_amount(squared_error) && is_amount(dropped), || "an energy out of range".into())?;
-        ensure(is_range(min, max), || format!("values from {min} to {max}"))?;
-        ensure(self.parts.len() <= MAX_PARTS, || format!("{} parts", self.parts.len()))?;
+        ensure(is_range(min, max), || format!("invalid value range {min} to {max}"))?;
+        ensure(self.parts.len() <= MAX_PARTS, || format!("{} parts, at most {MAX_PARTS}", self.parts.len()))?;
         let ascend = self.parts.is_sorted_by(|a, b| a.kind < b.kind);
         ensure(ascend, || "parts out of order".into())?;
         let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers);
         let both = self.is_exact() && self.parts.iter().any(lossy);
-        ensure(!both, || "exact samples beside coefficients or outliers".into())?;
-        let lost = !self.lost || self.encoded() == Self::of_lost(self.id).encoded();
-        ensure(lost, || "lost, but with parts or statistics".into())?;
+        ensure(!both, || "both exact samples and coefficients or outliers".into())?;
+        let lost = !self.lost || self.encoded() == Self::lost(self.id).encoded();
+        ensure(lost, || "a lost block with parts or statistics".into())?;
         self.parts.iter().try_for_each(PartEntry::check)
     }
 
-    /// Whether the block starts at `start` and its parts follow its header without a gap; its aligned end.
-    pub(crate) fn check_place(&self, start: u64) -> Check<u64> {
+    /// Checks that the parts of a block at `start` follow its header without a gap; returns its aligned end.
+    pub(crate) fn check_place(&self, start: u64) -> ParseResult<u64> {
         let mut at = start.saturating_add(self.header_len());
         for part in &self.parts {
             ensure(part.offset == at, || format!("{} at byte {} instead of {at}", part.kind, part.offset))?;
@@ -136,12 +138,12 @@ impl BlockEntry {
 }
 
 impl PartEntry {
-    /// Its stored bytes, if they are all there and their checksum is right.
+    /// Reads its stored bytes and checks their checksum.
     pub(crate) fn read(&self, storage: &impl Storage, file: FileId, block: BlockId) -> Result<Vec<u8>> {
-        let owner = Owner::Part(block, self.kind);
-        let stored = read(storage, owner, self.offset, self.stored_len.into())?;
-        if owner.checksum(file, &stored) != self.checksum {
-            return Err(owner.corrupt(self.offset, "the checksum does not match"));
+        let section = SectionId::Part(block, self.kind);
+        let stored = read(storage, section, self.offset, self.stored_len.into())?;
+        if section.checksum(file, &stored) != self.checksum {
+            return Err(section.corrupt(self.offset, "the checksum does not match"));
         }
         Ok(stored)
     }
@@ -159,7 +161,7 @@ impl PartEntry {
         out.put_f64(self.stats.largest);
     }
 
-    fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         let code = fields.array()?;
         let kind = PartKind::from_code(code).ok_or_else(|| format!("an unknown kind of part, {code:?}"))?;
         fields.reserved::<2>()?;
@@ -170,28 +172,13 @@ impl PartEntry {
         Ok(Self { kind, stats, offset, stored_len, raw_len, checksum })
     }
 
-    fn check(&self) -> Check {
+    fn check(&self) -> ParseResult {
         let PartStats { count, energy, largest } = self.stats;
         let sane = count > 0 && is_amount(energy) && finite_amount(largest);
         ensure(sane, || format!("{}: count, energy or largest coefficient out of range", self.kind))?;
         let amounts = matches!(self.kind, PartKind::Level(_)) || [energy, largest].map(f64::to_bits) == [0; 2];
-        ensure(amounts, || format!("{}: an energy or largest coefficient without any", self.kind))?;
+        ensure(amounts, || format!("{}: an energy or largest coefficient in a part without coefficients", self.kind))?;
         let sized = self.stored_len > 0 && self.raw_len > 0 && u64::from(self.raw_len) <= MAX_PART_RAW;
         ensure(sized, || format!("{}: a length out of range", self.kind))
     }
-}
-
-/// Not negative and not NaN: a sum of squares, which may overflow.
-pub(crate) fn is_amount(value: f64) -> bool {
-    value >= 0.0
-}
-
-/// Finite and not negative.
-pub(crate) fn finite_amount(value: f64) -> bool {
-    value >= 0.0 && value.is_finite()
-}
-
-/// Finite and in order, or the empty range: infinity to minus infinity.
-pub(crate) fn is_range(min: f64, max: f64) -> bool {
-    min.is_finite() && max.is_finite() && min <= max || min == f64::INFINITY && max == f64::NEG_INFINITY
 }

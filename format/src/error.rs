@@ -1,4 +1,4 @@
-//! What can be wrong with a coefficient file.
+//! The errors of reading and writing a coefficient file.
 
 use crate::BlockId;
 use std::io;
@@ -13,17 +13,17 @@ pub enum Error {
     /// Not a coefficient file at all.
     #[error("not a wavesplat coefficient file: {0}")]
     Foreign(String),
-    /// Bytes that cannot be right: damaged, cut, or forged.
+    /// Invalid bytes: the file is damaged, truncated or forged.
     #[error("damaged at byte {offset} ({place}): {what}")]
     Corrupt {
-        /// Where in the file.
+        /// Offset in the file.
         offset: u64,
-        /// The structure there, as "footer" or "window 3 block 7 level 2".
+        /// The structure at that offset, such as "footer" or "window 3 block 7 level 2".
         place: String,
         /// What is wrong.
         what: String,
     },
-    /// A block whose data were gone when the file was recovered from a damaged one.
+    /// A block whose data were missing when the file was recovered from a damaged one.
     #[error("{0}: lost before the file was recovered")]
     Lost(BlockId),
     /// Written by a newer version, or with a feature that this reader lacks.
@@ -39,14 +39,14 @@ pub enum Error {
         /// The largest that the format allows.
         limit: u64,
     },
-    /// What was asked for or given cannot be in a file.
+    /// The request or the given data are not valid for this file.
     #[error("not valid: {0}")]
     Invalid(String),
 }
 
 impl Error {
-    /// Whether the storage failed, and nothing is said of the file.
-    pub fn is_of_storage(&self) -> bool {
+    /// Whether the storage failed, so that the file itself may be valid.
+    pub fn is_io(&self) -> bool {
         matches!(self, Self::Io(_))
     }
 }

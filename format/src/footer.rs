@@ -1,8 +1,8 @@
-//! The fixed footer: where the metadata and the directory are, and how long the file is.
+//! The fixed-size footer: the offsets of metadata and directory, and the length of the file.
 
-use crate::bytes::{Check, Fields, Put, ensure};
-use crate::header::FileId;
-use crate::section::Extent;
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
+use crate::file_id::FileId;
+use crate::section::SectionExtent;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Bytes of the footer.
@@ -17,8 +17,8 @@ pub(crate) struct Footer {
     pub(crate) id: FileId,
     /// Bytes of the whole file, this footer included.
     pub(crate) total: u64,
-    pub(crate) metadata: Extent,
-    pub(crate) root: Extent,
+    pub(crate) metadata: SectionExtent,
+    pub(crate) root: SectionExtent,
     pub(crate) blocks: u64,
     pub(crate) leaves: u64,
 }
@@ -42,13 +42,15 @@ impl Footer {
         out
     }
 
-    /// End magic, checksum, reserved bytes, in this order.
-    pub(crate) fn decode(bytes: &[u8; FOOTER]) -> Check<Self> {
-        ensure(bytes.ends_with(&END_MAGIC), || "the end magic is missing: cut short, or never finished".into())?;
+    /// Checks end magic, checksum and reserved bytes, in this order.
+    pub(crate) fn decode(bytes: &[u8; FOOTER]) -> ParseResult<Self> {
+        ensure(bytes.ends_with(&END_MAGIC), || {
+            "the end magic is missing: the file is truncated or was never finished".into()
+        })?;
         let (fields, tail) = bytes.split_at(FOOTER - 16);
-        let matches = Fields::new(tail).u64()? == xxh3_64(fields);
+        let matches = FieldReader::new(tail).u64()? == xxh3_64(fields);
         ensure(matches, || "the checksum does not match".into())?;
-        let mut fields = Fields::new(fields);
+        let mut fields = FieldReader::new(fields);
         let footer = Self {
             id: FileId(fields.array()?),
             total: fields.u64()?,
@@ -63,7 +65,7 @@ impl Footer {
     }
 }
 
-fn extent(fields: &mut Fields<'_>) -> Check<Extent> {
+fn extent(fields: &mut FieldReader<'_>) -> ParseResult<SectionExtent> {
     let (offset, stored_len, raw_len) = (fields.u64()?, fields.u32()?, fields.u32()?);
-    Ok(Extent { offset, stored_len, raw_len, checksum: fields.u64()? })
+    Ok(SectionExtent { offset, stored_len, raw_len, checksum: fields.u64()? })
 }

@@ -1,7 +1,7 @@
-//! The sizes that a block's parts can have, from the metadata.
+//! The possible sizes of a block's parts, as the metadata determines them.
 
 use crate::block::PartKind;
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::cells::max_packed;
 use crate::directory::PartEntry;
 use crate::planes::bitmap_len;
@@ -30,7 +30,7 @@ impl BlockGeometry<'_> {
         (self.window.frames as usize).saturating_mul(self.voxels())
     }
 
-    /// Codes in the part of a level; none for a level that the window lacks.
+    /// Number of codes in a level part; `None` if the window has no such level.
     pub fn codes(&self, level: u8) -> Option<usize> {
         match &self.window.pyramid {
             Some(_) => (level < Pyramid::PARTS).then(|| self.boxes(level).iter().map(box_len).sum()),
@@ -38,7 +38,7 @@ impl BlockGeometry<'_> {
         }
     }
 
-    /// The nodes that the passes of a pyramid add in the part of a level, along x, y, z, k.
+    /// Extents along x, y, z, k of the nodes that each pass in a level part adds; empty without a pyramid.
     pub(crate) fn boxes(&self, level: u8) -> Vec<[usize; 4]> {
         let Some(pyramid) = &self.window.pyramid else { return Vec::new() };
         let [x, y, z] = self.size;
@@ -54,7 +54,7 @@ impl BlockGeometry<'_> {
         }
     }
 
-    /// Bytes before compression of a part with `count` things of `width` bytes; `width` matters to levels alone.
+    /// Bytes before compression of a part with `count` items. `width` is the bytes per code; only level parts use it.
     fn raw_len(&self, kind: PartKind, count: u64, width: u64) -> u64 {
         let size = self.sample_size as u64;
         match kind {
@@ -67,7 +67,7 @@ impl BlockGeometry<'_> {
         }
     }
 
-    /// The largest possible payload of a part before compression, in bytes.
+    /// Upper bound on the payload of a part before compression, in bytes.
     pub fn max_raw_len(&self, kind: PartKind) -> u64 {
         match kind {
             PartKind::Level(level) if self.window.pyramid.is_some() => max_packed(&self.boxes(level)) as u64,
@@ -75,15 +75,17 @@ impl BlockGeometry<'_> {
         }
     }
 
-    /// Whether a part can have its count and its length here.
-    pub(crate) fn check(&self, part: &PartEntry) -> Check {
+    /// Checks that a part's count and length are possible for this block.
+    pub(crate) fn check(&self, part: &PartEntry) -> ParseResult {
         let (kind, count, raw_len) = (part.kind, part.stats.count, u64::from(part.raw_len));
         if let PartKind::Level(level) = kind {
             ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.window.parts()))?;
         }
         let most = self.max_count(kind);
         let least = if kind == PartKind::Exact { most } else { 1 };
-        ensure((least..=most).contains(&count), || format!("{kind}: a count of {count}, at most {most}"))?;
+        ensure((least..=most).contains(&count), || {
+            format!("{kind}: a count of {count} where at most {most} is possible")
+        })?;
         let possible = match kind {
             PartKind::Level(_) if self.window.pyramid.is_some() => raw_len <= self.max_raw_len(kind),
             PartKind::Level(_) => (1..=4).any(|width| self.raw_len(kind, count, width) == raw_len),

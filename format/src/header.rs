@@ -1,45 +1,21 @@
-//! The fixed header: what the file is, which version and features it needs, and whose parts belong to it.
+//! The fixed-size header: magic, version, required features and file id.
 
-use crate::bytes::{Check, Fields, Put};
-use crate::metadata::Metadata;
+use crate::bytes::{FieldReader, FieldWriter, ParseResult};
+use crate::file_id::FileId;
 use crate::{Error, Result};
-use std::fmt;
-use xxhash_rust::xxh3::{xxh3_64, xxh3_128};
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Bytes of the header.
 pub(crate) const HEADER: usize = 128;
 
-/// The first bytes of every file: a high bit, a name, both line ends and an end-of-file sign, as in PNG.
+/// The first bytes of every file. As in PNG, they hold a high bit, a name, both line endings and an end-of-file character.
 pub(crate) const MAGIC: [u8; 8] = [0x89, b'W', b'S', b'P', 0x0D, 0x0A, 0x1A, 0x0A];
 
 /// The version that this package writes.
 pub(crate) const VERSION: (u16, u16) = (1, 0);
 
-/// The features that a reader must know, by bit; none yet.
+/// The required features that this reader supports, by bit; none are defined yet.
 const REQUIRED: [&str; 0] = [];
-
-/// A file's identity, derived from settings and data by whoever writes it; every checksum is tied to it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct FileId(pub [u8; 16]);
-
-impl FileId {
-    /// The id of a conversion: XXH3-128 of the start record's bytes followed by the digest of the first window
-    /// (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
-    ///
-    /// # Errors
-    /// [`crate::Error::Invalid`] if `metadata` cannot be encoded.
-    pub fn derive(metadata: &Metadata, first_digest: u64) -> Result<Self> {
-        let mut bytes = metadata.start().encode()?;
-        bytes.put_u64(first_digest);
-        Ok(Self(xxh3_128(&bytes).to_le_bytes()))
-    }
-}
-
-impl fmt::Display for FileId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
-}
 
 /// The fields of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,11 +24,11 @@ pub(crate) struct Header {
     pub(crate) required: u64,
     pub(crate) optional: u64,
     pub(crate) id: FileId,
-    /// What a reader must know, in words for users of readers that lack a required feature; empty without one.
+    /// Message for users whose reader lacks a required feature; empty if no feature is required.
     pub(crate) needs: String,
 }
 
-/// Bytes of the words in a header.
+/// Bytes of the field `needs`.
 const NEEDS: usize = 72;
 
 impl Header {
@@ -78,7 +54,7 @@ impl Header {
         out
     }
 
-    /// Trusts nothing: magic, checksum, version, features, reserved bytes, in this order.
+    /// Checks magic, checksum, version, features and reserved bytes, in this order.
     pub(crate) fn decode(bytes: &[u8; HEADER]) -> Result<Self> {
         check_magic(bytes)?;
         let (header, reserved) = Self::parse(bytes).map_err(damaged)?;
@@ -87,12 +63,12 @@ impl Header {
         Ok(header)
     }
 
-    fn parse(bytes: &[u8; HEADER]) -> Check<(Self, Check)> {
+    fn parse(bytes: &[u8; HEADER]) -> ParseResult<(Self, ParseResult)> {
         let (fields, checksum) = bytes.split_at(HEADER - 8);
-        if Fields::new(checksum).u64()? != xxh3_64(fields) {
+        if FieldReader::new(checksum).u64()? != xxh3_64(fields) {
             return Err("the checksum does not match".into());
         }
-        let mut fields = Fields::new(fields);
+        let mut fields = FieldReader::new(fields);
         fields.array::<8>()?;
         let version = (fields.u16()?, fields.u16()?);
         let first = fields.reserved::<4>();
@@ -109,24 +85,24 @@ impl Header {
         if major != VERSION.0 {
             return Err(Error::Unsupported(format!(
                 "format version {major}.{minor}{}; this reader knows 1.x",
-                self.words()
+                self.quoted_needs()
             )));
         }
         match (0..64).find(|bit| self.required >> bit & 1 == 1 && REQUIRED.get(*bit).is_none()) {
             Some(bit) => {
-                let what = format!("required feature bit {bit}{}, unknown to this reader", self.words());
+                let what = format!("required feature bit {bit}{}, unknown to this reader", self.quoted_needs());
                 Err(Error::Unsupported(what))
             }
             None => Ok(()),
         }
     }
 
-    fn words(&self) -> String {
+    fn quoted_needs(&self) -> String {
         if self.needs.is_empty() { String::new() } else { format!(" ({})", self.needs) }
     }
 }
 
-/// Names the usual reasons for a wrong magic.
+/// Checks the magic; the error names the likely reason if it is wrong.
 pub(crate) fn check_magic(start: &[u8]) -> Result<()> {
     let start = &start[..start.len().min(8)];
     if start == MAGIC {
@@ -134,12 +110,12 @@ pub(crate) fn check_magic(start: &[u8]) -> Result<()> {
     }
     let why = match start {
         [] => "it is empty",
-        [0x09, b'W', b'S', b'P', ..] => "the high bits of its bytes were stripped by a transfer",
+        [0x09, b'W', b'S', b'P', ..] => "a transfer stripped the high bits of its bytes",
         [0x89, b'W', b'S', b'P', 0x0A, ..] | [0x89, b'W', b'S', b'P', 0x0D, 0x0D, ..] => {
-            "its line ends were changed by a transfer as text"
+            "a transfer in text mode changed its line endings"
         }
-        _ if MAGIC.starts_with(start) => "it is cut within its first 8 bytes",
-        _ => "its first 8 bytes are another's",
+        _ if MAGIC.starts_with(start) => "it ends within its first 8 bytes",
+        _ => "its first 8 bytes belong to another format",
     };
     Err(Error::Foreign(why.into()))
 }

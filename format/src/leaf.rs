@@ -1,43 +1,43 @@
-//! The directory's two levels: leaves of up to 512 blocks, and the root that lists the leaves.
+//! The two levels of the directory: leaves of up to 512 blocks, and the root that lists the leaves.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, Put, ensure};
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, finite_amount, is_amount, is_range};
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::section::{Extent, section_end};
+use crate::section::{SectionExtent, section_end};
 use crate::window::WINDOW_END;
 
 /// Bytes of a leaf's entry in the root.
 pub(crate) const LEAF_ENTRY: usize = 128;
 
-/// The fewest bytes of a block in a file, header and padding included.
+/// Smallest size of a block in a file, with header and padding.
 pub(crate) const MIN_BLOCK: u64 = 128;
 
-/// A leaf's line in the root: a run of consecutive blocks of one window and channel.
+/// A leaf's entry in the root. A leaf describes consecutive blocks of one window and channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeafEntry {
     /// Window of its blocks.
     pub window: u32,
-    /// Its first block; a multiple of 512.
+    /// Number of its first block, a multiple of 512.
     pub first_block: u32,
     /// Channel of its blocks.
     pub channel: u16,
-    /// Its blocks, 1 to 512.
+    /// Number of its blocks, 1 to 512.
     pub count: u16,
     /// Bytes of the compressed leaf after its frame.
     pub stored_len: u32,
-    /// Bytes of the leaf once decompressed.
+    /// Bytes of the leaf after decompression.
     pub raw_len: u32,
-    /// Where its first block starts, absolute.
+    /// Offset of its first block in the file.
     pub data_offset: u64,
-    /// Where the leaf's own frame starts, absolute, right after its blocks.
+    /// Offset in the file of the leaf's own frame, directly after its blocks.
     pub offset: u64,
-    /// Of the compressed leaf.
+    /// Checksum of the compressed leaf.
     pub checksum: u64,
-    /// Smallest decoded finite sample; infinity when there is none.
+    /// Smallest decoded finite sample; infinity if there is none.
     pub min: f64,
-    /// Largest decoded finite sample; minus infinity when there is none.
+    /// Largest decoded finite sample; minus infinity if there is none.
     pub max: f64,
     /// Largest error of a sample.
     pub reached: f64,
@@ -45,22 +45,22 @@ pub struct LeafEntry {
     pub squared_error: f64,
     /// Energy of the stored coefficients.
     pub energy: f64,
-    /// Energy dropped or lost by quantisation, in coefficients.
+    /// Energy of coefficients lost by dropping and quantisation.
     pub dropped: f64,
-    /// Nonzero coefficients.
+    /// Number of nonzero coefficients.
     pub coded: u64,
-    /// Samples stored as outliers.
+    /// Number of samples stored as outliers.
     pub outliers: u64,
-    /// Samples stored as missing.
+    /// Number of samples stored as missing.
     pub missing: u64,
-    /// Blocks stored exactly.
+    /// Number of blocks stored exactly.
     pub exact: u32,
-    /// Blocks whose data were gone when the file was recovered from a damaged one.
+    /// Number of blocks whose data were missing when the file was recovered from a damaged one.
     pub lost: u64,
 }
 
 impl LeafEntry {
-    /// A leaf without blocks, whose first will be `id` at `data_offset`.
+    /// An empty leaf whose first block will be `id` at `data_offset`.
     pub(crate) fn new(id: BlockId, data_offset: u64) -> Self {
         let BlockId { window, block: first_block, channel } = id;
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -80,12 +80,12 @@ impl LeafEntry {
         BlockId { window: self.window, block: self.first_block, channel: self.channel }
     }
 
-    /// Adds a block's numbers. Sums run in the order of the blocks, so writer and reader get the same bits.
+    /// Adds a block's statistics. Sums run in the order of the blocks, so that writer and reader get the same bits.
     pub(crate) fn add(&mut self, block: &BlockEntry) {
         self.count = self.count.saturating_add(1);
-        self.min = least(self.min, block.stats.min);
-        self.max = -least(-self.max, -block.stats.max);
-        self.reached = -least(-self.reached, -block.stats.reached);
+        self.min = lesser(self.min, block.stats.min);
+        self.max = -lesser(-self.max, -block.stats.max);
+        self.reached = -lesser(-self.reached, -block.stats.reached);
         self.squared_error += block.stats.squared_error;
         self.dropped += block.stats.dropped;
         self.exact += u32::from(block.is_exact());
@@ -102,36 +102,36 @@ impl LeafEntry {
         }
     }
 
-    /// Its blocks.
+    /// The ids of its blocks, in order.
     pub fn ids(&self) -> impl Iterator<Item = BlockId> + Clone + use<> {
         let first = self.first();
         (self.first_block..).take(self.count.into()).map(move |block| BlockId { block, ..first })
     }
 
-    /// Bytes that its blocks' entries take at most.
-    pub(crate) fn most_raw(&self) -> usize {
+    /// Upper bound on the bytes of its blocks' entries.
+    pub(crate) fn max_raw_len(&self) -> usize {
         usize::from(self.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)
     }
 
-    /// The entries of its blocks, in order, from its decompressed bytes; their places and contents are not yet checked.
-    pub(crate) fn parse(&self, raw: &[u8]) -> Check<Vec<BlockEntry>> {
-        let mut fields = Fields::new(raw);
+    /// Parses the entries of its blocks, in order, from its decompressed bytes. Does not check their offsets and values.
+    pub(crate) fn parse(&self, raw: &[u8]) -> ParseResult<Vec<BlockEntry>> {
+        let mut fields = FieldReader::new(raw);
         let mut entries = Vec::with_capacity(usize::from(self.count).min(raw.len() / BLOCK_ENTRY));
         for id in self.ids() {
             let entry = BlockEntry::decode(&mut fields)?;
-            ensure(entry.id == id, || format!("{} where {id} belongs", entry.id))?;
+            ensure(entry.id == id, || format!("{} instead of {id}", entry.id))?;
             entries.push(entry);
         }
         fields.end()?;
         Ok(entries)
     }
 
-    pub(crate) fn extent(&self) -> Extent {
+    pub(crate) fn extent(&self) -> SectionExtent {
         let Self { offset, stored_len, raw_len, checksum, .. } = *self;
-        Extent { offset, stored_len, raw_len, checksum }
+        SectionExtent { offset, stored_len, raw_len, checksum }
     }
 
-    pub(crate) fn set_extent(&mut self, extent: &Extent) {
+    pub(crate) fn set_extent(&mut self, extent: &SectionExtent) {
         (self.offset, self.checksum) = (extent.offset, extent.checksum);
         (self.stored_len, self.raw_len) = (extent.stored_len, extent.raw_len);
     }
@@ -152,14 +152,14 @@ impl LeafEntry {
         [self.coded, self.outliers, self.missing, self.lost].into_iter().for_each(|value| out.put_u64(value));
     }
 
-    /// Its bytes, which also tell 0 from -0.
+    /// The encoded bytes; comparing these also distinguishes 0 from -0.
     pub(crate) fn encoded(&self) -> Vec<u8> {
         let mut out = Vec::new();
         self.encode(&mut out);
         out
     }
 
-    pub(crate) fn decode(fields: &mut Fields<'_>) -> Check<Self> {
+    pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
         Ok(Self {
             window: fields.u32()?,
             first_block: fields.u32()?,
@@ -184,27 +184,27 @@ impl LeafEntry {
         })
     }
 
-    /// What must be true of any leaf that follows the byte `end`; the first byte after it.
-    fn check(&self, end: u64) -> Check<u64> {
+    /// Checks a leaf whose blocks follow the byte `end`; returns the end of the leaf.
+    fn check(&self, end: u64) -> ParseResult<u64> {
         let first = self.first();
         let place = |what: &str| format!("leaf of {first}: {what}");
-        ensure(self.data_offset == align(end), || place("its blocks do not follow what is before"))?;
+        ensure(self.data_offset == align(end), || place("its blocks do not follow the preceding section"))?;
         let least = self.data_offset.saturating_add(MIN_BLOCK * u64::from(self.count));
-        ensure(self.offset == align(self.offset) && self.offset >= least, || place("a misplaced offset"))?;
+        ensure(self.offset == align(self.offset) && self.offset >= least, || place("its offset is wrong"))?;
         let sums = [self.squared_error, self.energy, self.dropped].into_iter().all(is_amount);
         ensure(sums && finite_amount(self.reached), || place("an error or energy out of range"))?;
         ensure(is_range(self.min, self.max), || place("a value range out of order"))?;
-        ensure(self.lost <= self.count.into(), || place("more lost blocks than there are"))?;
+        ensure(self.lost <= self.count.into(), || place("more lost blocks than blocks"))?;
         Ok(self.extent().end())
     }
 }
 
-/// The smaller one, of 0 and -0 the latter: `min` may give either.
-fn least(a: f64, b: f64) -> f64 {
+/// The smaller value, where -0 is smaller than 0: `f64::min` may return either.
+fn lesser(a: f64, b: f64) -> f64 {
     if b.total_cmp(&a).is_lt() { b } else { a }
 }
 
-/// The blocks of every leaf of a window, in order: the first and how many.
+/// The first block and the number of blocks of each leaf of a window, in order.
 pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item = (BlockId, u32)> {
     let blocks = metadata.blocks_per_channel();
     let runs = move || (0..blocks).step_by(BLOCKS_PER_LEAF as usize);
@@ -213,9 +213,9 @@ pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item 
         .map(move |id| (id, BLOCKS_PER_LEAF.min(blocks - id.block)))
 }
 
-/// Whether these are all leaves of the metadata, window after window from where the start section ends on; where the last
-/// window ends.
-pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u64> {
+/// Checks that these are all leaves of the archive, window after window from the end of the start section. Returns the
+/// end of the last window.
+pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> ParseResult<u64> {
     let per_window = metadata.leaves_per_window() as usize;
     let count = per_window as u64 * metadata.windows.len() as u64;
     ensure(leaves.len() as u64 == count, || format!("{} leaves instead of {count}", leaves.len()))?;
@@ -225,10 +225,10 @@ pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> Check<u
         .try_fold(metadata.start_end()?, |end, (number, leaves)| check_window(metadata, number, leaves, end))
 }
 
-/// Whether these are all leaves of a window that begins after the byte `end`; where it ends.
-pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> Check<u64> {
+/// Checks that these are all leaves of a window that starts after the byte `end`; returns the window's end.
+pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> ParseResult<u64> {
     let window = metadata.windows.get(number as usize).ok_or("no such window")?;
-    end = section_end(align(end), metadata.record(number).encode()?.len());
+    end = section_end(align(end), metadata.window_record(number).encode()?.len());
     for ((id, count), leaf) in leaves_of(metadata, number).zip(leaves) {
         let same = leaf.first() == id && u32::from(leaf.count) == count;
         ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;

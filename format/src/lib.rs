@@ -1,7 +1,7 @@
 //! The bytes of a wavesplat coefficient file (`.wspl`).
 //!
-//! `FORMAT.md` beside this package specifies them. This package knows bytes only: it starts no thread, opens no path
-//! and maps no memory; it reads through [`Storage`] and writes to any `std::io::Write` without a seek.
+//! `FORMAT.md` beside this package specifies the format. This package handles bytes only: it starts no threads, opens
+//! no paths and maps no memory. It reads through [`Storage`] and writes to any `std::io::Write` without seeking.
 #![forbid(unsafe_code)]
 
 mod bits;
@@ -10,6 +10,7 @@ mod bytes;
 mod cells;
 mod directory;
 mod error;
+mod file_id;
 mod footer;
 mod geometry;
 mod header;
@@ -21,7 +22,8 @@ mod planes;
 mod pyramid;
 mod rans;
 mod reader;
-mod salvage;
+mod record;
+mod recovery;
 mod sample;
 mod section;
 mod segments;
@@ -31,7 +33,7 @@ mod structure;
 mod testing;
 #[cfg(test)]
 mod tests;
-mod unfinished;
+mod prefix;
 mod window;
 mod writer;
 
@@ -39,19 +41,19 @@ pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Part
 pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
+pub use file_id::FileId;
 pub use geometry::BlockGeometry;
-pub use header::FileId;
 pub use leaf::LeafEntry;
 pub use metadata::{Bound, Metadata};
 pub use payload::{
     Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,
     unpack_outliers,
 };
+pub use prefix::CompletePrefix;
 pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
-pub use salvage::{Salvage, Salvaged};
+pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
 pub use storage::{ReadAhead, Storage, read_joined};
-pub use unfinished::Unfinished;
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

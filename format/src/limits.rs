@@ -1,24 +1,24 @@
-//! Every maximum of the format, with its reason. A reader refuses what is over them; a writer never writes it.
+//! The limits of the format, with their reasons. A reader refuses files that exceed them; a writer never exceeds them.
 
-/// Every block and section starts at a multiple of this many bytes: a cache line.
+/// Every block and section starts at a multiple of this many bytes, the size of a cache line.
 pub const ALIGN: u64 = 64;
 
-/// Blocks in one leaf of the directory: a leaf stays near 200 KiB raw, and a million blocks have 2 000 leaves.
+/// Blocks in one leaf of the directory: a leaf stays near 200 KiB uncompressed, and a million blocks have 2 000 leaves.
 pub const BLOCKS_PER_LEAF: u32 = 512;
 
-/// Samples, and also coefficients, of one block (64^3 voxels by 32 frames): bounds the memory of a decoder.
+/// Samples of one block, and coefficients of one block (64^3 voxels by 32 frames). Bounds the memory of a decoder.
 pub const MAX_BLOCK_SAMPLES: u64 = 1 << 23;
 
-/// Bytes of one part before compression: every sample of the largest block an outlier of 4 + 8 bytes.
+/// Bytes of one part before compression: the largest block with every sample an outlier of 4 + 8 bytes.
 pub const MAX_PART_RAW: u64 = 12 * MAX_BLOCK_SAMPLES;
 
-/// Groups of temporal levels in a window: more would be smaller than their directory entries.
+/// Groups of temporal levels in a window: with more, parts would be smaller than their directory entries.
 pub const MAX_LEVELS: usize = 32;
 
 /// Parts of one block: every level, outliers, missing samples, exact samples.
 pub const MAX_PARTS: usize = MAX_LEVELS + 3;
 
-/// Frames in one window: 1024, and one for bases of an odd number; a basis as a matrix stays near 8 MiB.
+/// Frames in one window: 1024, plus one for bases that need an odd number. A basis as a matrix stays near 8 MiB.
 pub const MAX_WINDOW_FRAMES: u32 = 1025;
 
 /// Coefficients of one voxel in one window: a redundant basis has at most a few per frame.
@@ -36,7 +36,7 @@ pub const MAX_METADATA: usize = 16 << 20;
 /// Bytes of the root of the directory before compression: 8 million leaves.
 pub const MAX_ROOT_RAW: u64 = 1 << 30;
 
-/// Next multiple of [`ALIGN`], or the largest number where there is none.
+/// Rounds up to a multiple of [`ALIGN`], or to `u64::MAX` on overflow.
 pub(crate) fn align(position: u64) -> u64 {
     position.checked_next_multiple_of(ALIGN).unwrap_or(u64::MAX)
 }

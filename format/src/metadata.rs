@@ -1,45 +1,40 @@
-//! The metadata record: grid, type, units, times, tolerance, windows, provenance. The only user of bincode.
-//!
-//! bincode 2.0.1 needs the limit and the check for leftovers: without them it aborts on nine hostile bytes and ignores
-//! what follows a value.
+//! The metadata record: grid, type, units, times, tolerance, windows, provenance.
 
-use crate::bytes::{Check, ensure};
-use crate::directory::finite_amount;
+use crate::bytes::{FieldWriter, ParseResult, ensure, finite_amount};
+use crate::file_id::FileId;
 use crate::header::HEADER;
 use crate::limits::*;
+use crate::record::{decode_exact, encode};
 use crate::section::section_end;
 use crate::window::{Window, WindowEnd, WindowRecord};
 use crate::{BlockGeometry, BlockId, Error, Result, SampleType};
-use bincode::{Decode, Encode, config};
+use bincode::{Decode, Encode};
+use xxhash_rust::xxh3::xxh3_128;
 
-/// Fixed-width little-endian integers, nothing larger than the limit.
-pub(crate) const CONFIG: config::Configuration<config::LittleEndian, config::Fixint, config::Limit<MAX_METADATA>> =
-    config::standard().with_little_endian().with_fixed_int_encoding().with_limit::<MAX_METADATA>();
-
-/// What the tolerance promises; new kinds are appended.
+/// The error measure that the tolerance bounds. New kinds are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Encode, Decode)]
 pub enum Bound {
     /// Every sample is within the window's `delta`.
     Pointwise,
-    /// The root mean square of each series' errors is within it.
+    /// The root mean square of each series' errors is within the window's `delta`.
     Rms,
-    /// Every sample v is within tolerance x max(|v|, floor); `delta` is the largest of these in the window.
+    /// The error of every sample v is within tolerance x max(|v|, floor); `delta` is the largest of these bounds in the window.
     Relative {
-        /// Below this magnitude samples may be as wrong as at it; in units of the samples.
+        /// Samples of smaller magnitude may have the error allowed at this magnitude; in units of the samples.
         floor: f64,
     },
-    /// As [`Bound::Rms`], but `delta` is ESTIMATED from images, so that the relative error of their pixels is about the
-    /// tolerance: an estimate, not a guarantee.
+    /// Like [`Bound::Rms`], but `delta` is ESTIMATED from images so that the relative error of their pixels is about the
+    /// tolerance. This is an estimate, not a guarantee.
     Sampled {
         /// Random pixels on each of three faces.
         samples: u32,
-        /// What chose them.
+        /// Seed of the random choice.
         seed: u64,
     },
 }
 
 impl Bound {
-    /// Its name.
+    /// The name used on the command line and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pointwise => "pointwise",
@@ -49,16 +44,16 @@ impl Bound {
         }
     }
 
-    fn check(self) -> Check {
+    fn check(self) -> ParseResult {
         match self {
-            Self::Relative { floor } => ensure(finite_amount(floor), || format!("a floor of {floor}")),
-            Self::Sampled { samples, .. } => ensure(samples > 0, || "a bound sampled nowhere".into()),
+            Self::Relative { floor } => ensure(finite_amount(floor), || format!("invalid floor {floor}")),
+            Self::Sampled { samples, .. } => ensure(samples > 0, || "a sampled bound with 0 samples".into()),
             Self::Pointwise | Self::Rms => Ok(()),
         }
     }
 }
 
-/// Everything about an archive but its samples.
+/// The metadata of an archive: everything except the samples.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct Metadata {
     /// Voxels along x, y, z; x is fastest.
@@ -71,70 +66,68 @@ pub struct Metadata {
     pub sample: SampleType,
     /// Voxels along the edge of a block's box; boxes are clipped at the far faces.
     pub block_edge: u32,
-    /// Channels, at least 1.
+    /// Number of channels, at least 1.
     pub channels: u16,
-    /// Frames.
+    /// Number of frames.
     pub frames: u64,
-    /// Time of each frame; empty: frame numbers.
+    /// Time of each frame. If empty, frames are identified by number.
     pub times: Vec<f64>,
     /// Name of the variable.
     pub variable: Option<String>,
-    /// What the tolerance promises.
+    /// The error measure that the tolerance bounds.
     pub bound: Bound,
-    /// The tolerance as asked for.
+    /// The tolerance as requested.
     pub tolerance: f64,
-    /// The value that marks a missing sample, besides NaN.
+    /// The value that marks a missing sample, in addition to NaN.
     pub missing_value: Option<f64>,
-    /// The windows, one after another from frame 0.
+    /// The windows, in order from frame 0.
     pub windows: Vec<Window>,
-    /// Provenance: names and values of settings, no paths.
+    /// Provenance: names and values of settings, without paths.
     pub settings: Vec<(String, String)>,
     /// Name and version of the program that wrote the file.
     pub program: String,
 }
 
-/// The record that is exactly `bytes`.
-pub(crate) fn whole<T: Decode<()>>(bytes: &[u8], what: &str) -> Check<T> {
-    let decoded = bincode::decode_from_slice::<T, _>(bytes, CONFIG);
-    let (record, used) = decoded.map_err(|e| format!("not a {what}: {e}"))?;
-    ensure(used == bytes.len(), || format!("{} bytes after the record", bytes.len() - used))?;
-    Ok(record)
-}
-
 impl Metadata {
-    /// The record's bytes; an error if the metadata is invalid or too large.
+    /// Encodes the record.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the metadata is invalid, [`Error::TooLarge`] if the record exceeds the limit.
     pub fn encode(&self) -> Result<Vec<u8>> {
         self.validate()?;
-        let bytes = bincode::encode_to_vec(self, CONFIG).map_err(|e| Error::Invalid(format!("metadata: {e}")))?;
+        let bytes = encode(self, "metadata").map_err(Error::Invalid)?;
         let (size, limit) = (bytes.len() as u64, MAX_METADATA as u64);
         if size > limit {
             return Err(Error::TooLarge { what: "bytes of metadata".into(), size, limit });
         }
-        whole::<Self>(&bytes, "metadata").map_err(Error::Invalid)?; // near the limit it must also fit in memory under it
+        decode_exact::<Self>(&bytes, "metadata").map_err(Error::Invalid)?; // near the limit, decoding needs memory within it too
         Ok(bytes)
     }
 
-    /// The valid metadata whose record is exactly `bytes`; [`Error::Invalid`] says why not.
+    /// Decodes and validates a record that must take up all of `bytes`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the reason.
     pub fn decode(bytes: &[u8]) -> Result<Self> {
         Self::parse(bytes).map_err(Error::Invalid)
     }
 
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        let metadata: Self = whole(bytes, "metadata record")?;
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        let metadata: Self = decode_exact(bytes, "metadata record")?;
         ensure(metadata.frames > 0, || "no frames".into())?;
         metadata.check()?;
         Ok(metadata)
     }
 
-    /// As [`Self::parse`], of the record in the start section.
-    pub(crate) fn parse_start(bytes: &[u8]) -> Check<Self> {
-        let start: Self = whole(bytes, "metadata record")?;
-        ensure(start.frames == 0, || "a start with frames".into())?;
+    /// Like [`Self::parse`], for the record in the start section.
+    pub(crate) fn parse_start(bytes: &[u8]) -> ParseResult<Self> {
+        let start: Self = decode_exact(bytes, "metadata record")?;
+        ensure(start.frames == 0, || "the start section has frames".into())?;
         start.check()?;
         Ok(start)
     }
 
-    /// What is known before the first frame: the same without frames.
+    /// The metadata that is known before the first frame: without frames, times and windows.
     pub fn start(&self) -> Self {
         let (frames, times, windows) = (0, Vec::new(), Vec::new());
         let Self { dims, spacing, origin, sample, block_edge, channels, bound, tolerance, missing_value, .. } = *self;
@@ -147,85 +140,101 @@ impl Metadata {
         start
     }
 
-    /// Where the start section ends.
-    pub(crate) fn start_end(&self) -> Check<u64> {
+    /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the
+    /// first window (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the metadata cannot be encoded.
+    pub fn file_id(&self, first_digest: u64) -> Result<FileId> {
+        let mut bytes = self.start().encode()?;
+        bytes.put_u64(first_digest);
+        Ok(FileId(xxh3_128(&bytes).to_le_bytes()))
+    }
+
+    /// The offset at which the start section ends.
+    pub(crate) fn start_end(&self) -> ParseResult<u64> {
         let record = self.start().encode().map_err(|e| e.to_string())?;
         Ok(section_end(HEADER as u64, record.len()))
     }
 
-    /// How a window that there is begins.
-    pub(crate) fn record(&self, number: u32) -> WindowRecord {
-        let window = self.windows[number as usize].begun();
+    /// The record of a window's section. Panics if there is no such window.
+    pub(crate) fn window_record(&self, number: u32) -> WindowRecord {
+        let window = self.windows[number as usize].without_totals();
         let first = window.first_frame as usize;
         let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
         WindowRecord { number, window, times }
     }
 
-    /// How it ends.
-    pub(crate) fn end(&self, number: u32) -> WindowEnd {
-        WindowEnd::of(number, &self.windows[number as usize])
+    /// The record of a window's end. Panics if there is no such window.
+    pub(crate) fn window_end(&self, number: u32) -> WindowEnd {
+        WindowEnd::from_window(number, &self.windows[number as usize])
     }
 
-    /// Adds a window; the reason if it cannot be the next one.
-    pub(crate) fn push(&mut self, record: WindowRecord, end: &WindowEnd) -> Check {
+    /// Adds a window; fails if it cannot be the next one.
+    pub(crate) fn push(&mut self, record: WindowRecord, end: &WindowEnd) -> ParseResult {
         let WindowRecord { number, window, times } = record;
         let next = self.windows.len();
-        ensure([number, end.number] == [next as u32; 2], || format!("window {number} where {next} belongs"))?;
-        let window = window.with(end);
+        ensure([number, end.number] == [next as u32; 2], || format!("window {number} instead of {next}"))?;
+        let window = window.with_totals(end);
         self.check_window(next, &window, self.frames)?;
         let timed = times.is_empty() && self.times.is_empty()
             || times.len() == window.frames as usize && self.times.len() as u64 == self.frames;
-        ensure(timed && times.iter().all(|t| t.is_finite()), || "times of some frames alone, or not finite".into())?;
+        ensure(timed && times.iter().all(|t| t.is_finite()), || {
+            "times that are not finite or are not given for every frame".into()
+        })?;
         self.frames += u64::from(window.frames);
         self.times.extend(times);
         self.windows.push(window);
         Ok(())
     }
 
-    /// Leaves `windows` windows.
+    /// Keeps only the first `windows` windows.
     pub(crate) fn truncate(&mut self, windows: usize) {
         self.windows.truncate(windows);
         self.frames = self.windows.iter().map(|window| u64::from(window.frames)).sum();
         self.times.truncate(self.frames as usize);
     }
 
-    /// The value range that a pointwise or rms tolerance refers to: as given, or that of all frames; (inf, -inf) without
-    /// one.
+    /// The value range that a pointwise or rms tolerance refers to: a given range, or the range of all frames.
+    /// (inf, -inf) if there is none.
     pub fn range(&self) -> (f64, f64) {
         self.windows.last().map_or((f64::INFINITY, f64::NEG_INFINITY), |window| window.range)
     }
 
-    /// Whether everything is within the limits and consistent; [`Error::Invalid`] says why not.
+    /// Checks that the metadata is consistent and within the limits.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the reason.
     pub fn validate(&self) -> Result<()> {
         self.check().map_err(|what| Error::Invalid(format!("metadata: {what}")))
     }
 
-    fn check(&self) -> Check {
+    fn check(&self) -> ParseResult {
         self.check_grid()?;
         self.check_times()?;
-        ensure(finite_amount(self.tolerance), || format!("a tolerance of {}", self.tolerance))?;
+        ensure(finite_amount(self.tolerance), || format!("invalid tolerance {}", self.tolerance))?;
         self.bound.check()?;
         self.check_windows()
     }
 
-    fn check_grid(&self) -> Check {
+    fn check_grid(&self) -> ParseResult {
         let sized = self.dims.iter().all(|d| (1..=MAX_DIM).contains(d));
-        ensure(sized, || format!("dimensions {:?}, each 1 to {MAX_DIM}", self.dims))?;
+        ensure(sized, || format!("dimensions {:?}: each must be 1 to {MAX_DIM}", self.dims))?;
         let spaced = self.spacing.iter().all(|s| s.is_finite() && *s > 0.0);
-        ensure(spaced && self.origin.iter().all(|o| o.is_finite()), || "a spacing or origin out of range".into())?;
-        ensure(self.channels > 0 && self.block_edge > 0, || "no channel, or empty blocks".into())?;
+        ensure(spaced && self.origin.iter().all(|o| o.is_finite()), || "spacing or origin out of range".into())?;
+        ensure(self.channels > 0 && self.block_edge > 0, || "no channels, or a block edge of 0".into())?;
         let blocks = self.count_blocks().and_then(|n| u32::try_from(n).ok());
         ensure(blocks.is_some(), || "too many blocks in a window".into())
     }
 
-    fn check_times(&self) -> Check {
+    fn check_times(&self) -> ParseResult {
         ensure(self.frames <= MAX_FRAMES, || format!("{} frames, at most {MAX_FRAMES}", self.frames))?;
         let timed = self.times.is_empty() || self.times.len() as u64 == self.frames;
         ensure(timed, || format!("{} times for {} frames", self.times.len(), self.frames))?;
         ensure(self.times.iter().all(|t| t.is_finite()), || "a time that is not finite".into())
     }
 
-    fn check_windows(&self) -> Check {
+    fn check_windows(&self) -> ParseResult {
         let mut next = 0u64;
         for (number, window) in self.windows.iter().enumerate() {
             self.check_window(number, window, next)?;
@@ -234,21 +243,23 @@ impl Metadata {
         ensure(next == self.frames, || format!("windows cover {next} of {} frames", self.frames))
     }
 
-    /// Whether this can be the window of this number, from the frame `next` on.
-    fn check_window(&self, number: usize, window: &Window, next: u64) -> Check {
+    /// Checks that `window` can have this number and start at frame `next`.
+    fn check_window(&self, number: usize, window: &Window, next: u64) -> ParseResult {
         let place = |what: String| format!("window {number}: {what}");
-        ensure(window.first_frame == next, || place(format!("starts at {} not {next}", window.first_frame)))?;
+        ensure(window.first_frame == next, || {
+            place(format!("starts at frame {} instead of {next}", window.first_frame))
+        })?;
         let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));
         window.check(self.largest_box(), voxels_in_all).map_err(place)
     }
 
-    /// Voxels of the largest box.
+    /// Number of voxels in the largest box.
     fn largest_box(&self) -> u64 {
         let edge = u64::from(self.block_edge);
         self.dims.iter().fold(1, |voxels: u64, &dim| voxels.saturating_mul(dim.min(edge)))
     }
 
-    /// Boxes along x, y, z.
+    /// Number of boxes along x, y, z.
     pub fn blocks_per_axis(&self) -> [u64; 3] {
         self.dims.map(|dim| dim.div_ceil(u64::from(self.block_edge).max(1)))
     }
@@ -257,23 +268,23 @@ impl Metadata {
         self.blocks_per_axis().iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks))
     }
 
-    /// Blocks of one window and channel, of valid metadata.
+    /// Number of blocks in one window and channel; meaningful for valid metadata.
     pub fn blocks_per_channel(&self) -> u32 {
         self.count_blocks().and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX)
     }
 
-    /// Blocks of the whole archive, or the largest number where there are more.
+    /// Number of blocks in the whole archive, or `u64::MAX` on overflow.
     pub fn blocks(&self) -> u64 {
         let per_window = u64::from(self.blocks_per_channel()) * u64::from(self.channels);
         per_window.saturating_mul(self.windows.len() as u64)
     }
 
-    /// Leaves of one window's directory.
+    /// Number of leaves that describe one window.
     pub(crate) fn leaves_per_window(&self) -> u64 {
         u64::from(self.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF)) * u64::from(self.channels)
     }
 
-    /// First voxel and size of a block's box along x, y, z; none for a block that the grid lacks.
+    /// First voxel and size of a block's box along x, y, z; `None` if the grid has no such block.
     pub fn block_box(&self, block: u32) -> Option<([u64; 3], [u64; 3])> {
         if block >= self.blocks_per_channel() {
             return None;
@@ -285,7 +296,7 @@ impl Metadata {
         Some((first, size))
     }
 
-    /// The sizes of a block; none for a block that the archive lacks.
+    /// The sizes of a block; `None` if the archive has no such block.
     pub fn geometry(&self, id: BlockId) -> Option<BlockGeometry<'_>> {
         let window = self.windows.get(id.window as usize).filter(|_| id.channel < self.channels)?;
         let (_, size) = self.block_box(id.block)?;

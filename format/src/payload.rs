@@ -1,15 +1,16 @@
-//! What is inside a part once it is decompressed: pure packing, strict unpacking.
+//! The payloads of parts: packing and strict unpacking.
 //!
-//! Unpacking accepts exactly what packing writes and says in words what else it met; it allocates no more than the
-//! caller's totals call for.
+//! Unpacking accepts exactly what packing writes; its errors name the reason. It allocates no more than the caller's
+//! totals require.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::planes::{bitmap_len, pack_bits, pack_planes, unpack_bits, unpack_planes};
 
 /// Packs quantised coefficients, coefficient-major: `codes[k * voxels + voxel]`.
 ///
-/// Appends one byte: the width `w`. All zero: `w` = 0 and nothing more. Otherwise a bitmap of the nonzero codes, and
-/// `w` (1 to 4) byte planes of their zig-zag values minus 1, `w` being the least that holds the largest of them.
+/// Appends one byte, the width `w`. If all codes are zero, `w` is 0 and nothing follows. Otherwise a bitmap of the nonzero
+/// codes follows, then `w` (1 to 4) byte planes of their zig-zag values minus 1; `w` is the least width that holds the
+/// largest of them.
 pub fn pack_codes(codes: &[i32], out: &mut Vec<u8>) {
     let values: Vec<u32> = codes.iter().filter(|&&c| c != 0).map(|&c| zigzag(c) - 1).collect();
     let Some(&largest) = values.iter().max() else { return out.push(0) };
@@ -21,7 +22,10 @@ pub fn pack_codes(codes: &[i32], out: &mut Vec<u8>) {
     }
 }
 
-/// Fills `codes`, whose length is that of the packed ones; returns how many are not zero.
+/// Fills `codes`, which must have the length of the packed codes; returns how many are not zero.
+///
+/// # Errors
+/// The reason if `raw` is not what [`pack_codes`] writes.
 pub fn unpack_codes(raw: &[u8], codes: &mut [i32]) -> Result<usize, String> {
     codes.fill(0);
     let (&width, rest) = raw.split_first().ok_or("no width byte")?;
@@ -32,19 +36,21 @@ pub fn unpack_codes(raw: &[u8], codes: &mut [i32]) -> Result<usize, String> {
     let (bitmap, planes) = split_bitmap(rest, codes.len())?;
     let count = count_bits(bitmap);
     let expected = count * usize::from(width);
-    ensure(count > 0 && planes.len() == expected, || format!("{} bytes for {expected} in planes", planes.len()))?;
+    ensure(count > 0 && planes.len() == expected, || {
+        format!("{} bytes of planes instead of {expected}", planes.len())
+    })?;
     let largest = match width {
         1 => scatter::<1>(bitmap, planes, count, codes),
         2 => scatter::<2>(bitmap, planes, count, codes),
         3 => scatter::<3>(bitmap, planes, count, codes),
         _ => scatter::<4>(bitmap, planes, count, codes),
     };
-    ensure(width_of(largest) == usize::from(width), || "the width is not the least possible".into())?;
+    ensure(width_of(largest) == usize::from(width), || "the width is larger than necessary".into())?;
     ensure(largest != u32::MAX, || "a code out of range".into())?;
     Ok(count)
 }
 
-/// Puts the values of `W` planes where the bitmap says; returns the largest.
+/// Writes the values of `W` planes to the positions set in the bitmap; returns the largest.
 fn scatter<const W: usize>(bitmap: &[u8], planes: &[u8], count: usize, codes: &mut [i32]) -> u32 {
     let planes: [&[u8]; W] = std::array::from_fn(|plane| &planes[plane * count..(plane + 1) * count]);
     let (mut next, mut largest) = (0, 0);
@@ -61,12 +67,12 @@ fn scatter<const W: usize>(bitmap: &[u8], planes: &[u8], count: usize, codes: &m
     largest
 }
 
-/// Least bytes, at least 1, that hold a value.
+/// The least number of bytes, at least 1, that holds a value.
 fn width_of(value: u32) -> usize {
     (4 - value.leading_zeros() as usize / 8).max(1)
 }
 
-/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
+/// Maps 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
 fn zigzag(code: i32) -> u32 {
     ((code << 1) ^ (code >> 31)) as u32
 }
@@ -97,18 +103,21 @@ pub fn pack_outliers(outliers: &Outliers, sample_size: usize, out: &mut Vec<u8>)
     pack_planes(&outliers.samples, sample_size, out);
 }
 
-/// The outliers of a block of `total` samples (frames x voxels).
+/// Unpacks the outliers of a block of `total` samples (frames x voxels).
+///
+/// # Errors
+/// The reason if `raw` is not what [`pack_outliers`] writes.
 pub fn unpack_outliers(raw: &[u8], sample_size: usize, total: usize) -> Result<Outliers, String> {
     let each = 4 + sample_size;
-    ensure(raw.len().is_multiple_of(each), || format!("{} bytes are no multiple of {each}", raw.len()))?;
+    ensure(raw.len().is_multiple_of(each), || format!("{} bytes are not a multiple of {each}", raw.len()))?;
     let count = raw.len() / each;
     ensure(count <= total, || format!("{count} outliers among {total} samples"))?;
     let (gaps, samples) = raw.split_at(4 * count);
     Ok(Outliers { positions: ascend(&unpack_planes(gaps, 4), total)?, samples: unpack_planes(samples, sample_size) })
 }
 
-/// Positions from little-endian gaps, all below `total`.
-fn ascend(gaps: &[u8], total: usize) -> Check<Vec<u32>> {
+/// The positions that little-endian gaps give; all must be below `total`.
+fn ascend(gaps: &[u8], total: usize) -> ParseResult<Vec<u32>> {
     let mut next = 0u64;
     let position = |gap: &[u8; 4]| {
         let position = next + u64::from(u32::from_le_bytes(*gap));
@@ -119,18 +128,21 @@ fn ascend(gaps: &[u8], total: usize) -> Check<Vec<u32>> {
     gaps.as_chunks::<4>().0.iter().map(position).collect()
 }
 
-/// Appends a bitmap of the missing samples (mask over `frame * voxels + voxel`), then `sample_size` byte planes of
-/// their samples, given as little-endian bytes in that order.
+/// Appends a bitmap of the missing samples (`mask` is indexed by `frame * voxels + voxel`), then `sample_size` byte planes
+/// of these samples, given as little-endian bytes in the same order.
 pub fn pack_missing(mask: &[bool], samples: &[u8], sample_size: usize, out: &mut Vec<u8>) {
     pack_bits(mask.iter().copied(), out);
     pack_planes(samples, sample_size, out);
 }
 
-/// The mask and the missing samples' bytes of a block of `total` samples.
+/// Unpacks the mask and the bytes of the missing samples of a block of `total` samples.
+///
+/// # Errors
+/// The reason if `raw` is not what [`pack_missing`] writes.
 pub fn unpack_missing(raw: &[u8], sample_size: usize, total: usize) -> Result<(Vec<bool>, Vec<u8>), String> {
     let (bitmap, planes) = split_bitmap(raw, total)?;
     let expected = count_bits(bitmap) * sample_size;
-    ensure(planes.len() == expected, || format!("{} bytes instead of {expected} in planes", planes.len()))?;
+    ensure(planes.len() == expected, || format!("{} bytes of planes instead of {expected}", planes.len()))?;
     Ok((unpack_bits(bitmap, total), unpack_planes(planes, sample_size)))
 }
 
@@ -139,15 +151,18 @@ pub fn pack_exact(samples: &[u8], sample_size: usize, out: &mut Vec<u8>) {
     pack_planes(samples, sample_size, out);
 }
 
-/// The little-endian bytes of all `total` samples of a block.
+/// Unpacks the little-endian bytes of all `total` samples of a block.
+///
+/// # Errors
+/// The reason if `raw` is not what [`pack_exact`] writes.
 pub fn unpack_exact(raw: &[u8], sample_size: usize, total: usize) -> Result<Vec<u8>, String> {
     let exact = total.checked_mul(sample_size) == Some(raw.len());
     ensure(exact, || format!("{} bytes for {total} samples of {sample_size}", raw.len()))?;
     Ok(unpack_planes(raw, sample_size))
 }
 
-/// The bitmap of `total` bits, whose padding bits must be zero, and what follows.
-fn split_bitmap(raw: &[u8], total: usize) -> Check<(&[u8], &[u8])> {
+/// Splits off a bitmap of `total` bits, whose padding bits must be zero.
+fn split_bitmap(raw: &[u8], total: usize) -> ParseResult<(&[u8], &[u8])> {
     let short = || format!("{} bytes are too few for a bitmap of {total}", raw.len());
     let (bitmap, rest) = raw.split_at_checked(bitmap_len(total)).ok_or_else(short)?;
     let padding = if total.is_multiple_of(8) { 0 } else { bitmap.last().map_or(0, |last| last >> (total % 8)) };
@@ -240,7 +255,7 @@ mod tests {
         }
 
         #[test]
-        fn what_unpacks_is_what_packs(raw in prop::collection::vec(0u8..6, 0..40), total in 0usize..40, size in sizes()) {
+        fn unpacked_payloads_pack_to_the_same_bytes(raw in prop::collection::vec(0u8..6, 0..40), total in 0usize..40, size in sizes()) {
             let mut codes = vec![0; total];
             if unpack_codes(&raw, &mut codes).is_ok() && total > 0 {
                 prop_assert_eq!(packed(&codes), raw.clone());

@@ -1,4 +1,4 @@
-//! Bitmaps and byte planes, the two layouts that payloads are made of.
+//! Bitmaps and byte planes, the building blocks of payloads.
 
 /// Bytes of a bitmap of `total` bits.
 pub(crate) fn bitmap_len(total: usize) -> usize {
@@ -14,19 +14,19 @@ pub(crate) fn pack_bits(bits: impl ExactSizeIterator<Item = bool>, out: &mut Vec
     }
 }
 
-/// The first `total` bits of a bitmap that holds them.
+/// The first `total` bits of a bitmap. Panics if it is shorter.
 pub(crate) fn unpack_bits(bitmap: &[u8], total: usize) -> Vec<bool> {
     (0..total).map(|i| bitmap[i / 8] >> (i % 8) & 1 == 1).collect()
 }
 
-/// Appends all first bytes of the values of `size` bytes, then all second bytes, and so on.
+/// Splits values of `size` bytes into byte planes: all first bytes, then all second bytes, and so on.
 pub(crate) fn pack_planes(values: &[u8], size: usize, out: &mut Vec<u8>) {
     for plane in 0..size {
         out.extend(values.chunks_exact(size).map(|value| value[plane]));
     }
 }
 
-/// The values of `size` bytes whose planes these are.
+/// Joins byte planes into values of `size` bytes.
 pub(crate) fn unpack_planes(planes: &[u8], size: usize) -> Vec<u8> {
     let count = planes.len() / size;
     let mut values = vec![0; count * size];

@@ -1,33 +1,35 @@
-//! The passes of a pyramid: how the coefficients of a block are refined, axis by axis, from one node to all.
+//! The passes of a pyramid: they refine the coefficients of a block axis by axis, from a single node to all.
 //!
-//! A block has nodes at `[x, y, z, k]`, k a frame or a coefficient along time. The coarsest lattice holds every 2^L-th
-//! node along the refined axes: one node. A pass halves the stride along one axis; the nodes that it adds, at odd
-//! multiples of the new stride, are predicted from those on both sides, and a code says what is missing.
+//! A block has nodes at `[x, y, z, k]`; k is a frame, or a coefficient along time. The coarsest lattice is one node
+//! along every refined axis. A pass halves the stride along one axis. It adds the nodes at odd multiples of the new
+//! stride: they are predicted from their neighbours along that axis (eq 33), and a code times the step of the level is
+//! added (eq 32 and 34). The method page of the package `wavesplat` has these equations; `FORMAT.md`, section 8, has
+//! the arithmetic to the bit.
 
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use bincode::{Decode, Encode};
 
-/// An axis of a block; new ones are appended.
+/// An axis of a block. New ones are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
 pub enum Axis {
-    /// The fastest in an array.
+    /// The fastest axis in memory.
     X,
-    /// The next.
+    /// The second axis.
     Y,
-    /// The slowest in space.
+    /// The slowest spatial axis.
     Z,
-    /// Frames.
+    /// The axis of frames or coefficients.
     T,
 }
 
 impl Axis {
-    /// Its place in `[x, y, z, k]`.
+    /// Its index in `[x, y, z, k]`.
     pub fn index(self) -> usize {
         self as usize
     }
 }
 
-/// What predicts a node from its neighbours along an axis; new ones are appended.
+/// The weights with which the neighbours of a node along an axis predict it (eq 33); new ones are appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
 pub enum Stencil {
     /// (1, 1) / 2.
@@ -39,39 +41,39 @@ pub enum Stencil {
 /// A pyramid over the blocks of a window.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct Pyramid {
-    /// The axes that are refined, in the order of the passes of a level.
+    /// The refined axes, in the order of a level's passes.
     pub order: Vec<Axis>,
-    /// What predicts a node.
+    /// The weights of predictions.
     pub stencil: Stencil,
-    /// Codes of level l count in steps of `step / min(growth^l, most)`; at least 1.
+    /// The step of level l is `step / min(growth^l, most)`; at least 1.
     pub growth: f64,
     /// See `growth`; at least 1.
     pub most: f64,
-    /// Whether predictions are made in 32-bit floats, not in 64-bit ones.
+    /// Whether predictions are computed in 32-bit floats instead of 64-bit floats.
     pub single: bool,
 }
 
 /// One pass, or the coarsest lattice before the first one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pass {
-    /// The axis that is refined; none for the coarsest lattice.
+    /// The refined axis; `None` for the coarsest lattice.
     pub axis: Option<Axis>,
     /// Its new stride is 2^level.
     pub level: u32,
-    /// Distance of neighbouring nodes along x, y, z, k once the pass is done.
+    /// Distance of neighbouring nodes along x, y, z, k after the pass.
     pub strides: [usize; 4],
     /// The level part of the block that holds its codes.
     pub part: u8,
 }
 
 impl Pass {
-    /// The first node that the pass adds, and the distance to the next one, along an axis.
+    /// The first node that the pass adds along an axis, and the distance to the next one.
     pub fn nodes(&self, axis: usize) -> (usize, usize) {
         let stride = self.strides[axis];
         if self.axis.is_some_and(|a| a.index() == axis) { (stride, 2 * stride) } else { (0, stride) }
     }
 
-    /// How many nodes it adds along x, y, z, k in a block of `shape` nodes.
+    /// Number of nodes that it adds along x, y, z, k in a block of `shape` nodes.
     pub fn extent(&self, shape: [usize; 4]) -> [usize; 4] {
         std::array::from_fn(|axis| {
             let (first, distance) = self.nodes(axis);
@@ -79,14 +81,14 @@ impl Pass {
         })
     }
 
-    /// How many nodes it adds.
+    /// Number of nodes that it adds in a block of `shape` nodes.
     pub fn codes(&self, shape: [usize; 4]) -> usize {
         self.extent(shape).iter().product()
     }
 }
 
 impl Pyramid {
-    /// Level parts of a block: the coarse levels together, level 1, level 0, and of level 0 a last pass along time.
+    /// Number of level parts of a block: the coarse levels together, level 1, level 0, and a last pass of level 0 along time.
     pub const PARTS: u8 = 4;
 
     /// The passes of a block of `shape` nodes, coarse to fine; the codes of a block come in this order.
@@ -116,19 +118,21 @@ impl Pyramid {
         }
     }
 
-    /// The step of the codes of a level.
+    /// The step of the codes of a level: `step / min(growth^level, most)` (eq 34).
     pub fn step(&self, step: f64, level: u32) -> f64 {
         let grown = (0..level).fold(1.0, |product: f64, _| (product * self.growth).min(self.most));
         step / grown
     }
 
-    pub(crate) fn check(&self, basis_is_samples: bool) -> Check {
+    pub(crate) fn check(&self, basis_is_samples: bool) -> ParseResult {
         let mut seen = [false; 4];
         for axis in &self.order {
             let again = std::mem::replace(&mut seen[axis.index()], true);
             ensure(!again, || format!("a pyramid that refines {axis:?} twice"))?;
         }
-        ensure(basis_is_samples || !seen[Axis::T.index()], || "a pyramid along time after a transform".into())?;
+        ensure(basis_is_samples || !seen[Axis::T.index()], || {
+            "a pyramid along time with a transform along time".into()
+        })?;
         let steps = |f: f64| f.is_finite() && (1.0..=1e6).contains(&f);
         ensure(steps(self.growth) && steps(self.most), || "a pyramid's steps out of range".into())
     }

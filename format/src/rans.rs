@@ -1,21 +1,34 @@
-//! Bytes in about their entropy: the range variant of asymmetric numeral systems (rANS) with fixed frequencies.
+//! Bytes in about their entropy: the range variant of asymmetric numeral systems (rANS), with fixed frequencies
+//! ([Duda](https://arxiv.org/abs/1311.2540)).
 //!
-//! A state holds 16 to 32 bits; long strings take turns in several states, so that a processor works on them at once.
+//! Frequencies F add up to 2^b. Byte value s owns F slots from `start`, the sum of the frequencies of lower values.
+//! Coding s turns a state X into
+//!
+//! ```text
+//! X' = 2^b floor(X / F) + start + X mod F                                                                 (eq 38)
+//! ```
+//!
+//! and decoding undoes that: X' mod 2^b is a slot of s, and X = F floor(X' / 2^b) + X' mod 2^b - start. A state holds
+//! 16 to 32 bits: it gives up its low 16 bits before it would grow beyond 32. Symbols are coded from the last to the
+//! first, so that they are decoded in order.
+//!
+//! Symbols of long strings take turns in several states, so that a processor works on them at once
+//! ([Giesen](https://arxiv.org/abs/1402.3392)).
 
 use crate::bits::{BitReader, BitWriter, take_bytes, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 
-/// How often each byte occurs, out of a power of two.
+/// Frequency of each byte. The sum is a power of two.
 pub(crate) type Frequencies = [u16; 256];
 
-/// A state is never below this; all begin here when packing and so end here when unpacking.
+/// The least value of a state. States start here when packing, so they end here when unpacking.
 const LOWEST: u32 = 1 << 16;
 
-/// States of strings at least this long; shorter ones have one.
+/// The number of states for strings of at least `LONG` symbols; shorter strings have one.
 const LANES: usize = 4;
 const LONG: usize = 1024;
 
-/// Frequencies out of `1 << bits` like the counts, at least 1 where a count is.
+/// Scales counts to frequencies whose sum is `1 << bits`. Every symbol that occurs gets at least 1.
 pub(crate) fn normalise(counts: &[u32; 256], bits: u32) -> Frequencies {
     let total: u64 = counts.iter().map(|&count| u64::from(count)).sum();
     let scale = |count: u32| ((u64::from(count) << bits) + total / 2) / total.max(1);
@@ -30,10 +43,10 @@ pub(crate) fn normalise(counts: &[u32; 256], bits: u32) -> Frequencies {
     frequencies
 }
 
-/// Appends frequencies out of `1 << bits`, none of which is all of them.
+/// Appends frequencies whose sum is `1 << bits`. No single frequency may be the whole sum.
 ///
-/// For each byte from 0 on, until they are complete: the length of its frequency in bits, as a difference to the one
-/// before, then its bits below the highest.
+/// For each byte from 0 on, until the sum is reached: the length of its frequency in bits, as the difference from the
+/// previous length, then the frequency's bits below the highest.
 pub(crate) fn put_frequencies(frequencies: &Frequencies, bits: u32, out: &mut Vec<u8>) {
     let mut writer = BitWriter::new(out);
     let (mut previous, mut sum) = (bits, 0);
@@ -75,8 +88,8 @@ fn take_length(previous: u32, reader: &mut BitReader) -> u32 {
     }
 }
 
-/// Takes frequencies out of `1 << bits`.
-pub(crate) fn take_frequencies(bytes: &mut &[u8], bits: u32) -> Check<Frequencies> {
+/// Reads frequencies whose sum must be `1 << bits`.
+pub(crate) fn take_frequencies(bytes: &mut &[u8], bits: u32) -> ParseResult<Frequencies> {
     let mut reader = BitReader::new(bytes);
     let mut frequencies = [0; 256];
     let (mut previous, mut sum) = (bits, 0);
@@ -97,12 +110,12 @@ pub(crate) fn take_frequencies(bytes: &mut &[u8], bits: u32) -> Check<Frequencie
     Ok(frequencies)
 }
 
-/// What packing a symbol takes.
+/// Precomputed values for packing a symbol.
 #[derive(Clone, Copy, Default)]
 struct Encode {
     /// `2^(32 + bits) / frequency`, rounded up: the reciprocal that divides every state below `limit` exactly.
     reciprocal: u64,
-    /// States from here on give up 16 bits first.
+    /// States at or above this first emit 16 bits.
     limit: u32,
     /// `2^bits - frequency`.
     others: u32,
@@ -117,7 +130,7 @@ impl Encode {
     }
 }
 
-/// Appends the symbols: states, then words of 16 bits. Every symbol's frequency out of `1 << bits` is above 0.
+/// Appends the coded symbols: states, then words of 16 bits. The frequency of every symbol must be above 0.
 pub(crate) fn encode(symbols: &[u8], frequencies: &Frequencies, bits: u32, out: &mut Vec<u8>) {
     if symbols.len() < LONG {
         encode_lanes::<1>(symbols, frequencies, bits, out);
@@ -148,6 +161,7 @@ fn encode_lanes<const N: usize>(symbols: &[u8], frequencies: &Frequencies, bits:
     out.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
 }
 
+/// Codes a symbol (eq 38), after the state has given up 16 bits if it would overflow.
 fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
     if *state >= symbol.limit {
         words.push(*state as u16);
@@ -157,8 +171,8 @@ fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
     *state = state.wrapping_add(quotient.wrapping_mul(symbol.others)).wrapping_add(symbol.start);
 }
 
-/// Takes what [`encode`] appended and fills `symbols`.
-pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, symbols: &mut [u8]) -> Check {
+/// Reads what [`encode`] appended and fills `symbols`.
+pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, symbols: &mut [u8]) -> ParseResult {
     let count = take_varint(bytes)?;
     let lanes = if symbols.len() < LONG { 1 } else { LANES };
     let (states, words) = take_bytes(bytes, count.saturating_mul(2).saturating_add(4 * lanes))?.split_at(4 * lanes);
@@ -171,11 +185,11 @@ pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, sy
     }
 }
 
-fn first<const N: usize>(states: &[[u8; 4]]) -> Check<&[[u8; 4]; N]> {
+fn first<const N: usize>(states: &[[u8; 4]]) -> ParseResult<&[[u8; 4]; N]> {
     states.first_chunk().ok_or_else(|| "states are missing".into())
 }
 
-/// What unpacking takes: the symbol of each of `S` slots, and of each symbol frequency * 65536 + first slot.
+/// Tables for unpacking: the symbol of each of `S` slots, and `frequency * 65536 + first slot` of each symbol.
 struct Slots<const S: usize> {
     symbols: [u8; S],
     ranges: [u32; 256],
@@ -200,7 +214,7 @@ fn decode_lanes<const N: usize, const S: usize>(
     states: &[[u8; 4]; N],
     words: &[[u8; 2]],
     symbols: &mut [u8],
-) -> Check {
+) -> ParseResult {
     let mut states = states.map(u32::from_le_bytes);
     ensure(states.iter().all(|&state| state >= LOWEST), || "a state is too low".into())?;
     let mut next = 0;
@@ -214,10 +228,10 @@ fn decode_lanes<const N: usize, const S: usize>(
         *symbol = pop(state, slots, words, &mut next);
     }
     let done = next == words.len() && states.iter().all(|&state| state == LOWEST);
-    ensure(done, || "symbols and words do not end together".into())
+    ensure(done, || "symbols and words do not end at the same place".into())
 }
 
-/// The next symbol of a state; past the last word there are zeros, which the end finds out.
+/// The next symbol of a state: the inverse of eq 38. Past the last word it reads zeros; the check at the end then fails.
 #[inline(always)]
 fn pop<const S: usize>(state: &mut u32, slots: &Slots<S>, words: &[[u8; 2]], next: &mut usize) -> u8 {
     let slot = *state & (S as u32 - 1);

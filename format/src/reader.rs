@@ -1,22 +1,23 @@
-//! Reads a file: opens it, finds blocks, copies out and decompresses parts. Nothing is trusted before it is checked:
-//! length, bounds, checksum, parse, decompress into the declared and capped size, exact length, meaning.
+//! Reads a file: opens it, finds blocks, reads and decompresses parts. Everything is checked before it is used: length,
+//! bounds, checksum, fields, decompression into the declared and limited size, exact length, valid values.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, ensure};
+use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::cells::unpack_cells;
 use crate::directory::{BlockEntry, PartEntry};
+use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
 use crate::geometry::BlockGeometry;
-use crate::header::{FileId, HEADER, Header, check_magic};
+use crate::header::{HEADER, Header, check_magic};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
-use crate::section::{FRAME, Owner, decompress, read_section};
+use crate::section::{FRAME, SectionId, decompress, read_section};
 use crate::{Error, ReadAhead, Result, Storage};
 use std::sync::Arc;
 
-/// An open file. Every method works from `&self`; threads may share it if the storage allows.
+/// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
 #[derive(Debug)]
 pub struct Reader<S: Storage> {
     storage: S,
@@ -32,7 +33,11 @@ struct Index {
 }
 
 impl<S: Storage> Reader<S> {
-    /// Opens a file: checks and reads header, footer, metadata and the directory's root; no leaf and no block.
+    /// Opens a file. Reads and checks header, footer, metadata and the directory's root, but no leaf and no block.
+    ///
+    /// # Errors
+    /// [`Error::Foreign`], [`Error::Unsupported`] or [`Error::Corrupt`] if the file is not valid, [`Error::Io`] if the
+    /// storage fails.
     pub fn open(storage: S) -> Result<Self> {
         let id = read_header(&storage)?.id;
         let footer = read_footer(&storage, id)?;
@@ -53,7 +58,7 @@ impl<S: Storage> Reader<S> {
         &self.index.footer
     }
 
-    /// Everything about the archive but its samples.
+    /// The archive's metadata.
     pub fn metadata(&self) -> &Metadata {
         &self.index.metadata
     }
@@ -63,30 +68,33 @@ impl<S: Storage> Reader<S> {
         self.index.footer.id
     }
 
-    /// Where the bytes are.
+    /// The storage that holds the file's bytes.
     pub fn storage(&self) -> &S {
         &self.storage
     }
 
-    /// The directory's leaves of a window, by channel and block; empty for a window that the archive lacks.
+    /// The leaves of a window, ordered by channel and block; empty if the archive has no such window.
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
         let count = self.index.metadata.leaves_per_window() as usize;
         let start = count.saturating_mul(window as usize);
         start.checked_add(count).and_then(|end| self.index.leaves.get(start..end)).unwrap_or(&[])
     }
 
-    /// The entries of a leaf's blocks, in order.
+    /// Reads the entries of a leaf's blocks, in order.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] if the leaf is damaged, [`Error::Io`] if the storage fails.
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
-        let owner = Owner::Leaf(leaf.first());
-        if leaf.raw_len as usize > leaf.most_raw() {
-            return Err(owner.corrupt(leaf.offset, format!("{} bytes, at most {}", leaf.raw_len, leaf.most_raw())));
+        let section = SectionId::Leaf(leaf.first());
+        if leaf.raw_len as usize > leaf.max_raw_len() {
+            return Err(section.corrupt(leaf.offset, format!("{} bytes, at most {}", leaf.raw_len, leaf.max_raw_len())));
         }
-        let stored = read_section(&self.storage, self.id(), owner, &leaf.extent())?;
+        let stored = read_section(&self.storage, self.id(), section, &leaf.extent())?;
         let entries = decompress(&stored, leaf.raw_len).and_then(|raw| self.parse_leaf(leaf, &raw));
-        entries.map_err(|what| owner.corrupt(leaf.offset, what))
+        entries.map_err(|what| section.corrupt(leaf.offset, what))
     }
 
-    fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> Check<Vec<BlockEntry>> {
+    fn parse_leaf(&self, leaf: &LeafEntry, raw: &[u8]) -> ParseResult<Vec<BlockEntry>> {
         let entries = leaf.parse(raw)?;
         let (mut sums, mut at) = (LeafEntry::new(leaf.first(), leaf.data_offset), leaf.data_offset);
         for entry in &entries {
@@ -102,13 +110,16 @@ impl<S: Storage> Reader<S> {
         Ok(entries)
     }
 
-    fn check_entry(&self, entry: &BlockEntry) -> Check {
+    fn check_entry(&self, entry: &BlockEntry) -> ParseResult {
         let geometry = self.index.metadata.geometry(entry.id).ok_or("no such block")?;
         entry.check()?;
         entry.parts.iter().try_for_each(|part| geometry.check(part))
     }
 
-    /// A block's entry; reads one leaf. [`Error::Invalid`] for a block that the archive lacks.
+    /// Reads a block's entry; this reads one leaf.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the archive has no such block; otherwise as [`Self::leaf`].
     pub fn entry(&self, id: BlockId) -> Result<BlockEntry> {
         self.geometry(id)?;
         let per_channel = self.index.metadata.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF) as usize;
@@ -118,28 +129,38 @@ impl<S: Storage> Reader<S> {
         entry.ok_or_else(|| no_block(id))
     }
 
-    /// The sizes of a block. [`Error::Invalid`] for a block that the archive lacks.
+    /// The sizes of a block.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the archive has no such block.
     pub fn geometry(&self, id: BlockId) -> Result<BlockGeometry<'_>> {
         self.index.metadata.geometry(id).ok_or_else(|| no_block(id))
     }
 
-    /// The payload of a block's part: copied out, its checksum checked, then decompressed to exactly the length that
-    /// the entry declares and the geometry allows.
+    /// Reads the payload of a part, checks its checksum and decompresses it to exactly the length that the entry declares
+    /// and the geometry allows.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] if a check fails, [`Error::Invalid`] if the archive has no such block, [`Error::Io`] if the
+    /// storage fails.
     pub fn part(&self, block: &BlockEntry, part: &PartEntry) -> Result<Vec<u8>> {
-        let owner = Owner::Part(block.id, part.kind);
-        self.geometry(block.id)?.check(part).map_err(|what| owner.corrupt(part.offset, what))?;
+        let section = SectionId::Part(block.id, part.kind);
+        self.geometry(block.id)?.check(part).map_err(|what| section.corrupt(part.offset, what))?;
         let stored = part.read(&self.storage, self.id(), block.id)?;
-        decompress(&stored, part.raw_len).map_err(|what| owner.corrupt(part.offset, what))
+        decompress(&stored, part.raw_len).map_err(|what| section.corrupt(part.offset, what))
     }
 
-    /// [`Error::Lost`] for a block of which nothing is known.
+    /// Fails with [`Error::Lost`] if the block is lost.
     fn check_present(&self, block: &BlockEntry) -> Result<()> {
         if block.lost { Err(Error::Lost(block.id)) } else { Ok(()) }
     }
 
-    /// Fills `codes[k * voxels + voxel]`, or with a pyramid pass after pass, with the codes of a level; all zero where the
-    /// block lacks the part.
-    /// [`Error::Invalid`] for a level that the window lacks, or a slice of another length than its codes.
+    /// Fills `codes` with the codes of a level: `codes[k * voxels + voxel]`, or pass after pass with a pyramid. They are all
+    /// zero if the block lacks the part.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the window has no such level or `codes` has the wrong length, [`Error::Lost`] if the block is
+    /// lost; otherwise as [`Self::part`].
     pub fn codes(&self, block: &BlockEntry, level: u8, codes: &mut [i32]) -> Result<()> {
         let geometry = self.geometry(block.id)?;
         if geometry.codes(level) != Some(codes.len()) {
@@ -155,7 +176,10 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, found, |&count| count).map(|_| ())
     }
 
-    /// The outliers of a block; empty where it has none.
+    /// Reads the outliers of a block; empty if it has none.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
     pub fn outliers(&self, block: &BlockEntry) -> Result<Outliers> {
         self.check_present(block)?;
         let Some(part) = block.part(PartKind::Outliers) else { return Ok(Outliers::default()) };
@@ -164,7 +188,10 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, outliers, |outliers| outliers.positions.len())
     }
 
-    /// The mask of a block's missing samples (`frame * voxels + voxel`) and their bytes; none where it has none.
+    /// Reads the mask of a block's missing samples (`frame * voxels + voxel`) and their bytes; `None` if it has none.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
     pub fn missing(&self, block: &BlockEntry) -> Result<Option<(Vec<bool>, Vec<u8>)>> {
         self.check_present(block)?;
         let Some(part) = block.part(PartKind::Missing) else { return Ok(None) };
@@ -173,7 +200,10 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, missing, |(_, bytes)| bytes.len() / geometry.sample_size).map(Some)
     }
 
-    /// The little-endian bytes of every sample of a block (`frame * voxels + voxel`); none where it is not exact.
+    /// Reads the little-endian bytes of all samples of an exact block (`frame * voxels + voxel`); `None` for other blocks.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
     pub fn exact(&self, block: &BlockEntry) -> Result<Option<Vec<u8>>> {
         self.check_present(block)?;
         let Some(part) = block.part(PartKind::Exact) else { return Ok(None) };
@@ -182,25 +212,31 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, samples, |bytes| bytes.len() / geometry.sample_size).map(Some)
     }
 
-    /// Reads every part of a block and compares its checksum, for its errors alone.
+    /// Checks the checksum of every part of a block.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost, [`Error::Corrupt`] if a checksum is wrong, [`Error::Io`] if the storage fails.
     pub fn check_stored(&self, block: &BlockEntry) -> Result<()> {
         self.check_present(block)?;
         block.parts.iter().try_for_each(|part| part.read(&self.storage, self.id(), block.id).map(drop))
     }
 
-    /// Reads and unpacks every part of a block, for its errors alone.
+    /// Reads and unpacks every part of a block to check it.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
     pub fn check_parts(&self, block: &BlockEntry) -> Result<()> {
         self.check_present(block)?;
         let geometry = self.geometry(block.id)?;
         block.parts.iter().try_for_each(|part| {
             let checked = check_payload(&geometry, part, &self.part(block, part)?);
-            checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+            checked.map_err(|what| SectionId::Part(block.id, part.kind).corrupt(part.offset, what))
         })
     }
 }
 
-/// Unpacks the payload of a part; how many things it holds.
-fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> Check<usize> {
+/// Unpacks the payload of a part; returns the number of its items.
+fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResult<usize> {
     let (size, samples) = (geometry.sample_size, geometry.samples());
     match kind {
         PartKind::Level(level) => {
@@ -213,27 +249,32 @@ fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> Check<usi
     }
 }
 
-fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> Check<usize> {
+fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> ParseResult<usize> {
     match &geometry.window.pyramid {
         Some(_) => unpack_cells(raw, &geometry.boxes(level), codes),
         None => unpack_codes(raw, codes),
     }
 }
 
-/// Whether the payload of a part can be unpacked and holds as many things as the entry says.
-pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> Check {
+/// Checks that the payload of a part can be unpacked and holds as many items as the entry says.
+pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> ParseResult {
     unpack(geometry, part.kind, raw).and_then(|held| check_count(held, part))
 }
 
-fn check_count(held: usize, part: &PartEntry) -> Check {
+fn check_count(held: usize, part: &PartEntry) -> ParseResult {
     let (held, said) = (held as u64, part.stats.count);
-    ensure(held == said, || format!("holds {held}, its entry says {said}"))
+    ensure(held == said, || format!("holds {held} items, but its entry says {said}"))
 }
 
-/// What a payload held, if it could be unpacked and holds as many things as its entry says.
-fn unpacked<T>(block: &BlockEntry, part: &PartEntry, payload: Check<T>, count: impl Fn(&T) -> usize) -> Result<T> {
+/// Returns an unpacked payload if it holds as many items as its entry says.
+fn unpacked<T>(
+    block: &BlockEntry,
+    part: &PartEntry,
+    payload: ParseResult<T>,
+    count: impl Fn(&T) -> usize,
+) -> Result<T> {
     let checked = payload.and_then(|payload| check_count(count(&payload), part).map(|()| payload));
-    checked.map_err(|what| Owner::Part(block.id, part.kind).corrupt(part.offset, what))
+    checked.map_err(|what| SectionId::Part(block.id, part.kind).corrupt(part.offset, what))
 }
 
 fn no_block(id: BlockId) -> Error {
@@ -246,7 +287,7 @@ pub(crate) fn read_header(storage: &impl Storage) -> Result<Header> {
     storage.read_at(0, &mut bytes[..present])?;
     check_magic(&bytes[..present])?;
     if present < HEADER {
-        let what = format!("cut short: {} bytes of it are missing, and all that follows", HEADER - present);
+        let what = format!("truncated: {} bytes of it and everything after it are missing", HEADER - present);
         return Err(Error::Corrupt { offset: present as u64, place: "header".into(), what });
     }
     Header::decode(&bytes)
@@ -256,24 +297,24 @@ pub(crate) fn read_footer(storage: &impl Storage, id: FileId) -> Result<Footer> 
     let (len, size) = (storage.len(), FOOTER as u64);
     let corrupt = |what: String| Error::Corrupt { offset: len.saturating_sub(size), place: "footer".into(), what };
     let offset = len.checked_sub(size).filter(|&offset| offset >= HEADER as u64);
-    let offset = offset.ok_or_else(|| corrupt("missing: the file is cut short, or was never finished".into()))?;
+    let offset = offset.ok_or_else(|| corrupt("missing: the file is truncated or was never finished".into()))?;
     let footer = footer_at(storage, offset)?.map_err(|what| corrupt(explain(storage, what)))?;
     ensure(footer.id == id, || "belongs to another file".into()).map_err(corrupt)?;
     let total = footer.total;
-    ensure(total <= len, || format!("the file is {} bytes too short: {len} of {total}", total - len))
+    ensure(total <= len, || format!("the file is {} bytes too short: {len} instead of {total}", total - len))
         .map_err(corrupt)?;
-    ensure(total == len, || format!("the file is {} bytes too long: {len} not {total}", len - total))
+    ensure(total == len, || format!("the file is {} bytes too long: {len} instead of {total}", len - total))
         .map_err(corrupt)?;
     Ok(footer)
 }
 
-fn footer_at(storage: &impl Storage, offset: u64) -> Result<Check<Footer>> {
+fn footer_at(storage: &impl Storage, offset: u64) -> Result<ParseResult<Footer>> {
     let mut bytes = [0; FOOTER];
     storage.read_at(offset, &mut bytes)?;
     Ok(Footer::decode(&bytes))
 }
 
-/// Adds to the reason why there is no footer that one is there a little earlier, if so.
+/// Explains why the footer is invalid: looks for a valid one a little earlier, which means that bytes were appended.
 fn explain(storage: &impl Storage, what: String) -> String {
     let len = storage.len();
     let earlier = (1..=4096).map_while(|extra| len.checked_sub(extra)).filter(|end| end.is_multiple_of(64));
@@ -282,39 +323,39 @@ fn explain(storage: &impl Storage, what: String) -> String {
         footer.is_some_and(|footer| footer.total == *end)
     };
     match earlier.into_iter().find(ends) {
-        Some(end) => format!("the file is {} bytes too long: {len} not {end}", len - end),
+        Some(end) => format!("the file is {} bytes too long: {len} instead of {end}", len - end),
         None => what,
     }
 }
 
 fn read_metadata(storage: &impl Storage, footer: &Footer) -> Result<Metadata> {
-    let (extent, owner) = (footer.metadata, Owner::Metadata);
-    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let (extent, section) = (footer.metadata, SectionId::Metadata);
+    let corrupt = |what: String| section.corrupt(extent.offset, what);
     let sized = extent.stored_len == extent.raw_len && extent.raw_len as usize <= MAX_METADATA;
     ensure(sized, || format!("{} bytes, at most {MAX_METADATA}", extent.raw_len)).map_err(corrupt)?;
     let placed = align(extent.end()) == footer.root.offset
         && align(footer.root.end()).checked_add(FOOTER as u64) == Some(footer.total);
     ensure(placed, || "metadata, root and footer do not follow each other".into()).map_err(corrupt)?;
-    let record = read_section(storage, footer.id, owner, &extent)?;
-    Metadata::parse(&record).map_err(|what| owner.corrupt(extent.offset + FRAME as u64, what))
+    let record = read_section(storage, footer.id, section, &extent)?;
+    Metadata::parse(&record).map_err(|what| section.corrupt(extent.offset + FRAME as u64, what))
 }
 
 fn read_root(storage: &impl Storage, footer: &Footer, metadata: &Metadata) -> Result<Vec<LeafEntry>> {
-    let (extent, owner) = (footer.root, Owner::Root);
-    let corrupt = |what: String| owner.corrupt(extent.offset, what);
+    let (extent, section) = (footer.root, SectionId::Root);
+    let corrupt = |what: String| section.corrupt(extent.offset, what);
     let blocks = metadata.blocks();
     let counted = footer.blocks == blocks && blocks.checked_mul(MIN_BLOCK).is_some_and(|bytes| bytes <= footer.total);
-    ensure(counted, || format!("{blocks} blocks by the metadata, {} in the footer", footer.blocks)).map_err(corrupt)?;
+    ensure(counted, || format!("{blocks} blocks in the metadata, {} in the footer", footer.blocks)).map_err(corrupt)?;
     let size = footer.leaves.checked_mul(LEAF_ENTRY as u64).filter(|&size| size <= MAX_ROOT_RAW);
     let sized = size == Some(extent.raw_len.into()) && footer.leaves <= blocks;
     ensure(sized, || format!("{} bytes for {} leaves", extent.raw_len, footer.leaves)).map_err(corrupt)?;
-    let stored = read_section(storage, footer.id, owner, &extent)?;
+    let stored = read_section(storage, footer.id, section, &extent)?;
     let raw = decompress(&stored, extent.raw_len).map_err(corrupt)?;
-    let leaves: Check<Vec<_>> =
-        raw.chunks(LEAF_ENTRY).map(|entry| LeafEntry::decode(&mut Fields::new(entry))).collect();
+    let leaves: ParseResult<Vec<_>> =
+        raw.chunks(LEAF_ENTRY).map(|entry| LeafEntry::decode(&mut FieldReader::new(entry))).collect();
     let leaves = leaves.map_err(corrupt)?;
     let end = check_leaves(metadata, &leaves).map_err(corrupt)?;
     let follows = align(end) == footer.metadata.offset;
-    ensure(follows, || format!("windows end at byte {end}, the metadata is elsewhere")).map_err(corrupt)?;
+    ensure(follows, || format!("windows end at byte {end}, but the metadata does not follow them")).map_err(corrupt)?;
     Ok(leaves)
 }

@@ -1,12 +1,12 @@
-//! The types that a sample can have in an archive.
+//! The sample types of an archive.
 
 use bincode::{Decode, Encode};
 use std::fmt;
 use std::str::FromStr;
 
-/// The type of the samples of an archive; part of the metadata record, so new types are appended.
+/// The sample type of an archive. Its numbers are stored in the metadata record, so new types are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Encode, Decode)]
-#[allow(missing_docs)] // the names say all
+#[allow(missing_docs)] // the names are the documentation
 pub enum SampleType {
     U8,
     I8,
@@ -20,7 +20,7 @@ pub enum SampleType {
 }
 
 impl SampleType {
-    /// Every type, in the order of their numbers in a file.
+    /// Every type, in the order of the numbers stored in a file.
     pub const ALL: [Self; 9] =
         [Self::U8, Self::I8, Self::U16, Self::I16, Self::U32, Self::I32, Self::F16, Self::F32, Self::F64];
 
@@ -49,7 +49,7 @@ impl SampleType {
         }
     }
 
-    /// Whether samples are floating-point numbers, so that NaN and infinities can occur.
+    /// Whether samples are floating-point numbers, which may be NaN or infinite.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::F16 | Self::F32 | Self::F64)
     }

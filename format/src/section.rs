@@ -1,8 +1,8 @@
-//! Framed sections and checksums: every structure but the parts' payloads is a frame of 24 bytes and its content.
+//! Sections and checksums. Every structure except the payloads of parts is a section: a frame of 24 bytes and its content.
 
 use crate::block::{BlockId, PartKind};
-use crate::bytes::{Check, Fields, Put, ensure};
-use crate::header::FileId;
+use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
+use crate::file_id::FileId;
 use crate::{Error, Result, Storage};
 use std::fmt;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
@@ -11,37 +11,37 @@ use zstd::zstd_safe;
 /// Bytes of a section's frame.
 pub(crate) const FRAME: usize = 24;
 
-/// The zstd level of the directory: fast, and the directory is small.
+/// The zstd level of the directory: a fast one, because the directory is small.
 const DIRECTORY_LEVEL: i32 = 3;
 
-/// Where a section is and what its stored bytes must be.
+/// Position, length and checksum of a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Extent {
-    /// Of the frame, absolute.
+pub(crate) struct SectionExtent {
+    /// Offset of the frame in the file.
     pub(crate) offset: u64,
     /// Bytes after the frame.
     pub(crate) stored_len: u32,
-    /// Bytes of the content once decompressed.
+    /// Bytes of the content after decompression.
     pub(crate) raw_len: u32,
-    /// Over the stored bytes.
+    /// Checksum of the stored bytes.
     pub(crate) checksum: u64,
 }
 
-impl Extent {
-    /// The first byte after the section, or the largest number where it would be beyond.
+impl SectionExtent {
+    /// Offset of the first byte after the section, or `u64::MAX` on overflow.
     pub(crate) fn end(&self) -> u64 {
         self.offset.saturating_add(FRAME as u64 + u64::from(self.stored_len))
     }
 }
 
-/// Where a section at `offset` of `len` stored bytes ends.
+/// The end of a section of `len` stored bytes at `offset`.
 pub(crate) fn section_end(offset: u64, len: usize) -> u64 {
     offset.saturating_add((FRAME + len) as u64)
 }
 
-/// Whose bytes are checksummed: seeds the checksum, so that bytes of another owner fail.
+/// Identifies a section or part. It seeds the checksum, so that bytes of another section or part fail the check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Owner {
+pub(crate) enum SectionId {
     Part(BlockId, PartKind),
     Block(BlockId),
     Leaf(BlockId),
@@ -52,8 +52,8 @@ pub(crate) enum Owner {
     WindowEnd(u32),
 }
 
-impl Owner {
-    /// Block, kind and level in the seed.
+impl SectionId {
+    /// The block, and kind and level, in the seed.
     fn identity(self) -> (BlockId, [u8; 2]) {
         let none = BlockId { window: 0, block: 0, channel: 0 };
         match self {
@@ -68,7 +68,7 @@ impl Owner {
         }
     }
 
-    /// The first bytes of the section; a part has none.
+    /// The tag that starts the section; parts have none.
     fn tag(self) -> [u8; 4] {
         match self {
             Self::Part(..) => [0; 4],
@@ -82,7 +82,7 @@ impl Owner {
         }
     }
 
-    /// The checksum of this owner's stored bytes in the file `file`.
+    /// The checksum of the stored bytes in the file `file`.
     pub(crate) fn checksum(self, file: FileId, stored: &[u8]) -> u64 {
         let (id, kind) = self.identity();
         let mut seed = Vec::with_capacity(28);
@@ -94,13 +94,13 @@ impl Owner {
         xxh3_64_with_seed(stored, xxh3_64(&seed))
     }
 
-    /// An error at `offset` in this owner's bytes.
+    /// An error at `offset` in this section.
     pub(crate) fn corrupt(self, offset: u64, what: impl Into<String>) -> Error {
         Error::Corrupt { offset, place: self.to_string(), what: what.into() }
     }
 }
 
-impl fmt::Display for Owner {
+impl fmt::Display for SectionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Part(id, kind) => write!(f, "{id} {kind}"),
@@ -115,10 +115,10 @@ impl fmt::Display for Owner {
     }
 }
 
-/// The frame of `owner`'s section.
-pub(crate) fn frame(owner: Owner, extent: &Extent) -> Vec<u8> {
+/// The bytes of a section's frame.
+pub(crate) fn frame(section: SectionId, extent: &SectionExtent) -> Vec<u8> {
     let mut out = Vec::with_capacity(FRAME);
-    out.put(&owner.tag());
+    out.put(&section.tag());
     out.put_u32(extent.stored_len);
     out.put_u32(extent.raw_len);
     out.put_u32(0);
@@ -126,66 +126,72 @@ pub(crate) fn frame(owner: Owner, extent: &Extent) -> Vec<u8> {
     out
 }
 
-/// Copies out `len` bytes at `offset`, after checking that they are there.
-pub(crate) fn read(storage: &impl Storage, owner: Owner, offset: u64, len: u64) -> Result<Vec<u8>> {
+/// Reads `len` bytes at `offset`. Checks the bounds before it allocates.
+pub(crate) fn read(storage: &impl Storage, section: SectionId, offset: u64, len: u64) -> Result<Vec<u8>> {
     let inside = offset.checked_add(len).is_some_and(|end| end <= storage.len());
     let size = usize::try_from(len).ok().filter(|_| inside);
     let Some(size) = size else {
-        return Err(owner.corrupt(offset, format!("{len} bytes reach beyond the file's {}", storage.len())));
+        return Err(
+            section.corrupt(offset, format!("{len} bytes extend past the end of the file at {}", storage.len()))
+        );
     };
     let mut out = vec![0; size];
     storage.read_at(offset, &mut out)?;
     Ok(out)
 }
 
-/// The stored bytes of a section whose frame and checksum are right.
-pub(crate) fn read_section(storage: &impl Storage, file: FileId, owner: Owner, extent: &Extent) -> Result<Vec<u8>> {
-    let mut bytes = read(storage, owner, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
-    if !bytes.starts_with(&frame(owner, extent)) {
-        return Err(owner.corrupt(extent.offset, "the section's frame differs from what points to it"));
+/// Reads the stored bytes of a section; checks its frame and checksum.
+pub(crate) fn read_section(
+    storage: &impl Storage,
+    file: FileId,
+    section: SectionId,
+    extent: &SectionExtent,
+) -> Result<Vec<u8>> {
+    let mut bytes = read(storage, section, extent.offset, FRAME as u64 + u64::from(extent.stored_len))?;
+    if !bytes.starts_with(&frame(section, extent)) {
+        return Err(section.corrupt(extent.offset, "the section's frame differs from the reference to it"));
     }
     bytes.drain(..FRAME);
-    if owner.checksum(file, &bytes) != extent.checksum {
-        return Err(owner.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
+    if section.checksum(file, &bytes) != extent.checksum {
+        return Err(section.corrupt(extent.offset + FRAME as u64, "the checksum does not match"));
     }
     Ok(bytes)
 }
 
-/// The section of `owner` at `offset`, of at most `most` stored bytes, whose frame says no more than it must and whose
-/// checksum is right.
+/// Reads the section at `offset`, of at most `most` stored bytes; checks its frame and checksum.
 pub(crate) fn section_at(
     storage: &impl Storage,
     file: FileId,
-    owner: Owner,
+    section: SectionId,
     offset: u64,
     most: usize,
-) -> Result<(Extent, Vec<u8>)> {
-    let bytes = read(storage, owner, offset, FRAME as u64)?;
-    let extent = parse_frame(owner, offset, &bytes).map_err(|what| owner.corrupt(offset, what))?;
+) -> Result<(SectionExtent, Vec<u8>)> {
+    let bytes = read(storage, section, offset, FRAME as u64)?;
+    let extent = parse_frame(section, offset, &bytes).map_err(|what| section.corrupt(offset, what))?;
     if extent.stored_len as usize > most {
-        return Err(owner.corrupt(offset, format!("{} bytes, at most {most}", extent.stored_len)));
+        return Err(section.corrupt(offset, format!("{} bytes, at most {most}", extent.stored_len)));
     }
-    let stored = read_section(storage, file, owner, &extent)?;
+    let stored = read_section(storage, file, section, &extent)?;
     Ok((extent, stored))
 }
 
-fn parse_frame(owner: Owner, offset: u64, bytes: &[u8]) -> Check<Extent> {
-    let mut fields = Fields::new(bytes);
-    ensure(fields.array()? == owner.tag(), || "no such section".into())?;
+fn parse_frame(section: SectionId, offset: u64, bytes: &[u8]) -> ParseResult<SectionExtent> {
+    let mut fields = FieldReader::new(bytes);
+    ensure(fields.array()? == section.tag(), || "another section's tag".into())?;
     let (stored_len, raw_len) = (fields.u32()?, fields.u32()?);
     fields.reserved::<4>()?;
-    Ok(Extent { offset, stored_len, raw_len, checksum: fields.u64()? })
+    Ok(SectionExtent { offset, stored_len, raw_len, checksum: fields.u64()? })
 }
 
-/// One zstd frame of the directory's `raw` bytes.
+/// Compresses `raw` bytes of the directory to one zstd frame.
 pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
     let mut compressor = zstd::bulk::Compressor::new(DIRECTORY_LEVEL)?;
     compressor.include_checksum(true)?;
     Ok(compressor.compress(raw)?)
 }
 
-/// Exactly `raw_len` bytes from exactly one zstd frame that declares them. The caller has capped `raw_len`.
-pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> Check<Vec<u8>> {
+/// Decompresses exactly one zstd frame, which must declare and hold exactly `raw_len` bytes. The caller limits `raw_len`.
+pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> ParseResult<Vec<u8>> {
     let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
     ensure(whole, || "not one whole zstd frame".into())?;
     ensure(stored.get(4).is_some_and(|descriptor| descriptor & 4 != 0), || "the zstd frame has no checksum".into())?;

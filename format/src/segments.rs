@@ -1,53 +1,53 @@
-//! A string of bytes cut in segments, each packed in the way that makes it shortest.
+//! Packs a string of bytes in segments, each in the shortest of several encodings.
 
 use crate::bits::{put_varint, take_bytes, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::rans::{decode, encode, normalise, put_frequencies, take_frequencies};
 
-/// Symbols after which a stream may change its frequencies.
+/// Frequencies can change after this many symbols of a stream.
 const PIECE: usize = 1 << 12;
 
-/// How a segment is packed: the lowest two bits of its head.
+/// The encoding of a segment: the lowest two bits of its head.
 const RAW: usize = 0;
 const CONSTANT: usize = 1;
 const COARSE: usize = 2;
 const FINE: usize = 3;
 
-/// Bits of the frequencies.
+/// Precision of the frequencies in bits.
 const COARSE_BITS: u32 = 12;
 const FINE_BITS: u32 = 14;
 
-/// Most bytes that a piece takes beside its symbols.
+/// Upper bound on the bytes that a piece adds to its symbols.
 const HEAD: usize = 5;
 
-/// Upper bound of the packed bytes of so many symbols in so many streams.
+/// Upper bound on the packed bytes of `symbols` symbols in `streams` streams.
 pub(crate) fn max_segments(symbols: usize, streams: usize) -> usize {
     symbols.saturating_add(HEAD * (streams + symbols / PIECE))
 }
 
-/// Appends streams, given one after another with the length of each.
+/// Packs streams. `symbols` holds them one after another; `lengths` is the length of each.
 pub(crate) fn pack_segments(symbols: &[u8], lengths: &[usize], out: &mut Vec<u8>) {
     let mut rest = symbols;
-    for segment in Segment::of(symbols, lengths) {
+    for segment in Segment::split(symbols, lengths) {
         let (symbols, after) = rest.split_at(segment.length);
         segment.pack(symbols, out);
         rest = after;
     }
 }
 
-/// About how many bytes [`pack_segments`] appends.
+/// Estimates how many bytes [`pack_segments`] appends.
 pub(crate) fn estimate_segments(symbols: &[u8], lengths: &[usize]) -> usize {
-    let cost: u64 = Segment::of(symbols, lengths).iter().map(|segment| segment.cost).sum();
+    let cost: u64 = Segment::split(symbols, lengths).iter().map(|segment| segment.cost).sum();
     (cost >> 19) as usize
 }
 
-/// Fills `symbols` from the segments at the front of `bytes` and takes those off.
-pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
+/// Fills `symbols` from the segments at the front of `bytes`, and advances `bytes` past them.
+pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> ParseResult {
     let mut rest = symbols;
     while !rest.is_empty() {
         let head = take_varint(bytes)?;
         let fits = 0 < head >> 2 && head >> 2 <= rest.len();
-        ensure(fits, || format!("a segment of {} where {} symbols are left", head >> 2, rest.len()))?;
+        ensure(fits, || format!("a segment of {} symbols where {} are left", head >> 2, rest.len()))?;
         let (segment, after) = rest.split_at_mut(head >> 2);
         unpack_segment(bytes, head & 3, segment)?;
         rest = after;
@@ -55,7 +55,7 @@ pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> Check {
     Ok(())
 }
 
-fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> Check {
+fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> ParseResult {
     match kind {
         RAW => symbols.copy_from_slice(take_bytes(bytes, symbols.len())?),
         CONSTANT => symbols.fill(take_bytes(bytes, 1)?[0]),
@@ -68,11 +68,11 @@ fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> Check {
     Ok(())
 }
 
-/// A run of symbols that share their frequencies.
+/// A run of symbols with the same frequencies.
 struct Segment {
     length: usize,
     counts: [u32; 256],
-    /// Estimated size in 1/65536 bits.
+    /// Estimated size in units of 1/65536 bit.
     cost: u64,
 }
 
@@ -85,8 +85,8 @@ impl Segment {
         Self { length, counts, cost: cost(length, &counts) }
     }
 
-    /// The segments of streams: pieces, joined with the one before where that is not longer.
-    fn of(symbols: &[u8], lengths: &[usize]) -> Vec<Self> {
+    /// The segments of streams: pieces, each joined with the previous segment unless that makes them longer.
+    fn split(symbols: &[u8], lengths: &[usize]) -> Vec<Self> {
         let mut segments: Vec<Self> = Vec::new();
         let mut rest = symbols;
         for &length in lengths {
@@ -100,7 +100,7 @@ impl Segment {
         segments
     }
 
-    /// Takes the next piece in, or gives it back where both are shorter apart.
+    /// Joins the next piece to this segment, or returns it if the two are shorter apart.
     fn join(&mut self, next: Self) -> Option<Self> {
         let counts = std::array::from_fn(|symbol| self.counts[symbol] + next.counts[symbol]);
         let both = Self::counted(self.length + next.length, counts);
@@ -130,13 +130,13 @@ impl Segment {
         }
     }
 
-    /// Bits of the frequencies; fine ones where they pay, for they unpack more slowly.
+    /// Precision of the frequencies in bits. Fine frequencies unpack more slowly, so they must save at least 1/256.
     fn bits(&self) -> u32 {
         let coarse = self.coded(COARSE_BITS);
         if self.coded(FINE_BITS) < coarse - coarse / 256 { FINE_BITS } else { COARSE_BITS }
     }
 
-    /// Size in 1/65536 bits with frequencies of so many bits.
+    /// Size in units of 1/65536 bit with frequencies of `bits` bits.
     fn coded(&self, bits: u32) -> u64 {
         let frequencies = normalise(&self.counts, bits);
         let mut table = Vec::new();
@@ -147,7 +147,7 @@ impl Segment {
     }
 }
 
-/// Estimated size in 1/65536 bits: the entropy, 8 bits for each frequency, 100 for the head and the states.
+/// Estimated size in units of 1/65536 bit: the entropy, 8 bits for each frequency, 100 bits for the head and the states.
 fn cost(length: usize, counts: &[u32; 256]) -> u64 {
     let used = counts.iter().filter(|&&count| count > 0);
     let (kinds, saved) = used.fold((0, 0), |(kinds, saved), &c| (kinds + 1, saved + u64::from(c) * log2(c)));
@@ -156,7 +156,7 @@ fn cost(length: usize, counts: &[u32; 256]) -> u64 {
     if kinds == 1 { 32 << 16 } else { raw.min(coded) }
 }
 
-/// Base 2 logarithm in 1/65536, by integers so that it is the same everywhere.
+/// Base 2 logarithm in units of 1/65536. Integer arithmetic makes it the same on every machine.
 fn log2(value: u32) -> u64 {
     let whole = value.max(1).ilog2();
     let mantissa = (u64::from(value.max(1)) << 31) >> whole;
@@ -165,7 +165,7 @@ fn log2(value: u32) -> u64 {
     (u64::from(whole) << 16) + low + (((high - low) * between) >> 23)
 }
 
-/// `log2(1 + i / 256)` in 1/65536.
+/// `log2(1 + i / 256)` in units of 1/65536.
 static LOG2: [u32; 257] = {
     let mut table = [0; 257];
     let mut i = 0;
@@ -176,7 +176,7 @@ static LOG2: [u32; 257] = {
     table
 };
 
-/// Bit by bit: the square of a number has twice its logarithm.
+/// One entry of [`LOG2`], bit by bit: squaring a number doubles its logarithm.
 const fn fraction(i: u64) -> u32 {
     let (mut value, mut bits, mut step) = ((256 + i) << 23, 0, 0);
     if i == 256 {
@@ -194,7 +194,7 @@ const fn fraction(i: u64) -> u32 {
     bits
 }
 
-/// How often each byte occurs; four counters of each, for equal neighbours would wait for one another.
+/// Counts how often each byte occurs. Four tables of counters, because equal neighbours would wait for each other in one.
 fn histogram(symbols: &[u8]) -> [u32; 256] {
     let mut counts = [[0u32; 256]; 4];
     let (fours, tail) = symbols.as_chunks::<4>();
@@ -222,7 +222,7 @@ mod tests {
         out
     }
 
-    /// Small numbers in no simple order, 255 now and then.
+    /// Small numbers in no simple order, sometimes 255.
     fn noise(count: u32, kinds: u32) -> Vec<u8> {
         let scramble = |i: u32| (i.wrapping_mul(0x9E37_79B1) ^ i >> 3).wrapping_mul(0x85EB_CA6B) >> 13;
         (0..count).map(|i| if scramble(i) % 1000 == 0 { 255 } else { (scramble(i) % kinds) as u8 }).collect()

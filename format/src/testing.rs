@@ -1,4 +1,4 @@
-//! Small files for the tests, from seeded pseudo-random blocks.
+//! Small files for the tests, made of seeded pseudo-random blocks.
 
 use crate::*;
 
@@ -65,7 +65,7 @@ pub(crate) fn tiny() -> Metadata {
     metadata
 }
 
-/// What a block holds.
+/// The content of a block.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Content {
     pub(crate) levels: Vec<Vec<i32>>,
@@ -140,7 +140,7 @@ pub(crate) fn encode(
     EncodedBlock { id, stats, parts }
 }
 
-/// Every block of an archive with its content; the windows' counts in the metadata are set to fit.
+/// Makes every block of an archive with its content, and sets the windows' counts in the metadata.
 pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, Content)> {
     let (mut random, mut compressor) = (Random(seed), Compressor::new(3).expect("level 3"));
     let mut found = Vec::new();
@@ -173,14 +173,14 @@ pub(crate) fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)])
     }
 }
 
-/// The file of these blocks.
+/// Writes a file of these blocks.
 pub(crate) fn file(metadata: &Metadata, blocks: &[(EncodedBlock, Content)]) -> Vec<u8> {
     let (file, summary) = write(metadata, blocks.iter().map(|(block, _)| block)).expect("complete");
     assert_eq!((summary.bytes, summary.blocks), (file.len() as u64, blocks.len() as u64));
     file
 }
 
-/// Writes these blocks, and ends a window wherever the next one begins.
+/// Writes these blocks; ends a window where the next one begins.
 pub(crate) fn write<'a>(
     metadata: &Metadata,
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
@@ -188,7 +188,7 @@ pub(crate) fn write<'a>(
     write_but(metadata, blocks, ID, None)
 }
 
-/// As [`write`], as the file `id`, one of the blocks as lost.
+/// Like [`write`], with the file id `id` and one of the blocks written as lost.
 pub(crate) fn write_but<'a>(
     metadata: &Metadata,
     blocks: impl IntoIterator<Item = &'a EncodedBlock>,
@@ -196,16 +196,16 @@ pub(crate) fn write_but<'a>(
     lost: Option<BlockId>,
 ) -> Result<(Vec<u8>, Summary)> {
     let mut writer = Writer::new(Vec::new(), id, metadata)?;
-    writer.begin_window(metadata.record(0))?;
+    writer.begin_window(metadata.window_record(0))?;
     for block in blocks {
         let ended = writer.metadata().windows.len() as u32;
         if block.id.window > ended {
-            writer.end_window(&metadata.end(ended))?;
-            writer.begin_window(metadata.record(ended + 1))?;
+            writer.end_window(&metadata.window_end(ended))?;
+            writer.begin_window(metadata.window_record(ended + 1))?;
         }
         if lost == Some(block.id) { writer.append_lost(block.id)? } else { writer.append(block)? }
     }
-    writer.end_window(&metadata.end(metadata.windows.len() as u32 - 1))?;
+    writer.end_window(&metadata.window_end(metadata.windows.len() as u32 - 1))?;
     writer.finish()
 }
 

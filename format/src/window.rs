@@ -1,27 +1,26 @@
-//! A window of frames: how its blocks are coded, and what they promised and reached.
+//! A window of frames: how its blocks are coded, and their error bounds and totals.
 
-use crate::bytes::{Check, ensure};
-use crate::directory::{finite_amount, is_amount, is_range};
+use crate::bytes::{ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::limits::*;
-use crate::metadata::{CONFIG, whole};
+use crate::record::{decode_exact, encode};
 use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
-/// The transform along time; new kinds are appended.
+/// The transform along time. New kinds are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
 pub enum Basis {
     /// The Haar wavelet.
     Haar,
     /// The multiwavelet of Geronimo, Hardin and Massopust.
     Multi,
-    /// None: the samples themselves.
+    /// No transform: the coefficients are the samples.
     Samples,
-    /// Orthonormal functions that suit the window's own series, then Haar functions that complete them.
+    /// Orthonormal functions fitted to the window's series, completed by Haar functions.
     Learned,
 }
 
 impl Basis {
-    /// Its name.
+    /// The name used on the command line and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Haar => "haar",
@@ -32,65 +31,66 @@ impl Basis {
     }
 }
 
-/// A run of frames that is coded together.
+/// A run of consecutive frames that are coded together.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct Window {
     /// Its first frame.
     pub first_frame: u64,
-    /// Its frames, 1 to [`MAX_WINDOW_FRAMES`].
+    /// Number of frames, 1 to [`MAX_WINDOW_FRAMES`].
     pub frames: u32,
     /// The transform along time.
     pub basis: Basis,
-    /// Coefficients of one voxel; may exceed `frames`.
+    /// Number of coefficients per voxel; may exceed `frames`.
     pub coefficients: u32,
-    /// Coefficients of one voxel in each level part, coarse to fine; their sum is `coefficients`. Empty with a pyramid.
+    /// Number of coefficients per voxel in each level part, coarse to fine; their sum is `coefficients`. Empty with a
+    /// pyramid.
     pub levels: Vec<u32>,
-    /// Of a learned basis: the learned functions, `frames` values each, in units of 2^-15; else empty.
+    /// For a learned basis: the learned functions, `frames` values each, in units of 2^-15. Otherwise empty.
     pub functions: Vec<i16>,
-    /// How coefficients are refined in space, or samples in space and time.
+    /// How coefficients are predicted in space, or samples in space and time, if they are.
     pub pyramid: Option<Pyramid>,
-    /// What the writer took for a block's step, in units of its own; for writers that append.
+    /// For writers that append: the value from which the writer chose the blocks' steps, in its own units.
     pub coarseness: f64,
-    /// The value range that a pointwise or rms tolerance refers to here: as given, or that of all frames up to the window's
-    /// end; (inf, -inf) without one.
+    /// The value range that a pointwise or rms tolerance refers to: a given range, or the range of all frames up to the
+    /// window's end. (inf, -inf) if there is none.
     pub range: (f64, f64),
-    /// The writer's digest of the samples, to tell whether a source still holds them; 0: unknown.
+    /// The writer's digest of the samples, by which it recognises a source; 0 if unknown.
     pub digest: u64,
     /// The largest error that the bound allows in this window, in units of the samples.
     pub delta: f64,
     /// Largest error of a sample, rounded up; at least that of every block.
     pub reached: f64,
-    /// Largest share of its bound that any series used, in the bound's own measure, rounded up; at most 1.
+    /// Largest share of its bound that any series uses, in the bound's own measure, rounded up; at most 1.
     pub share: f64,
     /// Sum of the squared errors of the samples; may overflow to infinity.
     pub squared_error: f64,
-    /// Smallest decoded finite sample; infinity when there is none.
+    /// Smallest decoded finite sample; infinity if there is none.
     pub min: f64,
-    /// Largest decoded finite sample; minus infinity when there is none.
+    /// Largest decoded finite sample; minus infinity if there is none.
     pub max: f64,
-    /// Missing samples; at least those in parts of missing samples.
+    /// Number of missing samples; at least as many as the parts of missing samples hold.
     pub missing: u64,
-    /// Nonzero coefficients: the sum of the counts of all level parts.
+    /// Number of nonzero coefficients: the sum of the counts of all level parts.
     pub coded: u64,
-    /// Outliers: the sum of the counts of all parts of outliers.
+    /// Number of outliers: the sum of the counts of all parts of outliers.
     pub outliers: u64,
 }
 
-/// What the section before a window's blocks holds: with it and the file's start, they can be decoded.
+/// The section before a window's blocks. It and the file's start are enough to decode them.
 #[derive(Debug, Clone, PartialEq, Encode, Decode)]
 pub struct WindowRecord {
-    /// Its number, from 0.
+    /// Number of the window, from 0.
     pub number: u32,
-    /// The window as it is before its first block: what adds up from blocks is still that of none.
+    /// The window with the totals of no blocks.
     pub window: Window,
-    /// Time of each of its frames; empty: frame numbers.
+    /// Time of each of its frames. If empty, frames are identified by number.
     pub times: Vec<f64>,
 }
 
-/// What the section after a window's blocks holds: what they add up to.
+/// The section after a window's blocks: their totals.
 #[derive(Debug, Clone, Copy, PartialEq, Encode, Decode)]
 pub struct WindowEnd {
-    /// Its number, from 0.
+    /// Number of the window, from 0.
     pub number: u32,
     /// [`Window::reached`]
     pub reached: f64,
@@ -114,34 +114,35 @@ pub struct WindowEnd {
 pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
 impl WindowRecord {
-    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
-        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+    pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
+        encode(self, "window")
     }
 
-    /// The record that is exactly `bytes`; the rest of the metadata says whether it can be.
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        let record: Self = whole(bytes, "window record")?;
-        let begun = Self { window: record.window.begun(), ..record.clone() };
-        ensure(begun.encode()? == bytes, || "a window that begins with blocks".into())?; // to the bit
+    /// Parses a record that must take up all of `bytes`. Does not compare it with the rest of the metadata.
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        let record: Self = decode_exact(bytes, "window record")?;
+        let empty = Self { window: record.window.without_totals(), ..record.clone() };
+        // compare bytes, because totals of -0 must fail too
+        ensure(empty.encode()? == bytes, || "a window section with totals of blocks".into())?;
         Ok(record)
     }
 }
 
 impl WindowEnd {
-    /// Before the first block.
-    pub fn of_nothing(number: u32) -> Self {
+    /// The totals of no blocks.
+    pub fn empty(number: u32) -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         let (reached, share, squared_error, missing, coded, outliers) = (0.0, 0.0, 0.0, 0, 0, 0);
         Self { number, reached, share, squared_error, min, max, missing, coded, outliers }
     }
 
-    /// Of a window that is whole.
-    pub fn of(number: u32, window: &Window) -> Self {
+    /// The totals of a complete window.
+    pub fn from_window(number: u32, window: &Window) -> Self {
         let Window { reached, share, squared_error, min, max, missing, coded, outliers, .. } = *window;
         Self { number, reached, share, squared_error, min, max, missing, coded, outliers }
     }
 
-    /// Adds a block, but for its share, which it does not tell.
+    /// Adds a block's statistics. These do not include a share, so `share` stays as it is.
     pub fn add(&mut self, block: &EncodedBlock) {
         let BlockStats { reached, squared_error, min, max, .. } = block.stats;
         self.reached = self.reached.max(reached);
@@ -157,39 +158,41 @@ impl WindowEnd {
         }
     }
 
-    pub(crate) fn encode(&self) -> Check<Vec<u8>> {
-        bincode::encode_to_vec(self, CONFIG).map_err(|e| format!("window: {e}"))
+    pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
+        encode(self, "window")
     }
 
-    pub(crate) fn parse(bytes: &[u8]) -> Check<Self> {
-        whole(bytes, "record of a window's end")
+    pub(crate) fn parse(bytes: &[u8]) -> ParseResult<Self> {
+        decode_exact(bytes, "record of a window's end")
     }
 }
 
 impl Window {
-    /// As it is before its first block.
-    pub(crate) fn begun(&self) -> Self {
-        self.with(&WindowEnd::of_nothing(0))
+    /// The window with the totals of no blocks.
+    pub(crate) fn without_totals(&self) -> Self {
+        self.with_totals(&WindowEnd::empty(0))
     }
 
-    /// As it is with what its blocks add up to.
-    pub fn with(&self, end: &WindowEnd) -> Self {
+    /// The window with these totals.
+    pub fn with_totals(&self, end: &WindowEnd) -> Self {
         let WindowEnd { reached, share, squared_error, min, max, missing, coded, outliers, .. } = *end;
         Self { reached, share, squared_error, min, max, missing, coded, outliers, ..self.clone() }
     }
 
-    /// Level parts that a block can have.
+    /// Number of level parts that a block can have.
     pub fn parts(&self) -> usize {
         if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }
     }
 
-    /// Whether it is within the limits for boxes of `voxels` in a grid of `voxels_in_all`.
-    pub(crate) fn check(&self, voxels: u64, voxels_in_all: u64) -> Check {
+    /// Checks the window for boxes of at most `voxels` in a grid of `voxels_in_all`, channels included.
+    pub(crate) fn check(&self, voxels: u64, voxels_in_all: u64) -> ParseResult {
         let Self { frames, coefficients, .. } = *self;
-        ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames"))?;
-        ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || format!("{coefficients} coefficients"))?;
+        ensure((1..=MAX_WINDOW_FRAMES).contains(&frames), || format!("{frames} frames, at most {MAX_WINDOW_FRAMES}"))?;
+        ensure((1..=MAX_COEFFICIENTS).contains(&coefficients), || {
+            format!("{coefficients} coefficients, at most {MAX_COEFFICIENTS}")
+        })?;
         let samples = voxels.saturating_mul(frames.max(coefficients).into());
-        ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples}, at most {MAX_BLOCK_SAMPLES} samples"))?;
+        ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples} samples, at most {MAX_BLOCK_SAMPLES}"))?;
         self.check_coding()?;
         let counted = voxels_in_all.saturating_mul(frames.into());
         let coded = voxels_in_all.saturating_mul(coefficients.into());
@@ -197,12 +200,12 @@ impl Window {
         ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
         let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);
         let ranges = is_range(self.min, self.max) && is_range(self.range.0, self.range.1);
-        ensure(errors && ranges, || "an error or value range out of range".into())?;
-        ensure(finite_amount(self.coarseness), || format!("a coarseness of {}", self.coarseness))?;
-        ensure((0.0..=1.0).contains(&self.share), || format!("a share of {} of the bound", self.share))
+        ensure(errors && ranges, || "an error or value range is invalid".into())?;
+        ensure(finite_amount(self.coarseness), || format!("invalid coarseness {}", self.coarseness))?;
+        ensure((0.0..=1.0).contains(&self.share), || format!("share {} is not between 0 and 1", self.share))
     }
 
-    fn check_coding(&self) -> Check {
+    fn check_coding(&self) -> ParseResult {
         let Self { frames, coefficients, .. } = *self;
         let sum: u64 = self.levels.iter().map(|&k| u64::from(k)).sum();
         let levels = match self.pyramid {
@@ -215,6 +218,6 @@ impl Window {
         let (functions, frames) = (self.functions.len(), frames as usize);
         let learned = functions.is_multiple_of(frames) && functions / frames <= frames;
         let fits = if self.basis == Basis::Learned { learned } else { functions == 0 };
-        ensure(fits, || format!("functions of {functions} values for {frames} frames"))
+        ensure(fits, || format!("{functions} values of functions for {frames} frames"))
     }
 }

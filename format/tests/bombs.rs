@@ -1,4 +1,4 @@
-//! Small files that promise to be huge: each is refused, or read as what it is, in little memory.
+//! Small files that claim to be huge. Each is refused or read correctly, with little memory.
 
 use peak_alloc::PeakAlloc;
 use std::io;
@@ -14,20 +14,20 @@ use forge::{Change, Piece, Pieces, put, u32_at};
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
-/// Held by a test: memory is that of all of them.
+/// Held by each test while it runs, because the measured memory is that of the whole process.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Bytes that a file of a few KiB may take beyond what there was.
+/// Additional memory in bytes that a file of a few KiB may take.
 const MOST: usize = 64 << 20;
 
-/// A change of pieces, by name.
+/// A named change of pieces.
 type Bomb = (&'static str, Box<dyn Fn(Piece, usize, &mut Vec<u8>)>);
 
-/// Blocks' entries without places, and their payloads.
+/// Blocks' entries without offsets, and their payloads.
 type Content = Vec<(BlockId, BlockStats, Vec<(PartKind, Vec<u8>)>)>;
 
 fn metadata() -> Metadata {
-    let empty = WindowEnd::of_nothing(0);
+    let empty = WindowEnd::empty(0);
     let window = |first_frame| Window {
         first_frame,
         frames: 4,
@@ -68,7 +68,7 @@ fn metadata() -> Metadata {
     }
 }
 
-/// Level 0 and outliers, or every sample exactly.
+/// A block with level 0 and outliers, or with exact samples.
 fn block(id: BlockId, compressor: &mut Compressor) -> EncodedBlock {
     let (mut codes, mut outliers, mut exact) = (Vec::new(), Vec::new(), Vec::new());
     let level: Vec<i32> = (0..4096).map(|i| i % 7 - 3).collect();
@@ -93,9 +93,9 @@ fn file() -> Vec<u8> {
     let mut writer = Writer::new(Vec::new(), FileId([0xA5; 16]), &metadata).expect("memory");
     for (number, window) in (0..).zip(&metadata.windows) {
         let times = metadata.times[4 * number as usize..][..4].to_vec();
-        let begun = window.with(&WindowEnd::of_nothing(number));
+        let begun = window.with_totals(&WindowEnd::empty(number));
         writer.begin_window(WindowRecord { number, window: begun, times }).expect("next");
-        let mut end = WindowEnd::of_nothing(number);
+        let mut end = WindowEnd::empty(number);
         for block in 0..2 {
             let block = self::block(BlockId { window: number, block, channel: 0 }, &mut compressor);
             end.add(&block);
@@ -122,21 +122,21 @@ fn read(file: &[u8]) -> Result<Content> {
     wrong.map_or(Ok(content), Err)
 }
 
-/// Does everything with a file and looks at the memory that it took; whether it was refused.
+/// Does everything with a file and checks the memory that this took. Returns whether the file was refused.
 fn set_off(name: &str, file: &[u8], expected: &Content) -> bool {
     HEAP.reset_peak_usage();
     let baseline = HEAP.current_usage();
     let content = read(file);
     assert!(content.as_ref().map_or(true, |content| content == expected), "{name}: other content");
-    let _ = Unfinished::read(&file);
-    let salvage = Salvage::search(&file, &mut |_| {});
-    let _ = salvage.and_then(|salvage| salvage.write(&file, io::sink(), &mut || {}));
+    let _ = CompletePrefix::read(&file);
+    let recovery = Recovery::search(&file, &mut |_| {});
+    let _ = recovery.and_then(|recovery| recovery.write(&file, io::sink(), &mut || {}));
     let taken = HEAP.peak_usage() - baseline;
     assert!((1..MOST).contains(&taken), "{name}: {taken} bytes");
     content.is_err()
 }
 
-/// Changes the payload of the first part, as it is stored.
+/// Changes the stored payload of the first part.
 fn stored(name: &'static str, change: impl Fn(&mut Vec<u8>) + 'static) -> Bomb {
     let change = move |piece, number, bytes: &mut Vec<u8>| {
         if (piece, number) == (Piece::Stored, 0) {
@@ -146,7 +146,7 @@ fn stored(name: &'static str, change: impl Fn(&mut Vec<u8>) + 'static) -> Bomb {
     (name, Box::new(change))
 }
 
-/// Sets a field in the first pieces of some kinds.
+/// Sets a field in the first piece of each of these kinds.
 fn field<const N: usize>(name: &'static str, kinds: &'static [Piece], at: usize, value: [u8; N]) -> Bomb {
     let change = move |piece, number, bytes: &mut Vec<u8>| {
         if kinds.contains(&piece) && number == 0 {
@@ -166,7 +166,7 @@ fn content(name: &'static str, kind: Piece, len: usize) -> Bomb {
     (name, Box::new(change))
 }
 
-/// The payload in a zstd frame that lacks something.
+/// The payload in a zstd frame without checksum or content size.
 fn again(bytes: &mut Vec<u8>, checksum: bool, size: bool) {
     let raw = zstd::bulk::decompress(bytes, 1 << 20).expect("whole");
     let mut compressor = zstd::bulk::Compressor::new(3).expect("known");
@@ -183,7 +183,7 @@ const FOOTER: &[Piece] = &[Piece::Footer];
 const RECORDS: &[Piece] = &[Piece::Start, Piece::Metadata];
 const WINDOWS: &[Piece] = &[Piece::Window];
 
-/// Frames of zstd that are not what a part's must be.
+/// zstd frames that are not valid for parts.
 fn frames() -> Vec<Bomb> {
     vec![
         stored("empty", Vec::clear),
@@ -213,7 +213,7 @@ fn frames() -> Vec<Bomb> {
     ]
 }
 
-/// Payloads and directories that grow.
+/// Payloads and directories that decompress to many times their size.
 fn ratios() -> Vec<Bomb> {
     let all = 2 * 4 * 4096;
     let mut bombs = vec![
@@ -241,7 +241,7 @@ fn ratios() -> Vec<Bomb> {
     bombs
 }
 
-/// Fields that lie about lengths and counts.
+/// Fields with wrong lengths and counts.
 fn lies() -> Vec<Bomb> {
     vec![
         field("raw length 0", ENTRY, 64 + 8, [0; 4]),
@@ -280,7 +280,7 @@ fn lies() -> Vec<Bomb> {
 }
 
 #[test]
-fn bombs_are_refused_or_read_as_what_they_are_in_little_memory() {
+fn bombs_are_refused_or_read_correctly_in_little_memory() {
     let (_alone, file) = (ALONE.lock(), file());
     let (pieces, expected) = (Pieces::new(&file), read(&file).expect("whole"));
     assert!(!set_off("nothing", &file, &expected));
@@ -293,7 +293,7 @@ fn bombs_are_refused_or_read_as_what_they_are_in_little_memory() {
     }
 }
 
-/// Wherever a list, a string, a number or a float may be in a record.
+/// Tries every offset at which a record may hold a list, a string, a number or a float.
 #[test]
 fn records_with_extremes_anywhere_take_little_memory() {
     let (_alone, file) = (ALONE.lock(), file());
@@ -316,7 +316,7 @@ fn records_with_extremes_anywhere_take_little_memory() {
     assert!(tries > 5000, "{tries}");
 }
 
-/// As [`set_off`], where other content is no wonder.
+/// Like [`set_off`], for changes that may read as other content.
 fn set_off_all(file: &[u8], expected: &Content) {
     let content = read(file).unwrap_or_default();
     set_off("a record", file, if content.is_empty() { expected } else { &content });

@@ -1,13 +1,33 @@
-//! One error type for the library. Each kind stands for what the caller can do about it; see [`Error::exit_code`].
+//! One error type for the library. Each kind stands for what the caller can do about it.
+
+pub use super::remedy::{Note, Remedy};
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why an operation ended early.
+///
+/// The kind says who can help: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever made the
+/// data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or nobody ([`Error::BoundMissed`]). Messages name
+/// fields, files and values. [`Error::remedy`] says what helps, where that is known.
+///
+/// ```
+/// use wavesplat::base::error::{Error, Remedy};
+/// use wavesplat::source::{OpenOptions, open};
+///
+/// let dims = Some(vec![4, 4]);
+/// match open(&["run.raw".into()], &OpenOptions { dims, ..OpenOptions::default() }) {
+///     Err(Error::Setting { setting, problem, .. }) => println!("the field {setting} {problem}"),
+///     Err(Error::Io { path, source, .. }) => println!("{} cannot be read: {source}", path.display()),
+///     Err(error) if error.remedy() == Some(Remedy::AllowGaps) => println!("frames are missing: {error}"),
+///     Err(error) => println!("{error}"),
+///     Ok(source) => println!("{:?} voxels", source.archive().grid.dims),
+/// }
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Reading or writing failed: try again, or make space.
+    /// Reading or writing failed. Try again, or make space.
     #[error("{}: {doing}: {source}", path.display())]
     Io {
         /// The file, or `-` for a standard stream.
@@ -17,18 +37,41 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
-    /// The request makes no sense or cannot be met as asked: ask differently.
+    /// A field of a configuration, or an argument, makes no sense or cannot be met. Give it another value.
+    #[error("{setting}: {problem}")]
+    Setting {
+        /// Name of the field, as `memory` or `splat_error`.
+        setting: &'static str,
+        /// What is wrong with its value.
+        problem: String,
+        /// What helps besides another value.
+        remedy: Option<Remedy>,
+    },
+    /// A path cannot be taken as an input or an output. Name another.
+    #[error("{}: {problem}", path.display())]
+    Path {
+        /// The path, a pattern of paths, or `-` for a standard stream.
+        path: PathBuf,
+        /// Why it cannot be taken.
+        problem: String,
+        /// What helps besides another path.
+        remedy: Option<Remedy>,
+    },
+    /// The arguments of a program make no sense. The library itself never returns this.
     #[error("{0}")]
     Usage(String),
-    /// An input is damaged, contradicts its description, or has a feature that is not supported.
+    /// An input is damaged, contradicts its description, or has a feature that is not supported. Repair it, or describe it
+    /// otherwise.
     #[error("{}: {what}", path.display())]
     Input {
         /// The file, or `-` for a standard stream.
         path: PathBuf,
         /// The place and the reason.
         what: String,
+        /// What helps.
+        remedy: Option<Remedy>,
     },
-    /// A coefficient file is damaged or from a newer version.
+    /// A coefficient file is damaged or from a newer version. Recover it ([`Error::remedy`]), or use that version.
     #[error("{}: {source}", path.display())]
     CoefficientFile {
         /// The file.
@@ -36,15 +79,17 @@ pub enum Error {
         /// The place and the reason.
         source: wavesplat_format::Error,
     },
-    /// An input changed while it was being read.
+    /// An input changed while it was being read, or since it was read before. Wait until nobody writes it.
     #[error("{}: {what}", path.display())]
     Changed {
         /// The file.
         path: PathBuf,
         /// What was noticed.
         what: String,
+        /// What helps.
+        remedy: Option<Remedy>,
     },
-    /// `verify` found samples outside the promised bound, or further off than the file states.
+    /// `verify` found samples outside the promised bound, or further off than the file states. The file is of no use.
     #[error("{}: {what}", path.display())]
     BoundMissed {
         /// The coefficient file.
@@ -68,29 +113,51 @@ impl Error {
         Self::Io { path: path.as_ref().into(), doing: doing.into(), source }
     }
 
-    /// An error about an input's content.
-    pub fn input(path: impl AsRef<Path>, what: impl Into<String>) -> Self {
-        Self::Input { path: path.as_ref().into(), what: what.into() }
+    /// An error about a field of a configuration, by its name.
+    pub fn setting(setting: &'static str, problem: impl Into<Note>) -> Self {
+        let Note { text: problem, remedy } = problem.into();
+        Self::Setting { setting, problem, remedy }
     }
 
-    /// An error about what was asked.
+    /// An error about a path that cannot be taken.
+    pub fn path(path: impl AsRef<Path>, problem: impl Into<Note>) -> Self {
+        let Note { text: problem, remedy } = problem.into();
+        Self::Path { path: path.as_ref().into(), problem, remedy }
+    }
+
+    /// An error about the arguments of a program.
     pub fn usage(what: impl Into<String>) -> Self {
         Self::Usage(what.into())
     }
 
-    /// What a user may do about a damaged file.
-    pub fn advice(&self) -> Option<&'static str> {
-        let Self::CoefficientFile { path, source } = self else { return None };
-        let unfinished = path.extension().is_some_and(|ending| ending == "part");
-        match source {
-            wavesplat_format::Error::Corrupt { .. } if unfinished => Some(
-                "an unfinished conversion: --resume of what made it goes on, wavesplat recover saves what it holds",
-            ),
-            wavesplat_format::Error::Corrupt { .. } | wavesplat_format::Error::Lost(_) => Some(
-                "wavesplat recover saves what is whole; --skip-damaged gives the rest where only blocks are damaged",
-            ),
-            _ => None,
+    /// An error about an input's content.
+    pub fn input(path: impl AsRef<Path>, what: impl Into<Note>) -> Self {
+        let Note { text: what, remedy } = what.into();
+        Self::Input { path: path.as_ref().into(), what, remedy }
+    }
+
+    /// An error about an input that is not what it was.
+    pub fn changed(path: impl AsRef<Path>, what: impl Into<Note>) -> Self {
+        let Note { text: what, remedy } = what.into();
+        Self::Changed { path: path.as_ref().into(), what, remedy }
+    }
+
+    /// What helps, where that is known.
+    pub fn remedy(&self) -> Option<Remedy> {
+        match self {
+            Self::Setting { remedy, .. }
+            | Self::Path { remedy, .. }
+            | Self::Input { remedy, .. }
+            | Self::Changed { remedy, .. } => remedy.clone(),
+            Self::CoefficientFile { path, source } => of_damage(path, source),
+            Self::Io { .. } | Self::Usage(_) | Self::BoundMissed { .. } => None,
         }
+    }
+
+    /// Whether the request is wrong, and neither the data nor the machine: [`Error::Setting`], [`Error::Path`] and
+    /// [`Error::Usage`].
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Setting { .. } | Self::Path { .. } | Self::Usage(_))
     }
 
     /// The programs' exit code: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or input changed.
@@ -101,7 +168,7 @@ impl Error {
         }
         match self {
             Self::Io { .. } => 1,
-            Self::Usage(_) => 2,
+            Self::Setting { .. } | Self::Path { .. } | Self::Usage(_) => 2,
             Self::Input { .. } | Self::CoefficientFile { .. } => 3,
             Self::Changed { .. } | Self::BoundMissed { .. } => 4,
         }
@@ -120,5 +187,15 @@ impl Error {
             }
             _ => None,
         }
+    }
+}
+
+/// What helps against damage of a coefficient file.
+fn of_damage(path: &Path, damage: &wavesplat_format::Error) -> Option<Remedy> {
+    let unfinished = path.extension().is_some_and(|ending| ending == "part");
+    match damage {
+        wavesplat_format::Error::Corrupt { .. } if unfinished => Some(Remedy::ResumeOrRecover),
+        wavesplat_format::Error::Corrupt { .. } | wavesplat_format::Error::Lost(_) => Some(Remedy::RecoverOrSkip),
+        _ => None,
     }
 }

@@ -58,7 +58,7 @@ impl State {
             now if now.modified != self.modified => "it has a new modification time".into(),
             _ => "it is another file".into(),
         };
-        Err(Error::Changed { path: path.into(), what: format!("changed while it was being read: {what}") })
+        Err(Error::changed(path, format!("changed while it was being read: {what}")))
     }
 
     /// An error if what has this name is no longer in this state.

@@ -4,6 +4,7 @@
 //! Nothing here knows frames, coefficients or pictures. The modules are listed from the lowest to the highest; each uses
 //! only those above it.
 
+mod remedy;
 pub mod error;
 pub mod progress;
 pub(crate) mod memory;

@@ -1,39 +1,169 @@
-//! The header of an `.npy` file or stream, written without a seek; the payload follows as raw little-endian bytes.
+//! The header of an `.npy` file or stream: written without a seek, and read from its text. The payload follows as raw bytes.
+
+mod literal;
 
 use crate::base::sample::SampleType;
-use npyz::{DType, TypeStr, WriteOptions, WriterBuilder};
+use literal::{Literal, Value};
 use std::io::{self, Write};
+
+/// How every `.npy` starts; two bytes of its version follow.
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// Headers are filled up with blanks to a multiple of so many bytes.
+const ALIGNMENT: usize = 64;
+
+/// Bytes of a written header before its text.
+const BEFORE_TEXT: usize = 10;
 
 /// Writes the header of a C-order array, last axis fastest. The shape must be final: there is one header for all frames.
 pub fn write_header(ty: SampleType, shape: &[usize], out: &mut impl Write) -> io::Result<()> {
-    let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
-    WriteOptions::new_header_only().dtype(dtype(ty)?).shape(&shape).writer(out).write_header_only().map(|_| ())
+    let order = if ty.size() == 1 { '|' } else { '<' };
+    let lengths: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let text = format!("{{'descr': '{order}{}', 'fortran_order': False, 'shape': ({lengths}), }}", numpy_name(ty));
+    let len = (BEFORE_TEXT + text.len() + 1).next_multiple_of(ALIGNMENT) - BEFORE_TEXT;
+    let stored = u16::try_from(len).map_err(io::Error::other)?;
+    out.write_all(MAGIC)?;
+    out.write_all(&[1, 0])?;
+    out.write_all(&stored.to_le_bytes())?;
+    writeln!(out, "{text:<0$}", len - 1)
 }
 
-/// NumPy's name of a type, as `<f4`.
-fn dtype(ty: SampleType) -> io::Result<DType> {
-    let order = if ty.size() == 1 { '|' } else { '<' };
-    let name = format!("{order}{}{}", &ty.name()[..1], ty.size());
-    name.parse::<TypeStr>().map(DType::Plain).map_err(|e| io::Error::other(e.to_string()))
+/// What the text of a header says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Header {
+    /// Sample type and whether its most significant byte is first; or the text of a type that is not supported.
+    pub(crate) samples: Result<(SampleType, bool), String>,
+    /// Whether the first axis is the fastest.
+    pub(crate) is_fortran: bool,
+    /// Lengths of the axes.
+    pub(crate) shape: Vec<u64>,
+}
+
+impl Header {
+    /// Reads the text of a header: a dictionary of Python.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words that follow "its npy header".
+    pub(crate) fn parse(text: &[u8]) -> Result<Self, String> {
+        let text = std::str::from_utf8(text).map_err(|_| "is damaged: it is not text")?;
+        let Value::Dictionary(entries) = literal::parse(text)?.value else {
+            return Err("is damaged: it is not a dictionary".into());
+        };
+        let entry = |name| {
+            let found = entries.iter().find(|(key, _)| key.value == Value::Text(name));
+            found.map(|(_, literal)| literal).ok_or_else(|| format!("is damaged: '{name}' is missing"))
+        };
+        let Value::Truth(is_fortran) = entry("fortran_order")?.value else {
+            return Err("is damaged: 'fortran_order' is neither True nor False".into());
+        };
+        Ok(Self { samples: samples(entry("descr")?)?, is_fortran, shape: shape(entry("shape")?)? })
+    }
+}
+
+/// A sample type and whether its most significant byte is first, by NumPy's name: `'<f4'`.
+fn samples(descr: &Literal<'_>) -> Result<Result<(SampleType, bool), String>, String> {
+    match &descr.value {
+        Value::Text(name) => Ok(sample_type(name).ok_or_else(|| descr.source.into())),
+        Value::Sequence(_) => Ok(Err(descr.source.into())),
+        _ => Err("is damaged: 'descr' is no type".into()),
+    }
+}
+
+fn sample_type(name: &str) -> Option<(SampleType, bool)> {
+    let (order, name) = name.split_at_checked(1)?;
+    let ty = SampleType::ALL.into_iter().find(|ty| numpy_name(*ty) == name)?;
+    let is_known = matches!(order, "<" | ">") || order == "|" && ty.size() == 1;
+    is_known.then_some((ty, order == ">"))
+}
+
+fn shape(literal: &Literal<'_>) -> Result<Vec<u64>, String> {
+    let length = |literal: &Literal<'_>| match literal.value {
+        Value::Number(n) => Ok(n),
+        _ => Err(format!("is damaged: {} is no length of an axis", literal.source)),
+    };
+    let Value::Sequence(lengths) = &literal.value else {
+        return Err("is damaged: 'shape' is no tuple".into());
+    };
+    let lengths: Vec<u64> = lengths.iter().map(length).collect::<Result<_, _>>()?;
+    let samples = lengths.iter().try_fold(1_u64, |all, n| all.checked_mul((*n).max(1)));
+    samples.map(|_| lengths).ok_or_else(|| format!("has numbers that are too large: {}", literal.source))
+}
+
+/// NumPy's name of a type without the order of its bytes: `f4`.
+fn numpy_name(ty: SampleType) -> String {
+    format!("{}{}", &ty.name()[..1], ty.size())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn every_type_has_a_numpy_name() {
-        let names = SampleType::ALL.map(|ty| dtype(ty).expect("a type").descr());
-        assert_eq!(names, ["'|u1'", "'|i1'", "'<u2'", "'<i2'", "'<u4'", "'<i4'", "'<f2'", "'<f4'", "'<f8'"]);
+    fn text(descr: &str, fortran: &str, shape: &str) -> String {
+        format!("{{'descr': {descr}, 'fortran_order': {fortran}, 'shape': {shape}, }}\n")
+    }
+
+    fn parse(descr: &str, fortran: &str, shape: &str) -> Result<Header, String> {
+        Header::parse(text(descr, fortran, shape).as_bytes())
     }
 
     #[test]
-    fn a_header_reads_back() {
-        for ty in SampleType::ALL {
+    fn headers_are_those_that_numpy_takes() {
+        let mut bytes = Vec::new();
+        write_header(SampleType::F32, &[2, 3, 4], &mut bytes).expect("written");
+        let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4, ), }";
+        let expected = [&b"\x93NUMPY\x01\x00\x76\x00"[..], text.as_bytes(), &[b' '; 53], b"\n"].concat();
+        assert_eq!(bytes, expected);
+        for axes in 0..30 {
             let mut bytes = Vec::new();
-            write_header(ty, &[2, 3, 4], &mut bytes).expect("written");
-            let file = npyz::NpyFile::new(bytes.as_slice()).expect("read");
-            assert_eq!((file.shape(), file.dtype().num_bytes()), (&[2, 3, 4][..], Some(ty.size())), "{ty}");
+            write_header(SampleType::U8, &vec![10; axes], &mut bytes).expect("written");
+            assert_eq!(bytes.len() % ALIGNMENT, 0, "{axes} axes");
+            assert_eq!(usize::from(bytes[8]) + 256 * usize::from(bytes[9]), bytes.len() - BEFORE_TEXT);
         }
+        assert!(write_header(SampleType::U8, &[1; 30_000], &mut Vec::new()).is_err());
+    }
+
+    #[test]
+    fn a_written_header_reads_back() {
+        for ty in SampleType::ALL {
+            for shape in [&[][..], &[5], &[2, 3, 4]] {
+                let mut bytes = Vec::new();
+                write_header(ty, shape, &mut bytes).expect("written");
+                let shape = shape.iter().map(|n| *n as u64).collect();
+                let expected = Header { samples: Ok((ty, false)), is_fortran: false, shape };
+                assert_eq!(Header::parse(&bytes[BEFORE_TEXT..]), Ok(expected), "{ty}");
+            }
+        }
+    }
+
+    #[test]
+    fn entries_may_be_in_any_order_with_either_quotes() {
+        let text = "{\"shape\":(7,5,),'more':[],\"descr\":\">i2\",'fortran_order':True}";
+        let expected = Header { samples: Ok((SampleType::I16, true)), is_fortran: true, shape: vec![7, 5] };
+        assert_eq!(Header::parse(text.as_bytes()), Ok(expected));
+    }
+
+    #[test]
+    fn types_that_are_not_supported_are_kept_as_text() {
+        for descr in ["'<i8'", "'|b1'", "'<c8'", "'|O'", "'<U3'", "'|f4'", "'=f4'", "''", "'é'", "[('a', '<f4')]"] {
+            assert_eq!(parse(descr, "False", "(1,)").expect("a header").samples, Err(descr.to_string()));
+        }
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let refused = |found: Result<Header, String>, words: &str| {
+            let error = found.expect_err(words);
+            assert!(error.contains(words), "{error}");
+        };
+        refused(parse("1", "False", "(1,)"), "'descr' is no type");
+        refused(parse("'<f4'", "0", "(1,)"), "'fortran_order' is neither");
+        refused(parse("'<f4'", "False", "7"), "'shape' is no tuple");
+        refused(parse("'<f4'", "False", "('7',)"), "'7' is no length");
+        refused(parse("'<f4'", "False", "(4294967296, 4294967296)"), "too large");
+        refused(Header::parse(b"()"), "not a dictionary");
+        refused(Header::parse(b"{}"), "'fortran_order' is missing");
+        refused(Header::parse(b"{'fortran_order': True}"), "'descr' is missing");
+        refused(Header::parse(b"\xff"), "not text");
+        refused(Header::parse(b""), "expected a value");
     }
 }

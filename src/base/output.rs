@@ -4,7 +4,7 @@ mod names;
 
 pub use names::{Numbered, names_of_views};
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, Permissions, TryLockError};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
@@ -94,7 +94,7 @@ impl Output {
         let path = real.as_deref().unwrap_or(path);
         let target = if path == Path::new(STANDARD) {
             if io::stdout().is_terminal() {
-                return Err(Error::usage("-o -: binary data is not written to a terminal; redirect or pipe it"));
+                return Err(Error::path(STANDARD, "binary data is not written to a terminal; redirect or pipe it"));
             }
             Target::Stdout(BufWriter::with_capacity(Self::BUFFER, io::stdout()))
         } else if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
@@ -145,7 +145,7 @@ impl Output {
     /// An error if a file cannot be made at `path`, as far as can be told without making it.
     pub fn check(path: &Path, force: bool) -> Result<()> {
         if path.is_dir() {
-            return Err(Error::usage(format!("{}: is a folder; name a file", path.display())));
+            return Err(Error::path(path, "is a folder; name a file"));
         }
         if path.exists() && !force {
             return Err(exists(path));
@@ -216,7 +216,7 @@ impl Part {
                 }
                 Err(TryLockError::WouldBlock) => {
                     let who = holder(&file).unwrap_or("another program".into());
-                    return Err(Error::usage(format!("{}: {who} is writing it", path.display())));
+                    return Err(Error::path(path, format!("{who} is writing it")));
                 }
                 Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
                 Err(TryLockError::Error(e)) => return Err(failed(e)),
@@ -302,7 +302,7 @@ pub fn part_of(path: &Path) -> PathBuf {
 }
 
 fn exists(path: &Path) -> Error {
-    Error::usage(format!("{}: exists already; --force replaces it", path.display()))
+    Error::path(path, Note::with("exists already", Remedy::Replace))
 }
 
 /// Which process has locked a file, where the system tells.

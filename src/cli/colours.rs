@@ -4,8 +4,7 @@ use super::{CommonArgs, Pair};
 use crate::base::error::{Error, Result};
 use crate::base::output::STANDARD;
 use crate::colour::TransferFunction;
-use crate::source::FrameSource;
-use crate::source::scan::value_range;
+use crate::source::{FrameSource, value_range};
 use std::path::{Path, PathBuf};
 
 /// The transfer function of a name, stretched over `range` if one is given. A map that is of no values of its own is stretched
@@ -35,7 +34,7 @@ pub fn transfer_function(
 /// The colours of a name that an option has.
 pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
-        Error::Usage(what) => Error::usage(format!("{option} {what}")),
+        Error::Path { path, problem, .. } => Error::usage(format!("{option} {}: {problem}", path.display())),
         other => other,
     })
 }

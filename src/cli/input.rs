@@ -1,6 +1,8 @@
 //! Options that say how an archive is read.
 
-use super::{CommonArgs, Dims, FrameRange, RegionSpec, Triple};
+#[cfg(feature = "cli")]
+use super::{CommonArgs, note_text};
+use super::{Dims, FrameRange, RegionSpec, Triple};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::Access;
 use crate::base::output::part_of;
@@ -81,15 +83,8 @@ impl InputArgs {
         Access::unless(self.no_mmap)
     }
 
-    /// Opens an archive, with notes on how it is read.
-    pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
-        let source = self.open_quietly(inputs, common)?;
-        source.archive().notes.iter().for_each(|n| common.note(n));
-        Ok(source)
-    }
-
-    /// Opens an archive without a word.
-    pub fn open_quietly(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
+    /// Opens an archive without a word; `memory` bytes may hold what must be decoded or is piped.
+    pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
         let options = OpenOptions {
             access: self.access(),
             dims: self.dims.as_ref().map(|d| d.0.clone()),
@@ -101,13 +96,21 @@ impl InputArgs {
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
             allow_gaps: self.allow_gaps,
-            memory: common.stream_memory(),
+            memory,
         };
         source::open(inputs, &options)
     }
 }
 
+#[cfg(feature = "cli")]
 impl InputArgs {
+    /// Opens an archive, with notes on how it is read.
+    pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
+        let source = self.open_quietly(inputs, common.stream_memory())?;
+        source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
+        Ok(source)
+    }
+
     /// Opens the archive that a file is of, or goes on with: of its variable, and narrowed to its region and to some frames.
     pub fn open_again(
         &self,

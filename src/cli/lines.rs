@@ -1,6 +1,6 @@
 //! Progress as lines of JSON.
 
-use super::note;
+use super::common::note;
 use serde::Serialize;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

@@ -1,7 +1,9 @@
 //! A program from its arguments to its exit code.
 
+use super::advice;
+use super::common::note;
 use super::config::Config;
-use super::{advice, note};
+use super::messages;
 use crate::base::error::{Error, Result};
 use crate::base::mapped;
 use crate::base::output::abandon;
@@ -19,7 +21,7 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     let args: Vec<OsString> = env::args_os().collect();
     let config = match Config::read(&command::<A>(), &args) {
         Ok(config) => config,
-        Err(e) => return failed(&e),
+        Err(e) => return failed::<A>(&e),
     };
     let args = match parse::<A>(&args, &config) {
         Ok(args) => args,
@@ -33,8 +35,8 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
         Err(e) => {
-            let code = failed(&e);
-            config.words().filter(|_| matches!(e, Error::Usage(_))).into_iter().for_each(note);
+            let code = failed::<A>(&e);
+            config.words().filter(|_| e.is_usage()).into_iter().for_each(note);
             code
         }
     }
@@ -56,9 +58,8 @@ fn end(signal: i32) {
     process::exit(128 + signal)
 }
 
-fn failed(error: &Error) -> ExitCode {
-    note(format_args!("error: {error}"));
-    error.advice().into_iter().for_each(note);
+fn failed<A: Parser>(error: &Error) -> ExitCode {
+    note(messages::of_error(error, &command::<A>()));
     ExitCode::from(error.exit_code())
 }
 

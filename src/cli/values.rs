@@ -3,7 +3,6 @@
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
 use std::fmt;
-use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 /// A number of bytes, as `512MiB`.
@@ -28,14 +27,6 @@ impl FromStr for Size {
 /// It is no number.
 pub fn share(text: &str) -> std::result::Result<f64, String> {
     text.parse().map_err(|_| "takes a share, 0 to 1; 2 % is 0.02".into())
-}
-
-/// A number of threads.
-///
-/// # Errors
-/// It is no whole number above 0.
-pub(super) fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
-    text.parse().map_err(|_| "takes a whole number, at least 1; without --threads each core has one".into())
 }
 
 /// `NXxNYxNZ` or `NXxNYxNZxNT`, x fastest.

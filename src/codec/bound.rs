@@ -1,15 +1,42 @@
-//! What is promised about errors (method.md section 5), and exact arithmetic to decide it.
+//! Error bounds: what a file promises, and exact arithmetic to decide whether a block keeps it.
 //!
-//! A promise rests on one comparison, `!(error <= allowed)`, whose two sides are rounded against us: the error up, what
-//! is allowed down. No slack is added anywhere. The *share* of a sample is its error in units of what it is allowed; that
-//! of a series is the largest, or the root mean square, of its samples' shares. A bound holds where shares are at most 1.
+//! A file promises one of these for all its samples v, decoded to v^:
+//!
+//! ```text
+//! pointwise    |v^ - v| <= delta = tolerance * (largest sample - least sample)                            (eq 21)
+//! relative     |v^ - v| <= tolerance * max(|v|, floor)                                                    (eq 22)
+//! rms          sqrt(mean over the frames of a window of (v^ - v)^2) <= delta                              (eq 23)
+//! ```
+//!
+//! The weights w_i of the voxels at a pixel are positive (eq 3). So eq 21 bounds every pixel of every view, by the
+//! triangle inequality:
+//!
+//! ```text
+//! |I^ - I| <= sum of w_i |v^_i - v_i| <= delta sum of w_i        |g^ - g| <= delta                        (eq 24)
+//! ```
+//!
+//! Under eq 22, with samples of at least the floor, the relative error of a pixel is at most the tolerance: this bounds
+//! what [Dobashi](crate::bibliography) calls E_rel (eq 10). Eq 23 bounds the mean over a window alone: one frame may be
+//! off by sqrt(T) delta. `sampled` is eq 23 with a delta from random pixels: an estimate ([`crate::convert::sampled`]).
+//!
+//! Rounding every coefficient by at most step / 2 moves a sample by at most gain step / 2, hence
+//!
+//! ```text
+//! step = 2 delta / gain        gain = max over t of the sum over k of |u_k(t)|                            (eq 25)
+//! ```
+//!
+//! A bound is decided by one comparison, `!(error <= allowed)`. The error is rounded up and the allowed value is
+//! rounded down, so rounding never makes a promise look kept. No slack is added anywhere. The *share* of a sample is
+//! its error divided by what it is allowed. The share of a series is the largest, or the root mean square, of its
+//! samples' shares. A bound holds where shares are at most 1.
 
 pub use wavesplat_format::Bound;
 
 use crate::base::sample::SampleType;
 use half::f16;
 
-/// x - y and what rounding took from it: the exact difference is their sum. Not numbers if x - y overflows.
+/// x - y and what rounding took from it: the exact difference is their sum ([Knuth](crate::bibliography)). Not numbers if
+/// x - y overflows.
 fn difference(x: f64, y: f64) -> (f64, f64) {
     let d = x - y;
     let y_used = x - d;
@@ -50,12 +77,12 @@ fn product_down(a: f64, b: f64) -> f64 {
 /// What rounding took from a product below this may itself underflow.
 const UNDERFLOW: f64 = 1e-280;
 
-/// `tolerance` times the length of a range, rounded down: the delta of [`Bound::Pointwise`] and [`Bound::Rms`].
+/// `tolerance` times the length of a range, rounded down: the delta of [`Bound::Pointwise`] and [`Bound::Rms`] (eq 21).
 pub fn range_bound(tolerance: f64, range: (f64, f64)) -> f64 {
     if range.0 <= range.1 { product_down(tolerance, length_down(range)) } else { 0.0 } // all missing so far
 }
 
-/// `tolerance` times |`value`|, or times `floor` if that is more, rounded down: what [`Bound::Relative`] allows.
+/// `tolerance` times |`value`|, or times `floor` if that is more, rounded down: what [`Bound::Relative`] allows (eq 22).
 pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
     product_down(tolerance, value.abs().max(floor))
 }
@@ -97,7 +124,7 @@ impl ErrorBound {
         }
     }
 
-    /// Whether the errors of one series keep the promise: for each frame the error, rounded up, and what is allowed.
+    /// Whether the errors of one series keep the promise (eq 21-23): for each frame the error, rounded up, and what is allowed.
     pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
         match self.measure() {
             Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
@@ -162,10 +189,9 @@ impl ErrorBound {
         }
     }
 
-    /// The quantisation step of orthonormal-like coefficients for which rounding alone keeps the promise of samples that
-    /// are allowed `error`.
+    /// The largest quantisation step with which rounding alone keeps the promise (eq 25), for samples that are allowed `error`.
     ///
-    /// `gain` is the largest sum of |u_k(t)| over k: with step/2 in every coefficient a sample moves by gain * step / 2.
+    /// `gain` is the largest sum of |u_k(t)| over k ([`crate::wavelet::gain`]). Where means are bounded, it does not matter.
     pub fn step(&self, error: f64, gain: f64) -> f64 {
         match self.measure() {
             Measure::Largest => 2.0 * error / gain,

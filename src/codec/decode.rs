@@ -1,4 +1,8 @@
 //! A coded block back to samples: the one decoder of the project.
+//!
+//! Codes times the step are coefficients, refined by the pyramid if there is one (eq 32). The inverse transform of each
+//! voxel's coefficients gives its frames (eq 7). Outliers and missing samples, stored exactly, then replace their
+//! samples.
 
 use super::WindowCodec;
 use super::buffer::Buffer;

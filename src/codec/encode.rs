@@ -1,4 +1,15 @@
 //! Samples of one block to a coded block that keeps its promise.
+//!
+//! 1. Transform along time (eq 5).
+//! 2. Without a pyramid, quantise and drop the smallest coefficients of each series (eq 7); with one, code the field
+//!    pass by pass (eq 32).
+//! 3. Decode again with the arithmetic of [`super::decode`], and compare with the source in the measure of the bound
+//!    (eq 21-23).
+//! 4. Store the samples that miss the bound exactly. If they are too many, or if that is smaller, store all samples
+//!    exactly.
+//!
+//! So a promise holds for any finite input, whatever the basis, and rounding and quantisation count against it. Missing
+//! samples are stored as a lossless mask with their own bytes.
 
 use super::buffer::clear;
 use super::check::Tally;

@@ -1,4 +1,4 @@
-//! How far leaving out level parts can move a sample.
+//! How far leaving out level parts can move a sample: the gain of eq 25, restricted to the parts that are left out.
 
 use super::WindowCodec;
 use super::scheme::{Axis, Pyramid};

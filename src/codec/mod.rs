@@ -38,7 +38,7 @@ pub struct WindowCodec {
     pub basis: Box<dyn TimeBasis>,
     /// The basis as numbers: `synthesis[k][t]` is u_k(t).
     pub synthesis: Vec<Vec<f64>>,
-    /// The largest sum over k of |u_k(t)|.
+    /// The largest sum over k of |u_k(t)| (eq 25).
     pub gain: f64,
     /// The type of the samples.
     pub sample: SampleType,

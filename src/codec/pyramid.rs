@@ -1,8 +1,22 @@
-//! The pyramid of a block: nodes predicted from coarser ones, and codes for what is missing (spacetime.md).
+//! The pyramid of a block: nodes predicted from coarser ones, and codes for what is missing.
 //!
-//! v = U v' + r: even nodes keep their value, odd nodes are predicted along one axis, and a code times the step of its
-//! level is added. The encoder predicts from what the decoder has, so that no error adds up: every node is within half a
-//! step of its own level.
+//! Interpolation on nested lattices with a quantised correction in a closed loop is the principle of
+//! [SZ3](crate::bibliography) and [Zhao](crate::bibliography). Pass j refines one axis by two. Even nodes keep their
+//! value. U_j predicts odd nodes along that axis, and a code q times the step of its level l is added:
+//!
+//! ```text
+//! v^_j = U_j v^_{j+1} + step_l q_j                                                                        (eq 32)
+//! linear (1, 1)/2        cubic (-1, 9, 9, -1)/16        near a face (3, 6, -1)/8                          (eq 33)
+//! step_l = step / min(growth^l, most)        |v^ - v| <= step_l / 2                                       (eq 34)
+//! ```
+//!
+//! The encoder predicts from what the decoder has. So errors do not add up from pass to pass: a node is off by the
+//! rounding of its own code, which is at most half a step of its level. Where nodes are samples, gain is 1 and step = 2
+//! delta (eq 25). Where nodes are coefficients of a transform along time, each k has a pyramid in space of its own, and
+//! eq 25 gives the step.
+//!
+//! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So the
+//! coefficients of one k can be decoded, and splatted, without the others.
 
 use super::real::Real;
 use super::rows::{self, Change};
@@ -154,11 +168,13 @@ struct Refined<'a> {
     pass: &'a Pass,
 }
 
+/// Eq 32 for all nodes of a pass.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_pass<R: Real>(refined: &Refined<'_>, step: R, codes: &[i32], field: &mut [R]) {
     refined.for_each_row(field, |first, nodes, predicted| rows::decode(nodes, predicted, &codes[first..], step));
 }
 
+/// The codes of a pass, and in place of its nodes what eq 32 makes of them.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &mut [i32], field: &mut [R]) -> bool {
     let mut fits = true;
@@ -335,9 +351,10 @@ impl Taps {
     }
 }
 
-/// What predicts odd node `i`, between the even nodes i and i + 1 of `evens`; all sums go from the first tap to the last.
+/// The stencil for odd node `i`, between the even nodes i and i + 1 of `evens` (eq 33). Sums go from the first tap to the last.
 ///
-/// Cubic polynomials through four nodes, quadratic ones through three next to a face, and straight lines beyond the last.
+/// The polynomial through the nearest nodes: cubic through four, quadratic through three next to a face, and a straight line
+/// (-1, 3)/2 beyond the last even node.
 fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {

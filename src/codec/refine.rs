@@ -1,4 +1,7 @@
-//! The samples of a block coded by a pyramid: to a field of coefficients, through the passes, and compared.
+//! Coding a block by a pyramid: samples to a field of coefficients (eq 5), through the passes (eq 32), and compared.
+//!
+//! The step is that of eq 25 times the scheme's coarseness, less what 32-bit floats round. With a coarseness above 1
+//! rounding alone does not keep the promise, and samples that miss it are stored exactly.
 
 use super::buffer::clear;
 use super::check::{Compared, Tally};

@@ -17,7 +17,7 @@ pub struct Scheme {
 }
 
 impl Scheme {
-    /// The paper's: a transform along time alone.
+    /// A transform along time alone, as [Dobashi](crate::bibliography) has it.
     pub fn along_time(basis: Basis) -> Self {
         Self { basis, functions: Vec::new(), pyramid: None, coarseness: 1.0 }
     }

@@ -1,4 +1,20 @@
-//! Which coefficients to keep (method.md section 4): the smallest are dropped for as long as the promise holds.
+//! Which coefficients a series keeps: the smallest are dropped for as long as the bound holds.
+//!
+//! [Dobashi](crate::bibliography) orders the coefficients of a series by size and keeps the largest n of them:
+//!
+//! ```text
+//! squared error = sum over the dropped k of c_{i,k}^2                                                     (eq 6)
+//! v^_i(t_j) = sum over the kept k of c_{i,k} u_k(t_j)                                                     (eq 7)
+//! ```
+//!
+//! Two misprints of the paper are corrected here. Its eq 6 sums the kept coefficients; the error is the sum over the
+//! dropped ones. Its loop drops coefficients until the error reaches the tolerance, and keeps the set whose error
+//! already does: one coefficient too few. The rule here: keep the fewest of the largest coefficients whose
+//! reconstruction is within the bound. A series that is within the bound of zero keeps none.
+//!
+//! Eq 6 needs an orthonormal basis, a bound of the mean, and coefficients that are not rounded. None of this is
+//! assumed. Coefficients are quantised first, every set is decoded, and the error is measured on samples. The number of
+//! dropped coefficients is found by bisection.
 
 use super::WindowCodec;
 use super::real::Real;
@@ -53,7 +69,7 @@ impl Group {
         kept(&self.codes[k], &self.rank[k], &self.dropped)
     }
 
-    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded`.
+    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded` (eq 7).
     pub(super) fn truncate(&mut self, codec: &WindowCodec, step: f64) {
         let counts = self.order();
         let mut holds = [0; LANES]; // so many can be dropped, or none can

@@ -1,13 +1,17 @@
-//! How much the errors of a block's samples weigh while its coefficients are chosen.
+//! How much the errors of a block's samples weigh while its coefficients are chosen, and the step that suits them.
+//!
+//! The error of each sample is divided by what it is allowed (eq 21-23), so that every bound reads "the measure is at
+//! most 1". The step follows from eq 25. Under a relative bound, a step for the smallest samples would be too fine for
+//! codes of 32 bits, so it is chosen for all but a few of them.
+//!
+//! These weights only guide the choice. Rounding to the samples' type comes later, and the decoded samples decide.
 
 use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::wavelet::{LANES, Lane};
 
-/// The weights of a block's errors, with which every bound reads "the measure is at most 1"; and the step that suits them.
-///
-/// They are a good guess: rounding to the samples' type comes after, and what is decoded decides.
+/// The weights of a block's errors, and its step.
 #[derive(Debug)]
 pub(super) struct QuantizerSetup {
     promise: ErrorBound,

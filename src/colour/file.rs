@@ -24,7 +24,7 @@ pub(super) fn read(name: &str) -> Result<TransferFunction> {
         "csv" => table::parse(&text(path)?),
         _ => {
             let what = "takes the name of a colour map, or a file: ParaView's .json, or .csv";
-            return Err(Error::usage(format!("{path}: {what}")));
+            return Err(Error::path(path, what));
         }
     };
     parsed.map_err(|what| Error::input(path, what))

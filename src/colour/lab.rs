@@ -1,4 +1,4 @@
-//! sRGB and CIE L*a*b* under D65 light.
+//! [sRGB](crate::bibliography) and CIE L\*a\*b\* ([CIE15](crate::bibliography)) under D65 light.
 
 use super::Colour;
 

@@ -1,8 +1,8 @@
 //! Values to colours and opacities.
 //!
-//! A [`TransferFunction`] is a colour, and where it is asked for an opacity, for every value: one of the field's named maps
-//! over a range, or what a file says (`file`). It is applied to samples before the transform (method.md 4.1), to pixels
-//! after projection, or along the ray; [`Scale`] is what a picture's pixels need of it.
+//! A [`TransferFunction`] is a colour, and where it is asked for an opacity, for every value: one of the field's named
+//! maps over a range, or what a file says (`file`). It is applied to samples before the transform (eq 28), to the means
+//! of pixels after projection, or along the ray (eq 31). [`Scale`] colours pixels.
 
 mod file;
 mod lab;
@@ -56,8 +56,8 @@ impl TransferFunction {
         }
         let path = Path::new(file::split(name).0);
         if path.extension().is_none() && !path.exists() {
-            let what = format!("{name}: no such colour map or file; the maps are {}", NAMES.join(" "));
-            return Err(Error::usage(what));
+            let what = format!("no such colour map or file; the maps are {}", NAMES.join(" "));
+            return Err(Error::path(name, what));
         }
         file::read(name)
     }
@@ -70,8 +70,8 @@ impl TransferFunction {
     /// Of points of some values and, unless it is to run from 0 at the first to 1 at the last of them, of opacities.
     ///
     /// # Errors
-    /// Fewer than two points, values that are not ascending or all the same, or anything that is not finite or not within
-    /// 0 to 1: in words that follow a name.
+    /// Fewer than two points, values that are not ascending or all the same, or anything that is not finite or not
+    /// within 0 to 1: in words that follow a name.
     pub fn of_points(
         points: Vec<(f64, Colour)>,
         space: ColourSpace,
@@ -163,8 +163,8 @@ impl TransferFunction {
         }
     }
 
-    /// What it is best stretched over for values of a range: where they lie to both sides of 0, and its colours to both sides of
-    /// a middle one, to both sides of 0 alike. Never empty.
+    /// What it is best stretched over for values of a range: where they lie to both sides of 0, and its colours to both
+    /// sides of a middle one, to both sides of 0 alike. Never empty.
     pub fn suitable(&self, (lo, hi): (f64, f64)) -> (f64, f64) {
         /// Less on one side than this share of the other is as good as none: what is around 0, and off by a little.
         const SIDE: f64 = 0.05;
@@ -246,11 +246,11 @@ impl TransferFunction {
 fn check_range((lo, hi): (f64, f64)) -> Result<()> {
     let wrong = match (hi - lo).is_finite() {
         true if lo < hi => return Ok(()),
-        true if lo == hi => "an empty range shows nothing; it takes two numbers, the lower one first",
+        true if lo == hi => "an empty range shows nothing; give two numbers, the lower one first",
         true => "takes two numbers, the lower one first",
         false => "takes two finite numbers, the lower one first, that are not too far apart",
     };
-    Err(Error::usage(format!("--range {lo},{hi}: {wrong}")))
+    Err(Error::setting("range", format!("{wrong}, not {lo},{hi}")))
 }
 
 /// Opacity from 0 to 1 over a range.
@@ -258,7 +258,8 @@ fn ramp((lo, hi): (f64, f64)) -> Vec<(f64, f64)> {
     vec![(lo, 0.0), (hi, 1.0)]
 }
 
-/// What is at a value, between the points on both sides of it. Of two points of one value the second holds from there on.
+/// What is at a value, between the points on both sides of it. Of two points of one value the second holds from there
+/// on.
 fn between<T: Copy>(points: &[(f64, T)], value: f64, mix: impl Fn(&T, &T, f64) -> T) -> T {
     let next = points.partition_point(|(v, _)| *v <= value);
     match (next.checked_sub(1).map(|last| &points[last]), points.get(next)) {

@@ -1,4 +1,6 @@
-//! The maps of the field by their names.
+//! Colour maps of the field by their names: viridis, plasma, inferno and magma ([Viridis](crate::bibliography)),
+//! cividis ([Nunez](crate::bibliography)), turbo ([Turbo](crate::bibliography)), coolwarm
+//! ([Moreland](crate::bibliography)), grey, and the rainbow of [Dobashi](crate::bibliography).
 
 use super::Colour;
 use super::space::ColourSpace;
@@ -39,8 +41,8 @@ pub(super) fn known(name: &str) -> Option<&'static Named> {
     MAPS.iter().find(|known| known.name == name)
 }
 
-/// The colours of a known map. Those of the library are of 8 bits, and are taken where its own tables have them: between these
-/// a transform would meet steps.
+/// The colours of a known map. Those of the library are of 8 bits, and are taken where its own tables have them:
+/// between these a transform would meet steps.
 fn colours(name: &str) -> Vec<Colour> {
     let gradient = match name {
         "viridis" => colorous::VIRIDIS,
@@ -59,11 +61,12 @@ fn colours(name: &str) -> Vec<Colour> {
     (0..256).map(at).collect()
 }
 
-/// The ends of Moreland's diverging map, ParaView's default.
+/// The ends of the diverging map of [Moreland](crate::bibliography), ParaView's default.
 const COOL: Colour = [0.231_373, 0.298_039, 0.752_941];
 const WARM: Colour = [0.705_882, 0.015_686_3, 0.149_02];
 
-/// The paper's map: small values blue, large ones red, by the hues between (240 to 0 degrees).
+/// The map of [Dobashi](crate::bibliography): small values blue, large ones red, by the hues between (240 to 0
+/// degrees).
 const BLUE_TO_RED: [Colour; 5] = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
 
 #[cfg(test)]

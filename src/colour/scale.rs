@@ -1,7 +1,7 @@
 //! The colours of a picture's pixels.
 
 use super::{Colour, Rgb, TransferFunction};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 
 /// How values are spread over the colours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -44,11 +44,11 @@ impl Scale {
     pub fn new(map: &TransferFunction, range: (f64, f64), norm: Norm, background: Rgb) -> Result<Self> {
         let (lo, hi) = range;
         if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
-            return Err(Error::usage(format!("--range {lo},{hi}: takes two numbers, the lower one first")));
+            return Err(Error::setting("range", format!("takes two numbers, the lower one first, not {lo},{hi}")));
         }
         if norm == Norm::Log && lo <= 0.0 {
-            let what = "a logarithm takes a range above 0; give --range, or --norm linear";
-            return Err(Error::usage(format!("--norm log: {what} (the range is {lo},{hi})")));
+            let what = format!("a logarithm takes a range above 0, and this is {lo},{hi}");
+            return Err(Error::setting("norm", Note::with(what, Remedy::RangeAboveZero)));
         }
         let map = map.over((0.0, 1.0))?;
         let at = |i| map.colour(f64::from(i) / f64::from(SHARES)).map_or(background, bytes);
@@ -64,8 +64,8 @@ impl Scale {
         self.colour_at(self.share(value))
     }
 
-    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the background
-    /// where any number is NaN.
+    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the
+    /// background where any number is NaN.
     pub fn colour_of_pixel(&self, numbers: &[f32]) -> Rgb {
         match *numbers {
             [value] => self.colour(value),

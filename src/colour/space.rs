@@ -105,7 +105,7 @@ fn polar([l, a, b]: [f64; 3]) -> [f64; 3] {
 /// Angles below this are no colour, but grey.
 const SATURATED: f64 = 0.05;
 
-/// Between two colours in Msh: K. Moreland, "Diverging Color Maps for Scientific Visualization", 2009.
+/// Between two colours in Msh, as [Moreland](crate::bibliography) has it.
 fn diverging(mut a: [f64; 3], mut b: [f64; 3], mut t: f64) -> Colour {
     let colours = a[1] > SATURATED && b[1] > SATURATED;
     let apart = (a[2] - b[2] + PI).rem_euclid(TAU) - PI;

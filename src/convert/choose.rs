@@ -1,4 +1,10 @@
 //! Which scheme a window is coded with: the one that makes some of its boxes smallest.
+//!
+//! Candidates are a learned basis along time (eq 20) with a pyramid in space, and a pyramid in space and time (eq 32).
+//! Fronts and moving things suit the second, slow change and noise the first. The promising ones are tuned: first the
+//! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33) and the growth of steps (eq 34).
+//! Boxes lie at the places of the sequence of [Roberts](crate::bibliography), which are spread evenly whatever their
+//! number.
 
 use super::learn::learned_functions;
 use super::{ConvertConfig, Pool};
@@ -40,7 +46,7 @@ impl SchemeConstraint {
 }
 
 impl From<Basis> for SchemeConstraint {
-    /// The paper's bases along time alone, others with a pyramid.
+    /// The bases of [Dobashi](crate::bibliography) along time alone, others with a pyramid.
     fn from(basis: Basis) -> Self {
         let alone = matches!(basis, Basis::Haar | Basis::Multi);
         Self { basis: Some(basis), space: if alone { SpatialPredictor::Alone } else { SpatialPredictor::Any } }
@@ -124,7 +130,7 @@ impl SchemeSelector<'_> {
             }
         }
         let tuned = promising.map(|f| self.coarsest(f, &trials));
-        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::usage("--basis: nothing to choose from"))?;
+        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
         for variants in [Self::orders, Self::stencils, Self::growths] {
             let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
             best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);

@@ -3,6 +3,7 @@
 use super::{ConvertConfig, Plan, Task, convert};
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::output::STANDARD;
 use crate::base::progress::{Progress, Silent};
 use crate::source::scan::{Scan, join_ranges, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, open_stream};
@@ -40,7 +41,10 @@ pub struct Estimate {
 pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
     let archive = source.archive().clone();
     let Some(frames) = archive.frames.filter(|frames| *frames > 0) else {
-        return Err(Error::usage("--estimate: needs frames that can be read more than once, not standard input"));
+        return Err(Error::path(
+            STANDARD,
+            "an estimate needs frames that can be read more than once, not standard input",
+        ));
     };
     let task = Task::new(config, &archive);
     let plan = Plan::new(&task.config, &task.archive, None)?;

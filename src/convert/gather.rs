@@ -4,14 +4,14 @@ use super::choose::{SchemeSelector, most_samples};
 use super::sampled::{self, Pixel};
 use super::task::BRIGHTNESS;
 use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::sample;
 use crate::codec::WindowCodec;
 use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::codec::scheme::Scheme;
 use crate::source::scan::{Scan, join_ranges, scan};
 use crate::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
-use crossbeam::channel::Sender;
+use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_format::{BlockId, FileId, Window};
@@ -102,19 +102,16 @@ impl WindowReader<'_> {
 
     /// The error of a source that goes on after what was its end, in a window that is short.
     fn has_grown(&self, done: &WindowsDone) -> Error {
-        let (name, frames) = (done.name.display(), self.frames);
-        let what = format!(
-            "the input ended after {frames} frames and has grown: --frames 0:{frames} makes {name} of these, to \
-                            which append adds the others; --force begins anew"
-        );
-        Error::Changed { path: done.name.clone(), what }
+        let frames = self.frames;
+        let what = format!("the input ended after {frames} frames and has grown");
+        Error::changed(&done.name, Note::with(what, Remedy::AppendOrBeginAnew { frames }))
     }
 
     /// The error of a source that has fewer frames than it had.
     fn ended(&self, done: &WindowsDone) -> Error {
         let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
         let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
-        Error::Changed { path: done.name.clone(), what }
+        Error::changed(&done.name, what)
     }
 
     /// The source's frame that comes next.
@@ -139,7 +136,7 @@ impl WindowReader<'_> {
                 "frames {first}..{end} are not those that were converted before, of which {} holds the windows",
                 done.name.display()
             );
-            return Err(Error::Changed { path: window.name(0).into(), what });
+            return Err(Error::changed(window.name(0), what));
         }
         self.take_over(known);
         Ok(())
@@ -147,7 +144,7 @@ impl WindowReader<'_> {
 
     /// The file's id: that of the file which is continued, or a new one that follows from the first window's digest.
     fn id(&mut self, digest: u64) -> Result<FileId> {
-        let new = || FileId::derive(&self.plan.start, digest).map_err(|e| Error::usage(e.to_string()));
+        let new = || self.plan.start.file_id(digest).map_err(|e| Error::setting("settings", e.to_string()));
         let id = self.id.map_or_else(new, Ok)?;
         self.id = Some(id);
         Ok(id)
@@ -186,7 +183,8 @@ impl WindowReader<'_> {
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
         let id = self.id(seen.digest)?;
-        let index = u32::try_from(index).map_err(|_| Error::usage("too many windows: choose a longer --window"))?;
+        let index =
+            u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;
         let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
@@ -218,16 +216,14 @@ impl WindowReader<'_> {
             return Ok(());
         };
         let [x, y, z] = self.archive.grid.whole().voxel(voxel);
-        Err(Error::input(
-            window.name(frame),
-            format!(
-                "frame {} has a missing value (NaN, infinite or as declared) at x {x}, y {y}, z {z}, the first of {} in \
-                 frames {first}..{}; --missing mask keeps them as they are",
-                first + frame,
-                seen.missing,
-                first + window.frames()
-            ),
-        ))
+        let what = format!(
+            "frame {} has a missing value (NaN, infinite or as declared) at x {x}, y {y}, z {z}, the first of {} in \
+             frames {first}..{}",
+            first + frame,
+            seen.missing,
+            first + window.frames()
+        );
+        Err(Error::input(window.name(frame), Note::with(what, Remedy::MaskMissing)))
     }
 
     /// Gathers and sends the window's blocks. False if nobody listens any more.

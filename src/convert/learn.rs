@@ -1,4 +1,15 @@
-//! Functions along time that suit the series of some boxes: the principal components of their samples.
+//! Functions along time that suit the series of some boxes: their principal components
+//! ([Hotelling](crate::bibliography)).
+//!
+//! With v_i the series of voxel i as a vector over time, the functions are eigenvectors of the sum of products, those
+//! of the largest energy first:
+//!
+//! ```text
+//! (sum of v_i v_i^T) u_k = energy_k u_k                                                                   (eq 20)
+//! ```
+//!
+//! No other K functions leave a smaller sum of squares of these series. Functions are kept whose coefficients have a
+//! root mean square above delta / 4: below that, nearly all codes would be zero.
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::ErrorBound;
@@ -83,8 +94,8 @@ impl Products {
 /// Series of each box that are looked at.
 const SERIES: usize = 128;
 
-/// Eigenvalues and eigenvectors of a symmetric matrix, largest first, by Jacobi's rotations: plain arithmetic in a fixed
-/// order, so that every machine finds the same.
+/// Eigenvalues and eigenvectors of a symmetric matrix, largest first, by the rotations of [Jacobi](crate::bibliography): plain
+/// arithmetic in a fixed order, so that every machine finds the same.
 fn eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
     let mut v: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
     for _ in 0..SWEEPS {

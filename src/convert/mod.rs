@@ -38,7 +38,7 @@ use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
 use crate::wavelet;
 pub use choose::{SchemeConstraint, SpatialPredictor};
-use crossbeam::channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
@@ -51,7 +51,7 @@ use std::time::{Duration, Instant};
 use task::Task;
 pub use to_file::convert_to_file;
 pub use wavesplat_format::Basis;
-use wavesplat_format::{BlockId, FileId, Metadata, Unfinished, Window};
+use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,7 +167,7 @@ pub struct ConvertReport {
 #[derive(Debug)]
 pub struct PartialFile {
     /// Its whole windows.
-    pub unfinished: Unfinished,
+    pub unfinished: CompletePrefix,
     /// The first of these windows whose frames the source still holds, from its first frame on; those before it are not
     /// compared with anything.
     pub before: usize,
@@ -261,17 +261,23 @@ impl<'a> Plan<'a> {
     fn new(config: &ConvertConfig, archive: &Archive, colour_transform: Option<&'a ColourTransform>) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         if !(0.0..=1.0).contains(&config.tolerance) {
-            return Err(Error::usage("--tolerance: a share, 0 to 1; 2 % is 0.02"));
+            return Err(Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
         }
         let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
         let coefficients = most_coefficients(config) as u64;
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
         if edge == 0 || (edge as u64).saturating_pow(3).saturating_mul(coefficients) > most {
-            return Err(Error::usage(format!("--block {edge}: a block holds 1 to {most} samples over a window")));
+            return Err(Error::setting(
+                "block",
+                format!("holds 1 to {most} samples over a window, not {edge} voxels a side"),
+            ));
         }
         let blocks = BlockGrid { dims: archive.grid.dims, edge };
         if u32::try_from(blocks.len()).is_err() {
-            return Err(Error::usage(format!("--block {edge}: gives more than 2^32 blocks; take larger ones")));
+            return Err(Error::setting(
+                "block",
+                format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
+            ));
         }
         let batch = batch_len(config, blocks, archive, colour_transform)?;
         Ok(Self { start: start(config, archive, colour_transform, edge), colour_transform, blocks, batch })
@@ -327,10 +333,10 @@ impl WindowsDone {
         let Some(PartialFile { unfinished, before }) = begun else { return Ok(Self::default()) };
         let held = unfinished.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
-            return Err(Error::usage(format!("{}: was begun with another {what}", name.display())));
+            return Err(Error::path(name, format!("was begun with another {what}")));
         }
         if *before == 0 && held.start() != plan.start {
-            return Err(Error::usage(format!("{}: was begun with other settings", name.display())));
+            return Err(Error::path(name, "was begun with other settings"));
         }
         Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before, name: name.into() })
     }
@@ -364,7 +370,7 @@ fn batch_len(
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
         let window = config.window;
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
-        Error::usage(format!("--memory: {what}; give that, or a smaller --window or --block"))
+        Error::setting("memory", format!("{what}; give that, or a smaller window or block"))
     })
 }
 

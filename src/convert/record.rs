@@ -4,7 +4,7 @@ use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, Windo
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::file::report::{BoundReport, WindowReport};
-use crossbeam::channel::Receiver;
+use crossbeam_channel::Receiver;
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -59,7 +59,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         if self.window.is_none() {
             writer.begin_window(window_record(&batch.window)).map_err(failed)?;
         }
-        let window = self.window.get_or_insert(WindowEnd::of_nothing(batch.window.index));
+        let window = self.window.get_or_insert(WindowEnd::empty(batch.window.index));
         for encoded in &batch.blocks {
             window.add(&encoded.block);
             window.share = window.share.max(encoded.share);
@@ -121,7 +121,7 @@ impl<'a, W: Write> Recorder<'a, W> {
 /// How a window begins.
 fn window_record(job: &WindowJob) -> WindowRecord {
     let (scheme, WindowEnd { number, reached, share, squared_error, min, max, missing, coded, outliers }) =
-        (&job.codec.scheme, WindowEnd::of_nothing(job.index));
+        (&job.codec.scheme, WindowEnd::empty(job.index));
     let window = Window {
         first_frame: job.first_frame,
         frames: job.codec.frames() as u32,

@@ -1,9 +1,21 @@
-//! The paper's own rule for the bound (its section 3.4; method.md section 5, `sampled`): an estimate, not a guarantee.
+//! The bound of [Dobashi](crate::bibliography), section 3.4: an estimate from random pixels, not a guarantee.
 //!
-//! g, the weighted mean along a line of sight (eq 12, tau = 0, default kernel), is taken at random pixels of the three
-//! views along the axes. The tolerance times the mean of |g| is what a frame's pixels may be off, epsilon(t_j); the bound
-//! of every series in the window is their root mean square. Pixels darker than the mean may be off by more than the
-//! tolerance, and so may single frames: the sum over time alone is bounded (eq 13).
+//! The relative error of a pixel stays below the tolerance where samples are off by less than epsilon (eq 10). But g is
+//! not known before pictures are rendered, so its mean at random pixels stands for it:
+//!
+//! ```text
+//! |I^ - I| / I < epsilon(t_j) sum of w_i / sum of v_i w_i                                                 (eq 10)
+//! epsilon(t_j) = tolerance * g(t_j)                                                                       (eq 11)
+//! g = sum of v_i w_i / sum of w_i                                                                         (eq 12)
+//! sum over j of the squared error of a series <= sum over j of epsilon(t_j)^2                             (eq 13)
+//! ```
+//!
+//! Pixels are taken on the three views along the axes, with tau = 0 and the default kernel. Samples may have any sign,
+//! so the mean is that of |g|. delta is the root mean square of epsilon over the window's frames, and bounds every
+//! series as in eq 23.
+//!
+//! Pixels darker than the mean may be off by more than the tolerance. So may single frames: eq 13 bounds the sum over
+//! time alone.
 
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
@@ -48,7 +60,7 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    /// The root mean square over the window's frames of `tolerance` times the mean of |g| at `pixels`: delta.
+    /// The root mean square over the window's frames of `tolerance` times the mean of |g| at `pixels`: delta (eq 11 and 13).
     pub(super) fn bound(&self, tolerance: f64, pixels: &[Pixel]) -> Result<f64> {
         let kernel = Kernel::new(None, 0.0, self.grid)?;
         let scale = scale(self.magnitude);
@@ -62,7 +74,7 @@ impl View<'_> {
         Ok(((squares / self.window.frames() as f64).sqrt() / scale).min(f64::MAX))
     }
 
-    /// g of one frame at a pixel, in units of 1 / `scale`; none if all samples there are missing.
+    /// g of one frame at a pixel (eq 12), in units of 1 / `scale`; none if all samples there are missing.
     fn mean(&self, frame: usize, pixel: &Pixel, sigma: f64, scale: f64, scratch: &mut Scratch) -> Result<Option<f64>> {
         let line = Line::new(self.grid, pixel, sigma);
         let mut sums = Sums::default();
@@ -95,7 +107,7 @@ fn mean_of_present(values: &[Option<f64>]) -> f64 {
     present().map(|g| g.abs()).sum::<f64>() / present().count().max(1) as f64
 }
 
-/// The voxels that a line of sight sees, and their weights: a product of one factor along each axis (eq 9).
+/// The voxels that a line of sight sees, and their weights: a product of one factor along each axis (eq 2).
 struct Line {
     region: Region,
     factors: [Vec<f64>; 3],

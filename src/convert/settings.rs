@@ -97,14 +97,14 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
     let of = |m: &Metadata| {
         let given = [
             ("size", format!("{:?}", m.dims)),
-            ("--spacing", format!("{:?}", m.spacing)),
-            ("--origin", format!("{:?}", m.origin)),
+            ("spacing", format!("{:?}", m.spacing)),
+            ("origin", format!("{:?}", m.origin)),
             ("type of samples", m.sample.to_string()),
-            ("--block", m.block_edge.to_string()),
+            ("block", m.block_edge.to_string()),
             ("variable", m.variable.clone().unwrap_or_default()),
-            ("--bound", format!("{:?}", m.bound)),
-            ("--tolerance", format!("{:?}", m.tolerance)),
-            ("--missing-value", format!("{:?}", m.missing_value)),
+            ("bound", format!("{:?}", m.bound)),
+            ("tolerance", format!("{:?}", m.tolerance)),
+            ("missing value", format!("{:?}", m.missing_value)),
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
@@ -113,7 +113,7 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             .chain(Units::SETTINGS)
             .chain(["frames", "region"])
             .chain(ColourTransform::SETTINGS.map(|(name, _)| name));
-        let settings = ours.map(|name| (option(name), setting(m, name).unwrap_or("none").to_string()));
+        let settings = ours.map(|name| (called(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
     let pairs = of(before).into_iter().zip(of(now));
@@ -122,9 +122,9 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
 }
 
 /// What a setting is called in messages.
-fn option(setting: &'static str) -> &'static str {
+fn called(setting: &'static str) -> &'static str {
     let of_colours = ColourTransform::SETTINGS.into_iter().find(|(name, _)| *name == setting);
-    of_colours.map_or(setting, |(_, option)| option)
+    of_colours.map_or(setting, |(_, words)| words)
 }
 
 /// As much of a setting as a message has room for: transfer functions may have many points.

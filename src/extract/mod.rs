@@ -47,17 +47,16 @@ impl ExtractConfig {
     /// An error unless the file has these frames and voxels and this channel.
     fn check(&self, file: &CoefficientFile) -> Result<()> {
         let (frames, [x, y, z], channels) = (file.frames(), file.grid.dims, file.channels());
-        let what = match self {
-            Self { frames: asked, .. } if !asked.is_sorted() || asked.last().is_some_and(|last| *last >= frames) => {
-                format!("frames are asked for in ascending order, 0 to {}", frames - 1)
-            }
-            Self { region, .. } if !file.grid.whole().contains(region) || region.is_empty() => {
-                format!("a region has voxels within {x} x {y} x {z}")
-            }
-            Self { channel, .. } if *channel >= channels => format!("channels are 0 to {}", channels - 1),
-            _ => return Ok(()),
-        };
-        Err(Error::usage(format!("{}: {what}", file.path().display())))
+        if !self.frames.is_sorted() || self.frames.last().is_some_and(|last| *last >= frames) {
+            return Err(Error::setting("frames", format!("takes numbers below {frames}, ascending")));
+        }
+        if !file.grid.whole().contains(&self.region) || self.region.is_empty() {
+            return Err(Error::setting("region", format!("takes voxels of {x} x {y} x {z}, at least one")));
+        }
+        if self.channel >= channels {
+            return Err(Error::setting("channel", format!("takes a number below {channels}")));
+        }
+        Ok(())
     }
 }
 
@@ -144,7 +143,7 @@ impl Pieces {
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
         if available < plane {
             let least = (2 * plane + memory::FIXED + block_bytes(file)).div_ceil(1 << 20);
-            return Err(Error::usage(format!("--memory: extracting from this file needs at least {least}MiB")));
+            return Err(Error::setting("memory", format!("extracting from this file needs at least {least}MiB")));
         }
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
         Ok(Self { blocks, frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })

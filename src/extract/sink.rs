@@ -66,7 +66,10 @@ impl Files {
 /// A name for each frame.
 fn numbered(path: &Path, frames: &[usize]) -> Result<Vec<PathBuf>> {
     if path == Path::new(STANDARD) && frames.len() > 1 {
-        return Err(Error::usage(format!("-: standard output takes one .vti, and these are {} frames", frames.len())));
+        return Err(Error::path(
+            path,
+            format!("standard output takes one .vti, and these are {} frames", frames.len()),
+        ));
     }
     let names = Numbered::new(path, frames.len())?;
     Ok(frames.iter().map(|frame| names.of(*frame)).collect())
@@ -75,13 +78,12 @@ fn numbered(path: &Path, frames: &[usize]) -> Result<Vec<PathBuf>> {
 /// The name, without its ending, that is also that of what lies beside the file.
 fn stem(path: &Path) -> Result<String> {
     let stem = path.file_stem().filter(|_| path != Path::new(STANDARD) && path.extension().is_some());
-    let none =
-        || format!("{}: other files lie beside this one, named after it: name a file with an ending", path.display());
-    stem.map(|stem| stem.to_string_lossy().into_owned()).ok_or_else(|| Error::usage(none()))
+    let what = "other files lie beside this one, named after it: name a file with an ending";
+    stem.map(|stem| stem.to_string_lossy().into_owned()).ok_or_else(|| Error::path(path, what))
 }
 
 fn no_folder(path: &Path) -> Error {
-    Error::usage(format!("{}: must be a folder, for the files of frames; it is a file", path.display()))
+    Error::path(path, "must be a folder, for the files of frames; it is a file")
 }
 
 /// A folder that was made for files, and goes away if none is in it.

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage, Unfinished};
+use wavesplat_format::{BlockEntry, BlockId, CompletePrefix, FileId, LeafEntry, Metadata, Reader, Storage};
 
 /// An open coefficient file; several threads may read it.
 #[derive(Debug)]
@@ -205,7 +205,7 @@ impl CoefficientFile {
     /// What is wrong with the blocks of a leaf; an error if the storage fails.
     fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
         let entries = match self.reader.leaf(leaf) {
-            Err(failed) if failed.is_of_storage() => return Err(self.failed(failed)),
+            Err(failed) if failed.is_io() => return Err(self.failed(failed)),
             Err(wrong) => return Ok(leaf.ids().map(|id| (id, wrong.to_string())).collect()),
             Ok(entries) => entries,
         };
@@ -213,7 +213,7 @@ impl CoefficientFile {
         for entry in entries {
             match self.reader.check_stored(&entry) {
                 Ok(()) => {}
-                Err(failed) if failed.is_of_storage() => return Err(self.failed(failed)),
+                Err(failed) if failed.is_io() => return Err(self.failed(failed)),
                 Err(wrong) => found.push((entry.id, wrong.to_string())),
             }
         }
@@ -241,10 +241,10 @@ impl CoefficientFile {
         let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
         let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
         if leaf.ids().all(|id| is_lost(&id)) {
-            return Ok(leaf.ids().map(BlockEntry::of_lost).collect());
+            return Ok(leaf.ids().map(BlockEntry::lost).collect());
         }
         let entries = self.reader.leaf(leaf).map_err(|e| self.failed(e))?.into_iter();
-        Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::of_lost(entry.id) } else { entry }).collect())
+        Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::lost(entry.id) } else { entry }).collect())
     }
 
     /// The entries of the blocks of a channel and window that touch a region, in order, a leaf of the directory at a time.
@@ -306,8 +306,8 @@ impl CoefficientFile {
     }
 
     /// All of its windows, once every byte of them was seen to be whole.
-    pub fn whole_windows(&self) -> Result<Unfinished> {
-        let whole = Unfinished::read(self.reader.storage()).map_err(|e| self.failed(e))?;
+    pub fn whole_windows(&self) -> Result<CompletePrefix> {
+        let whole = CompletePrefix::read(self.reader.storage()).map_err(|e| self.failed(e))?;
         match whole.metadata() == self.metadata() {
             true => Ok(whole),
             false => {

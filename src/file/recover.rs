@@ -7,7 +7,7 @@ use crate::source::CHANNELS;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
-use wavesplat_format::{BlockId, Salvage};
+use wavesplat_format::{BlockId, Recovery};
 
 /// What was saved, and what not.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -58,11 +58,11 @@ pub fn recover(
 ) -> Result<RecoverReport> {
     let failed = |source| Error::CoefficientFile { path: damaged.path().into(), source };
     searching.start(Some(damaged.len()));
-    let salvage = Salvage::search(damaged, &mut |bytes| searching.advance(bytes)).map_err(failed)?;
+    let recovery = Recovery::search(damaged, &mut |bytes| searching.advance(bytes)).map_err(failed)?;
     searching.finish();
-    let metadata = salvage.metadata();
+    let metadata = recovery.metadata();
     saving.start(Some(metadata.blocks()));
-    let saved = salvage.write(damaged, out, &mut || saving.advance(1));
+    let saved = recovery.write(damaged, out, &mut || saving.advance(1));
     let (mut out, saved) = saved.map_err(|source| Error::CoefficientFile { path: name.into(), source })?;
     out.flush().map_err(|e| Error::io(name, "writing", e))?;
     damaged.check_unchanged()?;

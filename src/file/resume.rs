@@ -3,7 +3,7 @@
 //! Both are the same: whole windows at the beginning of `NAME.part`, after which writing goes on. Those of a finished file are
 //! copied there first, so that it stays what it is until its successor takes its name.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::output::Output;
 use crate::file::CoefficientFile;
@@ -12,7 +12,7 @@ use crate::source::{Archive, FrameSource};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
-use wavesplat_format::{Error as FormatError, Unfinished, Window};
+use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
 
 /// What becomes of the whole windows that an earlier run left unfinished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub enum Earlier {
 }
 
 impl Earlier {
-    /// As `--force` and `--resume` say.
+    /// What becomes of them with `resume`, or else with `force`.
     pub fn by(force: bool, resume: bool) -> Self {
         match (resume, force) {
             (true, _) => Self::Resume,
@@ -36,13 +36,12 @@ impl Earlier {
     }
 
     /// What is gone on with of what there is.
-    fn of(self, held: Option<Unfinished>, part: &Path) -> Result<Option<Unfinished>> {
+    fn of(self, held: Option<CompletePrefix>, part: &Path) -> Result<Option<CompletePrefix>> {
         match (self, held) {
             (Self::Resume, held) => Ok(held),
             (Self::Refuse, Some(held)) => {
-                let (part, frames) = (part.display(), held.metadata().frames);
-                let what = "--resume goes on with it, --force begins anew";
-                Err(Error::usage(format!("{part}: holds {frames} frames of a run that was not finished; {what}")))
+                let what = format!("holds {} frames of a run that was not finished", held.metadata().frames);
+                Err(Error::path(part, Note::with(what, Remedy::ResumeOrBeginAnew)))
             }
             (Self::Discard | Self::Refuse, _) => Ok(None),
         }
@@ -51,22 +50,22 @@ impl Earlier {
 
 /// Opens the output of a conversion, and finds what there is to go on with. With `replace` a file of that name is replaced in
 /// the end.
-pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<Unfinished>)> {
+pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<CompletePrefix>)> {
     let mut out = Output::resumable(path, replace)?;
     let Some(part) = out.part() else {
         return match earlier {
-            Earlier::Resume => Err(Error::usage("--resume: takes a file to write to, not a pipe or a device")),
+            Earlier::Resume => Err(Error::setting("resume", "takes a file to write to, not a pipe or a device")),
             _ => Ok((out, None)),
         };
     };
     let held = if earlier == Earlier::Discard { None } else { earlier.of(whole_windows(part)?, part)? };
-    out.begin_at(held.as_ref().map_or(0, Unfinished::bytes))?;
+    out.begin_at(held.as_ref().map_or(0, CompletePrefix::bytes))?;
     Ok((out, held))
 }
 
 /// Opens the successor of a finished file that begins with all of its windows, and finds these, or more where there are more
 /// to go on with.
-pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, Unfinished)> {
+pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, CompletePrefix)> {
     let (path, own) = (of.path(), of.whole_windows()?);
     let mut out = Output::resumable(path, true)?;
     of.check_unchanged()?; // before it was locked it may have been replaced
@@ -79,10 +78,7 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
             out.begin_at(held.bytes())?;
             Ok((out, held))
         }
-        Some(_) => {
-            let what = "is of another file; --force begins anew";
-            Err(Error::usage(format!("{}: {what}", part.display())))
-        }
+        Some(_) => Err(Error::path(part, Note::with("is of another file", Remedy::BeginAnew))),
         None => {
             out.begin_at(0)?;
             let mut start = File::open(path).map_err(|e| Error::io(path, "opening", e))?.take(own.bytes());
@@ -93,19 +89,18 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
 }
 
 /// Whether the first windows of one are those of the other.
-fn goes_on(all: &Unfinished, first: &Unfinished) -> bool {
+fn goes_on(all: &CompletePrefix, first: &CompletePrefix) -> bool {
     all.id() == first.id() && all.metadata().windows.starts_with(&first.metadata().windows)
 }
 
 /// The whole windows at the beginning of a file; none if there is not even one.
-fn whole_windows(part: &Path) -> Result<Option<Unfinished>> {
-    match Unfinished::read(&FileBytes::open(part, Access::Read)?) {
+fn whole_windows(part: &Path) -> Result<Option<CompletePrefix>> {
+    match CompletePrefix::read(&FileBytes::open(part, Access::Read)?) {
         Ok(held) => Ok(Some(held).filter(|held| held.metadata().frames > 0)),
         Err(FormatError::Io(e)) => Err(Error::io(part, "reading", e)),
-        Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => Err(Error::usage(format!(
-            "{}: is in the way, and not an unfinished conversion; --force replaces it",
-            part.display()
-        ))),
+        Err(FormatError::Foreign(_)) if part.metadata().is_ok_and(|m| m.len() > 0) => {
+            Err(Error::path(part, Note::with("is in the way, and not an unfinished conversion", Remedy::Replace)))
+        }
         Err(_) => Ok(None),
     }
 }

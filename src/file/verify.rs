@@ -1,6 +1,6 @@
 //! Is a coefficient file whole, and does it keep its promise?
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Region;
 use crate::base::memory::MOST_BLOCKS;
 use crate::base::progress::Progress;
@@ -50,7 +50,7 @@ impl VerifyReport {
     fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(read) => Ok(Some(read)),
-            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_of_storage()) => {
+            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_io()) => {
                 self.damage(&wrong);
                 Ok(None)
             }
@@ -192,12 +192,9 @@ fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
         let [x, y, z] = a.grid.dims;
         let [fx, fy, fz] = b.grid.dims;
         let frames = a.frames.map_or("unknown".into(), |f| f.to_string());
-        return Err(Error::usage(format!(
-            "--against: {frames} frames of {x}x{y}x{z} {} samples, but the file holds {} of {fx}x{fy}x{fz} {sample}; --frames a:b \
-             chooses those that it holds",
-            a.sample,
-            b.frames()
-        )));
+        let source = format!("{frames} frames of {x}x{y}x{z} {} samples", a.sample);
+        let what = format!("{source}, but the file holds {} of {fx}x{fy}x{fz} {sample}", b.frames());
+        return Err(Error::setting("against", Note::with(what, Remedy::ChooseFrames)));
     }
     Ok(())
 }

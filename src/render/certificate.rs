@@ -1,21 +1,22 @@
-//! Certified pictures: a bound on the error of every pixel (method.md section 5).
+//! Certified pictures: a bound on the error of every pixel.
 //!
-//! With w_i the weights of the uncut kernel and c_i those that are splatted, the true pictures are I = sum w_i v_i and
-//! g = I / sum w_i; the rendered ones have c_i for w_i and v^_i for v_i. Let r_i bound |v^_i - v_i|, let C = sum c_i,
-//! T = sum (w_i - c_i) be what lies beyond the cut, and the range V hold every v_i. Then
+//! Let w_i be the weights of the uncut kernel and w'_i those that are splatted. The true pictures are I = sum of w_i
+//! v_i and g = I / sum of w_i. The rendered ones have w'_i for w_i and v^_i for v_i. Let r_i bound |v^_i - v_i|, W' =
+//! sum of w'_i, B = sum of (w_i - w'_i), what lies beyond the cut (eq 15), and let the range V hold every v_i. Then
 //!
 //! ```text
-//! |I^ - I| <= sum c_i r_i + T max |V|
-//! |g^ - g| <= sum c_i r_i / C + T / (C + T) (max V - min V)
+//! |I^ - I| <= sum of w'_i r_i + B max |V|                                                                 (eq 26)
+//! |g^ - g| <= sum of w'_i r_i / W' + B / (W' + B) (max V - min V)
 //! ```
 //!
-//! since the mean over the cut and that beyond it are both means of values in V. Where samples are missing, C counts the
-//! weights that are present; T may count all, since T / (C + T) grows with T.
+//! The first line is the triangle inequality. For the second, g is a mean of two means, of the voxels as cut and of
+//! what lies beyond, with weights W' and B; both are within V. Where samples are missing, W' counts the weights that
+//! are present. B may count all weights, since B / (W' + B) grows with B.
 //!
-//! The r_i come from the directory by way of the selection of a batch into the error planes , whose sums
-//! [`super::reconstruct`] takes. Rounding comes on top: a sum of N terms is off by N units in the last place of the sum of
-//! their absolute values, a weight by what [`weight_rounding`] says, and the inverse transform by [`INVERSE`]. A mean is
-//! off by that of its emission, and by that of its weights times itself.
+//! The directory of a file stores the r_i block by block. They are splatted like samples, into error planes. Rounding
+//! comes on top: a sum of N terms is off by N units in the last place of the sum of their absolute values, a weight by
+//! `weight_rounding`, and the inverse transform by `INVERSE`. A mean is off by the rounding of its emission, and by
+//! the rounding of its weights times itself.
 
 use super::config::Quantity;
 use super::scene::FrameBounds;
@@ -24,15 +25,15 @@ use super::weights::PixelWeight;
 use crate::base::sample::magnitude;
 use crate::view::footprint::Method;
 
-/// The rounding of the inverse transform, as a share of the sum of absolute terms: at most ten levels of up to seven
-/// products each, whose intermediate sums are at most a few hundred times larger.
+/// The rounding of the inverse transform, as a share of the sum of absolute terms. It has at most ten levels of up to
+/// seven products each, and its intermediate sums are at most a few hundred times larger than the terms.
 const INVERSE: f64 = 1.0 / (1u64 << 36) as f64;
 
-/// The bounds of all pixels of a view.
+/// Computes the error bounds of a view's pixels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Certificate {
     pub(super) quantity: Quantity,
-    /// How far rounding moves a sum over voxels, as a share of the sum of its absolute terms.
+    /// The rounding error of a sum over voxels, as a share of the sum of its absolute terms.
     pub(super) rounding: f64,
 }
 
@@ -41,7 +42,8 @@ impl Certificate {
         Self { quantity, rounding: sum_rounding(setup) + INVERSE }
     }
 
-    /// The error of a pixel that holds `value`: `errors` is sum c_i r_i, `absent` the weights that are missing.
+    /// The error bound of a pixel with this `value` (eq 26). `errors` is the sum of w'_i r_i, and `absent` is the sum
+    /// of the missing weights.
     pub(super) fn error(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64, value: f64) -> f32 {
         let errors = errors * (1.0 + self.rounding);
         let bound = match self.quantity {
@@ -51,15 +53,17 @@ impl Certificate {
         let stored = (f64::from(value as f32) - value).abs();
         match bound + stored {
             _ if value.is_nan() => f32::NAN,
-            error if error.is_nan() => f32::INFINITY, // numbers too large to say
-            error => (error as f32).next_up(),        // by far more than the few roundings of this formula
+            error if error.is_nan() => f32::INFINITY, // the numbers overflow
+            error => (error as f32).next_up(),        // far more than the few roundings of this formula
         }
     }
 
+    /// The first line of eq 26, and rounding.
     fn emission(&self, frame: &FrameBounds, weight: &PixelWeight, errors: f64) -> f64 {
         errors + weight.beyond * magnitude(frame.range) + self.rounding * weight.sum * frame.absolute_sum
     }
 
+    /// The second line of eq 26, and rounding.
     fn mean(&self, frame: &FrameBounds, weight: &PixelWeight, absent: f64, errors: f64) -> f64 {
         let present = weight.sum - absent; // more than 0, or the pixel is background
         let own = (errors / present).min(frame.error); // a mean of errors
@@ -69,13 +73,13 @@ impl Certificate {
     }
 }
 
-/// The kernel that cuts are measured against; nothing is splatted with it but weights.
+/// The kernel that cuts are compared with; only weights are splatted with it.
 pub(super) const WHOLE: Method = Method { name: "whole", radius: 8.0, stated_error: 5.07e-14 };
-/// exp(-R^2 / 2) at its cut: the share of its peak that a voxel further away has at most.
+/// exp(-R^2 / 2) at its cut: an upper bound of the weight of voxels beyond the cut, as a share of the peak.
 const BEYOND_WHOLE: f64 = 1.27e-14;
 
-/// Turns the sums of weights of the whole kernel, as seen by `setup`, into at least what a cut leaves out, whose sums are
-/// `cut`.
+/// Replaces the sums of weights of the whole kernel (`setup`, `whole`) by upper bounds of the weights beyond a cut.
+/// `cut` holds the sums of weights of the cut kernel.
 pub(super) fn leave_beyond(setup: &ViewSetup, cut: &[f64], whole: &mut [f64]) {
     let rounding = sum_rounding(setup);
     let further = setup.clip.voxels() as f64 * setup.footprint.at_depth(0.0) * BEYOND_WHOLE * (1.0 + rounding);
@@ -83,12 +87,12 @@ pub(super) fn leave_beyond(setup: &ViewSetup, cut: &[f64], whole: &mut [f64]) {
     whole.iter_mut().zip(cut).for_each(|(whole, cut)| *whole = left(*cut, *whole));
 }
 
-/// How far rounding moves a sum of weights, as a share of it.
+/// The relative rounding error of a sum of weights.
 fn sum_rounding(setup: &ViewSetup) -> f64 {
     weight_rounding(setup) + (setup.clip.voxels() as f64 + 64.0) * f64::EPSILON
 }
 
-/// How far rounding moves a single weight, as a share of it: in the position, the depth and the exponentials.
+/// The relative rounding error of one weight: of its position, its depth and its exponentials.
 fn weight_rounding(setup: &ViewSetup) -> f64 {
     setup.footprint.rounding(setup.camera.rounding(&setup.grid), setup.camera.depth(&setup.grid))
 }

@@ -1,14 +1,14 @@
-//! Along the rays, slab by slab (method.md section 7): the volume is cut across the view direction, the planes of each slab
-//! are splatted and inverted for all frames, and its means are coloured and composited front to back.
+//! Composites and maximum intensity projections: splats every frame batch slab by slab, and blends the slabs front to
+//! back.
 //!
 //! ```text
 //! for each view
-//!   for each group of frames of a window          plan: as many as fit
-//!     which tiles of which slabs can be seen       visible: from the ranges of blocks
+//!   for each batch of frames of a window           driver: as many as fit
+//!     find the visible tiles of each slab          slabs::visible: from the ranges of blocks
 //!     for each band of rows
-//!       for each run of slabs, front to back       as many as fit, and as a block is deep
-//!         splat the blocks that they need          canvas, as for several views: each slab is an eye of its own
-//!         each slab: every tile inverts its pixels, and blends them behind what is there
+//!       for each run of slabs, front to back       as many as fit, at most a block's depth
+//!         splat the blocks that they need          each slab is a view of its own
+//!         every tile of each slab inverts its pixels and blends them behind the earlier slabs
 //!     give the finished frames to the sink
 //! ```
 
@@ -29,7 +29,7 @@ use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 use std::time::Instant;
 
-/// Renders pictures of slabs, view by view; progress is in rows of pixels of slabs.
+/// Renders slab by slab, one view after another. Progress counts rows of pixels of slabs.
 pub(super) fn composite(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -48,7 +48,7 @@ pub(super) fn composite(
     Ok(())
 }
 
-/// Renders all frames from a view that is cut into slabs, giving each to `sink`.
+/// Renders all frames from a view that is cut into slabs, and gives each to `sink`.
 fn render_view(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -72,10 +72,10 @@ fn render_view(
     }
 }
 
-/// A view, and how its slabs become a picture.
+/// A view with its slabs and the way they blend.
 struct View<'a, B> {
     slabs: &'a [ViewSetup],
-    /// World units that a slab is thick at least where it counts.
+    /// Minimum length of a ray in a slab, in world units; a slab is ignored at pixels with less.
     least: f64,
     blend: B,
     config: &'a RenderConfig,
@@ -114,7 +114,7 @@ impl<B: Blend> View<'_, B> {
         Ok(B::finish(pixels))
     }
 
-    /// Blends all slabs of a band into its pixels, as many at a time as the budget has room for.
+    /// Blends all slabs into the pixels of a band, as many slabs at a time as fit in the budget.
     fn render_band(
         &self,
         source: &WithLengths<'_>,
@@ -133,7 +133,7 @@ impl<B: Blend> View<'_, B> {
             let (blocks, batch) = (visible.blocks(&run, rows), budget.batch(&source.layout, rows.len()));
             report.add_splatted(&splat(&mut accumulators, (&blocks, batch), source)?);
             let mut clock = Instant::now();
-            let wanted = |n: usize, place: &_| visible.is_open(run[n], place);
+            let wanted = |n: usize, rect: &_| visible.is_open(run[n], rect);
             let together = (TOGETHER / source.layout.planes()).max(1);
             BandAccumulator::finish_layers(&accumulators, together, pixels, wanted, |tile, pixels| {
                 self.blend_tile(source, visible, tile, pixels);
@@ -145,7 +145,7 @@ impl<B: Blend> View<'_, B> {
         Ok(())
     }
 
-    /// Puts a tile of some slabs, front to back, behind what is there.
+    /// Blends the layers of a tile, front to back, behind the earlier slabs.
     fn blend_tile(
         &self,
         source: &WithLengths<'_>,
@@ -160,14 +160,14 @@ impl<B: Blend> View<'_, B> {
         for (y, at) in tile.rect.y.clone().zip((0..).step_by(width)) {
             for first in (0..width).step_by(LANES) {
                 let lanes = LANES.min(width - first);
-                let place = [tile.rect.x.start + first, y];
-                if (0..frames).all(|f| pixels.at(f, place, lanes).iter().all(B::is_closed)) {
+                let pixel = [tile.rect.x.start + first, y];
+                if (0..frames).all(|f| pixels.at(f, pixel, lanes).iter().all(B::is_closed)) {
                     continue;
                 }
                 is_closed = false;
                 tile.load(at + first, lanes, &mut planes);
                 for (layer, planes) in layers.iter_mut().zip(planes.chunks_exact_mut(count)) {
-                    layer.means(planes, |f, sums, lengths| self.blend_lane(sums, lengths, pixels.at(f, place, lanes)));
+                    layer.means(planes, |f, sums, lengths| self.blend_lane(sums, lengths, pixels.at(f, pixel, lanes)));
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! What is to be rendered, and how.
+//! The settings of a rendering.
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
@@ -6,15 +6,15 @@ use crate::colour::TransferFunction;
 use crate::view::camera::View;
 use crate::view::footprint::{Kernel, Method};
 
-/// A pixel is background where its weights sum to less than this share of the view's largest sum.
+/// A pixel is background if its weights sum to less than this share of the view's largest sum.
 pub(super) const BACKGROUND: f64 = 0.01;
 
-/// The default splat error for a file of this tolerance, or for frames: half the tolerance, at most 1e-3.
+/// The default splat error: half the tolerance of the file, at most 1e-3. `None` (frames of an archive) gives 1e-3.
 pub fn default_splat_error(tolerance: Option<f64>) -> f64 {
     tolerance.map_or(f64::INFINITY, |t| t / 2.0).min(1e-3)
 }
 
-/// The cheapest footprints within an error.
+/// The cheapest footprint method within a splat error.
 pub fn splat_method(quantity: Quantity, error: f64) -> Method {
     Method::within(most_splat_error(quantity, error))
 }
@@ -28,49 +28,49 @@ pub(super) fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
     }
 }
 
-/// What a pixel means (method.md section 2).
+/// The quantity that a pixel of a projection shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// g, the weighted mean along the ray; NaN is background (eq 12).
+    /// g, the weighted mean along the ray (eq 12); NaN is background (eq 16).
     Mean,
     /// I, the emission: value times length (eq 4).
     Emission,
 }
 
-/// What becomes of what lies along a ray.
+/// How the values along a ray are combined.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum Mode {
-    /// It is summed up: the quantity that is asked for.
+    /// Sums along the ray give the [`Quantity`].
     #[default]
     Projection,
-    /// It is coloured, and hides what is behind (method.md section 7).
+    /// Values have colours and opacities, and hide the values behind them (eq 29-31).
     Composite {
         /// Colour and opacity of every value.
         transfer: TransferFunction,
-        /// World units of a path that has such an opacity; by default the largest spacing.
+        /// Length of the path that has the transfer function's opacity, in world units; by default the largest spacing.
         unit: Option<f64>,
-        /// Slabs that the volume is cut into; by default each is about as thick as the largest spacing.
+        /// Number of slabs that the volume is cut into; by default each is about as thick as the largest spacing.
         slabs: Option<usize>,
     },
-    /// The largest value is taken.
+    /// The maximum along the ray.
     Mip {
-        /// As of [`Self::Composite`].
+        /// Number of slabs, as in [`Self::Composite`].
         slabs: Option<usize>,
     },
 }
 
 impl Mode {
-    /// What the numbers of a pixel are.
+    /// The kind of numbers in each pixel.
     pub fn pixel(&self) -> Pixel {
         if matches!(self, Self::Composite { .. }) { Pixel::Light } else { Pixel::Value }
     }
 
-    /// Whether rays are summed up.
+    /// Whether this is [`Self::Projection`].
     pub fn is_projection(&self) -> bool {
         matches!(self, Self::Projection)
     }
 
-    /// How many slabs are asked for.
+    /// The number of slabs that the caller set.
     pub(super) fn slabs(&self) -> Option<usize> {
         match self {
             Self::Projection => None,
@@ -79,44 +79,43 @@ impl Mode {
     }
 }
 
-/// How to render. [`RenderConfig::new`] has the defaults; change others by struct update.
+/// The settings of a rendering. [`RenderConfig::new`] gives the defaults; struct update changes the others.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
-    /// What becomes of what lies along a ray. Default: a projection.
+    /// How the values along a ray are combined. Default: a projection.
     pub mode: Mode,
-    /// From where, one view or more; pictures of all views are equally large.
+    /// The views, at least one; all have the same picture size.
     pub views: Vec<View>,
-    /// The kernel. Default: of 0.75 of the largest distance of voxels, without attenuation.
+    /// The kernel of every voxel. Default: [`Kernel::of_grid`].
     pub kernel: Kernel,
-    /// What a pixel means. Default: the mean.
+    /// The quantity that a pixel of a projection shows. Default: the mean.
     pub quantity: Quantity,
-    /// Which frames, ascending. Default: all.
+    /// Frame numbers, ascending. Default: all frames.
     pub frames: Vec<usize>,
-    /// Which voxels; none means all. Default: none.
+    /// The voxels to render; `None`, the default, means all.
     pub region: Option<Region>,
-    /// What splatting may add to the error: of an emission relative to the image of the largest |v| at the brightest
-    /// place of the plane of the picture, of a mean relative to the value range where weights sum to as much as there, and
-    /// elsewhere in inverse proportion to that sum. 0 asks for the exact method. Default: half of
-    /// [`Scene::tolerance`](super::Scene::tolerance), at most 1e-3.
+    /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
+    /// brightest point of the picture plane. For a mean it is relative to the value range at pixels with that point's
+    /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default: [`default_splat_error`].
     pub splat_error: f64,
-    /// How far off the picture may be, in the unit of samples, so that less is read and splatted; none: as near as the
-    /// file is. Of an emission: as far as where all samples are off by so much. Default: none.
+    /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
+    /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all have this error.
     pub allowed: Option<f64>,
-    /// Which error that limits. Default: the certified one.
+    /// The error that `allowed` limits. Default: the certified error.
     pub limited: Limit,
-    /// Whether each picture comes with a bound on the error of every pixel. Default: no.
+    /// Whether each picture comes with an error bound for every pixel. Default: no.
     pub certify: bool,
-    /// Bytes that may be allocated, besides what takes the pictures. Default: 512 MiB.
+    /// Limit of allocated memory in bytes, without the memory of the sink. Default: 512 MiB.
     pub memory: usize,
 }
 
 /// An error that can be limited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Limit {
-    /// The largest of any sample, and so of any pixel of a mean.
+    /// The largest error of any sample, and so of any pixel of a mean.
     #[default]
     Certified,
-    /// The root mean square over the pixels of a window's pictures of a view, as it is estimated.
+    /// The estimated root mean square error over the pixels of a window's pictures, per view.
     Expected,
 }
 
@@ -126,7 +125,7 @@ impl RenderConfig {
         self.views[0].size
     }
 
-    /// Whether it depends on the view what is read of a file.
+    /// Whether the selection of blocks depends on the view.
     pub(super) fn chooses_by_view(&self) -> bool {
         self.allowed.is_some() && self.limited == Limit::Expected
     }
@@ -148,19 +147,19 @@ impl RenderConfig {
     }
 }
 
-/// What the numbers of a pixel are.
+/// The kind of numbers in each pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pixel {
-    /// A value.
+    /// One value.
     Value,
-    /// Red, green and blue, each as a value is.
+    /// Red, green and blue, each a value of its own channel.
     Channels,
-    /// Red, green and blue of the light that comes out, 0 to 1, and the opacity of all that is there.
+    /// Red, green and blue of the light, 0 to 1, and the opacity of the whole ray.
     Light,
 }
 
 impl Pixel {
-    /// How many there are.
+    /// How many numbers a pixel has.
     pub fn numbers(self) -> usize {
         match self {
             Self::Value => 1,

@@ -1,4 +1,4 @@
-//! The loop over batches of frames, the same for projections and composites.
+//! The loop over frame batches, shared by projections and composites.
 
 use super::config::RenderConfig;
 use super::expectation::Expectation;
@@ -7,23 +7,23 @@ use super::report::RenderReport;
 use super::scene::{BatchOutcome, BatchRequest, FrameBatch, Scene};
 use crate::base::error::Result;
 
-/// What a rendering works with.
+/// The settings and the budget of a rendering.
 #[derive(Clone, Copy)]
 pub(super) struct Job<'a> {
     pub(super) config: &'a RenderConfig,
     pub(super) budget: &'a Budget<'a>,
-    /// The views, where errors are expected in them.
+    /// The views in which to estimate errors; empty for composites.
     pub(super) views: &'a [Expectation<'a>],
 }
 
-/// The pictures of a channel of a batch, and the errors that are expected in each view.
+/// The pictures of one channel of a batch, and the expected mean square error in each view.
 pub(super) struct RenderedBatch<P> {
     pub(super) pictures: P,
     pub(super) expected: Vec<f64>,
 }
 
-/// Renders all frames, as many at a time as the budget has room for. `render` makes the pictures of one channel of a batch;
-/// `give` takes those of all its channels.
+/// Renders all frames, as many at a time as fit in the budget. `render` makes the pictures of one channel of a batch;
+/// `give` takes the pictures of all its channels.
 pub(super) fn for_each_batch<P>(
     scene: &mut dyn Scene,
     job: Job<'_>,
@@ -46,7 +46,7 @@ pub(super) fn for_each_batch<P>(
     Ok(())
 }
 
-/// Renders a channel of a batch, and again where more was found than its layout has room for.
+/// Renders one channel of a batch. Repeats it with a new layout if the blocks needed more planes.
 fn render_channel<P>(
     scene: &mut dyn Scene,
     request: &BatchRequest<'_>,

@@ -1,52 +1,54 @@
-//! How far off pixels are expected to be: the energies of blocks' errors by way of the weights of a view. An estimate.
+//! Estimates the errors of pixels from the mean square errors of blocks and the weights of a view.
 //!
-//! A pixel is the mean of its voxels by their weights w_i. Where these are off by s_i in the mean square, each by itself,
-//! the pixel is off by sum w_i^2 s_i^2 / W^2, with W = sum w_i; where all err together, by at most sum w_i s_i^2 / W.
-//! Errors of neighbours are alike, as if boxes of so many voxels erred together, so what counts is between the two:
+//! A pixel is the mean of its voxels by their weights w_i. Let s_i^2 be the mean square error of voxel i, and W = sum
+//! of w_i. If errors are independent, the pixel's expected squared error is sum of w_i^2 s_i^2 / W^2. If the errors of
+//! all voxels are equal, it is at most sum of w_i s_i^2 / W. Errors of neighbours are correlated, as if they were equal
+//! within boxes of L voxels a side. Then F voxels count as one, and the error is between the two:
 //!
 //! ```text
-//! s_i^2 w_i / W min(1, F w_i / W)        F = L L^2 (1 + n) / (L^2 + n)
+//! expected squared error of g = sum of s_i^2 w_i / W min(1, F w_i / W)                                    (eq 27)
+//! F = L L^2 (1 + n) / (L^2 + n)        n = 4 pi sigma^2, the voxels of a footprint
 //! ```
 //!
-//! for boxes of L voxels a side and footprints of n = 4 pi sigma^2 voxels: along the ray L voxels count as one, and
-//! across it those of a box that a footprint holds. In the mean over pixels w_i becomes a = 2 pi sigma^2 w_i pixels, and
-//! w_i^2 half of a w_i. Of an emission everything is W^2 times that. A block's energy is taken to be spread evenly over its
-//! voxels, and what is missing to be there.
+//! Along the ray, all L voxels of a box count as one. Across the ray, the voxels within a footprint count as one. In
+//! the mean over pixels, w_i becomes a = 2 pi sigma^2 w_i pixels, and w_i^2 becomes half of a w_i. For the emission,
+//! everything is multiplied by W^2. The estimate spreads a block's errors evenly over its voxels and treats missing
+//! samples as present.
 
 use super::config::{Quantity, RenderConfig};
 use super::weights::WeightedView;
 use crate::base::grid::{Grid, Region};
 use std::f64::consts::PI;
 
-/// A view that errors are seen in.
+/// A view in which errors are estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Expectation<'a> {
     weighted: &'a WeightedView<'a>,
     quantity: Quantity,
-    /// Pixels that are not background.
+    /// Number of pixels that are not background.
     pixels: f64,
-    /// The mean square over these of what an error of 1 in every sample comes to.
+    /// The mean square over these pixels of the error caused by an error of 1 in every sample.
     unit: f64,
     /// a / w.
     area: f64,
 }
 
-/// What a block's errors, of a mean square of 1, come to in the mean square over pixels.
+/// The mean square over pixels of the error that a block causes if the mean square error of its samples is 1.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BlockInfluence {
-    /// If all err together.
+    /// For equal errors of all voxels.
     together: f64,
-    /// If each errs by itself.
+    /// For independent errors.
     apart: f64,
 }
 
 impl BlockInfluence {
-    /// If `alike` err as one: F.
+    /// For equal errors of `alike` voxels each (F of eq 27).
     pub(super) fn of(&self, alike: f64) -> f64 {
         if alike.is_finite() { (alike * self.apart).min(self.together) } else { self.together }
     }
 
-    /// Whether no pixel sees them.
+    /// Whether the block influences no pixel.
     pub(super) fn is_nothing(&self) -> bool {
         self.together == 0.0
     }
@@ -65,27 +67,27 @@ impl<'a> Expectation<'a> {
         Self { weighted, quantity: config.quantity, pixels, unit, area }
     }
 
-    /// The mean square over pixels that samples come to which all are off by `error`.
+    /// The mean square error over pixels if every sample has the error `error`.
     pub(super) fn allowed(&self, error: f64) -> f64 {
         error * error * self.unit
     }
 
-    /// What the errors of the block at `region` come to.
+    /// The influence of the block at `region`.
     pub(super) fn of_block(&self, region: &Region) -> BlockInfluence {
         let clip = region.intersect(&self.weighted.setup.clip);
-        let mut seen = BlockInfluence::default();
+        let mut sum = BlockInfluence::default();
         let mut points = 0.0;
         for voxel in spread(&clip) {
             let one = self.of_voxel(voxel);
             points += 1.0;
-            seen.together += one.together;
-            seen.apart += one.apart;
+            sum.together += one.together;
+            sum.apart += one.apart;
         }
         let share = clip.voxels() as f64 / (self.pixels * f64::max(points, 1.0));
-        BlockInfluence { together: seen.together * share, apart: seen.apart * share }
+        BlockInfluence { together: sum.together * share, apart: sum.apart * share }
     }
 
-    /// Summed over pixels.
+    /// Eq 27 for one voxel, summed over pixels.
     fn of_voxel(&self, voxel: [usize; 3]) -> BlockInfluence {
         let WeightedView { setup, weights } = self.weighted;
         let [x, y, z] = setup.camera.project(setup.grid.position(voxel));
@@ -97,20 +99,20 @@ impl<'a> Expectation<'a> {
     }
 }
 
-/// F of boxes of `side` voxels: how many voxels err as one. The same for all views.
+/// F for boxes of `side` voxels: the number of voxels that count as one (eq 27). It is the same for all views.
 pub(super) fn alike(config: &RenderConfig, grid: &Grid, side: f64) -> f64 {
     let footprint = footprint(config, grid);
     let across = (1.0 + footprint) / (1.0 + footprint / (side * side));
     side * across
 }
 
-/// n: the voxels of a footprint.
+/// n: the number of voxels in a footprint.
 fn footprint(config: &RenderConfig, grid: &Grid) -> f64 {
     let (cell, sigma) = (grid.spacing.iter().product::<f64>(), config.kernel.sigma);
     4.0 * PI * sigma * sigma / libm::cbrt(cell * cell)
 }
 
-/// Some voxels that stand for all of a region.
+/// A sample of voxels that represents a region.
 fn spread(region: &Region) -> impl Iterator<Item = [usize; 3]> + use<> {
     const A_SIDE: usize = 4;
     let dims = region.dims();

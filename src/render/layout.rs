@@ -1,33 +1,33 @@
-//! The planes of a frame batch: which sums a view keeps for each pixel, and in which order.
+//! The planes of a frame batch: the sums that a view keeps for each pixel, and their order.
 
-/// The planes of a batch, one after another: coefficients, then values of single frames, then weights of what is
-/// missing in single frames and of what is missing in all of them, then errors, and last lengths.
+/// The planes of a frame batch, one after another: coefficients, values of single frames, weights of samples missing in
+/// single frames, weights of samples missing in all frames, errors, and lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Planes of coefficients.
+    /// Number of coefficient planes.
     pub coefficients: usize,
-    /// Frames of the batch.
+    /// Number of frames in the batch.
     pub frames: usize,
-    /// Whether values are splatted into single frames.
+    /// Whether each frame has a plane of values.
     pub values: bool,
-    /// Whether anything is missing.
+    /// Whether samples are missing.
     pub absent: bool,
-    /// Planes of errors; none unless pictures are certified.
+    /// Number of error planes; 0 unless pictures are certified.
     pub error_planes: usize,
-    /// Whether the last plane is of the weights of all voxels: lengths of the rays.
+    /// Whether the last plane holds the weights of all voxels: the lengths of the rays.
     pub lengths: bool,
-    /// How tiles should keep the planes.
+    /// How tiles store the planes.
     pub order: Order,
 }
 
 impl Layout {
-    /// One plane of values for each of `frames` frames, and nothing else.
+    /// The layout with one plane of values for each of `frames` frames, and no other planes.
     pub fn of_values(frames: usize) -> Self {
         let (coefficients, error_planes, order) = (0, 0, Order::Pixels);
         Self { coefficients, frames, values: true, absent: false, error_planes, lengths: false, order }
     }
 
-    /// The plane of the values of a frame.
+    /// The index of a frame's plane of values.
     pub fn value(&self, frame: usize) -> usize {
         self.coefficients + frame
     }
@@ -37,24 +37,25 @@ impl Layout {
         self.coefficients + if self.values { self.frames } else { 0 }
     }
 
-    /// The plane of the weights that are missing in a frame.
+    /// The index of a frame's plane of missing weights.
     pub fn absent(&self, frame: usize) -> usize {
         self.value_planes() + frame
     }
 
-    /// Whose samples a plane holds: the frame, and whether those are weights that are missing.
+    /// The frame of a plane of values or of missing weights, and whether it holds missing weights; `None` for other
+    /// planes.
     pub(super) fn samples(&self, plane: usize) -> Option<(usize, bool)> {
         let of = |first: usize, there: bool| plane.checked_sub(first).filter(|f| there && *f < self.frames);
         let absent = || of(self.absent(0), self.absent).map(|f| (f, true));
         of(self.value(0), self.values).map(|f| (f, false)).or_else(absent)
     }
 
-    /// The plane of the weights that are missing in all frames.
+    /// The index of the plane of weights missing in all frames.
     pub fn absent_in_all(&self) -> usize {
         self.value_planes() + self.frames
     }
 
-    /// The first plane of errors.
+    /// The index of the first error plane.
     pub fn first_error(&self) -> usize {
         self.value_planes() + if self.absent { self.frames + 1 } else { 0 }
     }
@@ -65,12 +66,12 @@ impl Layout {
     }
 }
 
-/// How the planes of a tile lie in memory. No sum depends on it.
+/// How the planes of a tile lie in memory. The sums do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Plane by plane: fast where voxels have terms in few planes, a row of pixels at a time.
+    /// Plane by plane: fast if voxels have values in few planes; splats a row of pixels at a time.
     Planes,
-    /// Pixel by pixel: fast where voxels have terms in most planes, all planes of a pixel at a time.
+    /// Pixel by pixel: fast if voxels have values in most planes; splats all planes of a pixel at a time.
     Pixels,
 }
 

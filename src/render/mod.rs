@@ -1,31 +1,48 @@
-//! A scene to pictures (method.md sections 6 and 7): splat the planes of a batch of frames, then invert every pixel.
+//! Renders a scene: splats the planes of a frame batch, then inverts every pixel.
 //!
-//! The modules are listed in the order in which a code becomes a pixel; each uses only those above it.
+//! Splatting is linear, so it may come before the inverse transform along time, as in [Dobashi](crate::bibliography):
 //!
 //! ```text
-//! config            what is asked for
+//! I^(t_j) = sum over k of C_k u_k(t_j)                                                                    (eq 8)
+//! C_k(x, y) = sum of c_{i,k} w_i(x, y)                                                                    (eq 9)
+//! g = I / sum of w_i                                                                                      (eq 12)
+//! ```
+//!
+//! A *plane* is the image of one k, or of one frame if decoded samples are splatted. It holds a sum for each pixel, or
+//! for each cell of a lattice from which the pixels are computed. Coefficients are splatted once for all frames of a
+//! window, and a new view needs no new conversion. Partial sums over any split of the voxels add up.
+//!
+//! The modules are listed in the order of the data path, from codes to pixels. Each uses only the modules above it.
+//!
+//! ```text
+//! config            the caller's settings
 //! layout            the planes of a batch; plane_values: a block's values, plane by plane
 //! splat/            a view's camera and backend; blocks into bands; bands into tiles
-//! weights           what a mean divides by; expectation: how errors of blocks show in a view
-//! scene             where blocks come from: a batch of frames, and the blocks that are selected for it
+//! weights           the divisors of means; expectation: the effect of block errors on the pixels of a view
+//! scene             the source of blocks: a frame batch and the blocks selected for it
 //! scenes/           a coefficient file or an archive's frames as a scene
-//! slabs/            composites and largest values: the volume in slabs
-//! plan              what fits in memory; weigh: the weights of a view
+//! slabs/            composites and maximum intensity projections: the volume in slabs
+//! plan              how much fits in memory; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
-//! driver            the loop over batches of frames
-//! project, composite   what is made of each batch
-//! annotate/, sink/  letters and files; pictures: a rendering into files
+//! driver            the loop over frame batches
+//! project, composite   the pictures of each batch
+//! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!
 //! ```text
-//! for some views                               plan: as many as fit in memory
+//! for each group of views                      plan: as many as fit in memory
 //!   for each batch of frames of a window       driver: as many as fit; the scene selects its blocks
 //!     for each band of rows
 //!       for each run of blocks                 scene: read, decode                          (workers)
-//!         every plane of every view takes it   splat: values -> cells or tiles              (one owner each)
+//!         add it to every plane of every view  splat: values -> cells or tiles              (one owner each)
 //!       every tile inverts its pixels          reconstruct: planes -> frames, then / weights; certificate
 //!     give the finished frames to the sink
 //! ```
+//!
+//! Tiles splat the voxels directly (`splat::footprints`) if footprints are less work than the lattice, if the lattice
+//! is not precise enough, or if pictures are certified. All planes of a view are splatted in the same way, weights and
+//! missing samples included, so that means stay means. Composites and maximum intensity projections go slab by slab
+//! (`composite`).
 
 mod config;
 mod layout;
@@ -68,7 +85,10 @@ use splat::ViewSetup;
 use splat::reference_weights::without_what_is_dim;
 use std::time::{Duration, Instant};
 
-/// Renders all frames from all views, giving each to `sink`; those of one view come in order.
+/// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
+///
+/// # Errors
+/// Invalid settings, too little memory, failed reads, or an error of `sink`.
 pub fn render(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -98,18 +118,21 @@ pub fn render(
     Ok(report)
 }
 
-/// An error if [`render`] would refuse to begin.
+/// Checks the settings and the memory limit as [`render`] does before it reads any block.
+///
+/// # Errors
+/// The errors that [`render`] would return before its first picture.
 pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
     setups(scene, config).map(|_| ())
 }
 
-/// What is to be said of each view before it is splatted.
+/// The report of each view, before anything is splatted.
 fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
     let slabs = |setup| (!config.mode.is_projection()).then(|| slabs::count(setup, config));
     config.views.iter().zip(setups).map(|(view, setup)| ViewReport::new(view, setup, slabs(setup))).collect()
 }
 
-/// All views, for each of which there is memory enough.
+/// The setups of all views. An error unless each view alone fits in memory.
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {

@@ -1,7 +1,7 @@
-//! How much of a picture is worked on at a time, so that memory stays within its budget.
+//! Divides the work so that memory stays within its budget.
 //!
-//! Neither the number of views and frames that are rendered together, nor the rows in a band, nor the blocks in a batch
-//! changes a pixel.
+//! The number of views and frames rendered together, the rows of a band and the blocks decoded together do not change
+//! any pixel.
 
 use super::config::{Mode, RenderConfig};
 use super::layout::Layout;
@@ -16,16 +16,16 @@ use crate::base::grid::Region;
 use crate::base::memory;
 use std::ops::Range;
 
-/// What is allocated at once, for some views that are rendered together.
+/// The memory of views that are rendered together.
 #[derive(Debug)]
 pub(super) struct Budget<'a> {
     setups: &'a [ViewSetup],
-    /// Bytes left for pictures, planes and blocks, besides weights.
+    /// Bytes left for pictures, planes and blocks, after the weights.
     available: usize,
     size: [usize; 2],
-    /// Finished bytes of a pixel and frame, in the pictures of all.
+    /// Bytes of a pixel and frame in the finished pictures of all views.
     pixel_bytes: usize,
-    /// Those of a frame once more, where its channels are put together when they are finished.
+    /// Bytes of a pixel in the copy of a frame that interleaves its channels; 0 for one channel.
     together: usize,
     /// The largest block.
     block: Region,
@@ -36,7 +36,7 @@ pub(super) struct Budget<'a> {
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
-    /// An error unless there is memory enough for each of some views alone.
+    /// An error unless there is enough memory for each view alone.
     pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> Result<()> {
         let planes = most_planes(scene, 1, config);
         let least = |setup: &ViewSetup| {
@@ -54,7 +54,7 @@ impl<'a> Budget<'a> {
         )))
     }
 
-    /// For pictures of a scene from these views, or of these slabs of one.
+    /// The budget for pictures from these views, or for these slabs of one view.
     fn new(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let channels = scene.channels();
         let of_a_view = match config.mode {
@@ -69,20 +69,21 @@ impl<'a> Budget<'a> {
         Self { setups, available, size, pixel_bytes, together, block, block_bytes }
     }
 
-    /// For as many of the first views as go together: whole pictures of all, and as many frames at a time as the first has
-    /// alone. Where what is read is chosen by the view, that is one.
+    /// The budget for as many of the first views as fit together: whole pictures of all views, and as many frames at a
+    /// time as the first view has alone. One view if the selection of blocks depends on the view.
     pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let most = if config.chooses_by_view() { 1 } else { setups.len() };
         Self::of_first(config, scene, &setups[..most], config.size()[1])
     }
 
-    /// For as many slabs of a view as go together: with more than a block is deep, less would be hidden.
+    /// The budget for as many slabs of a view as fit together, at most a block's depth: longer runs would splat more
+    /// values that turn out to be hidden.
     pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [ViewSetup]) -> Self {
         let deep = slabs::of_block(slabs, &scene.blocks().region(0)).0.min(slabs.len());
         Self::of_first(config, scene, &slabs[..deep], config.size()[1].min(FEW_ROWS * TILE))
     }
 
-    /// For as many of the first views as go together with so many rows of all pictures.
+    /// The budget for as many of the first views as fit together with `rows` rows of all pictures.
     fn of_first(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup], rows: usize) -> Self {
         let alone = Self::new(config, scene, &setups[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
@@ -100,7 +101,7 @@ impl<'a> Budget<'a> {
         best
     }
 
-    /// The views.
+    /// The views, or the slabs of one view.
     pub(super) fn setups(&self) -> &'a [ViewSetup] {
         self.setups
     }
@@ -110,12 +111,12 @@ impl<'a> Budget<'a> {
         self.size[0] * self.size[1]
     }
 
-    /// Pictures of so many frames, bands of so many rows, and a block.
+    /// Bytes of the pictures of `frames` frames, bands of `rows` rows, and one block.
     fn bytes(&self, frames: usize, planes: usize, rows: usize) -> usize {
         self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes)
     }
 
-    /// A block, and if there are tiles to splat its terms and where they are in each view.
+    /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints.
     fn block_bytes(&self, planes: usize) -> usize {
         let footprints = self.setups.iter().filter(|setup| !setup.backend.is_lattice()).count();
         let terms = if footprints > 0 { SparseTerms::most_bytes(planes) } else { 0 };
@@ -123,12 +124,12 @@ impl<'a> Budget<'a> {
         self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES + shares)
     }
 
-    /// Finished pictures of a batch.
+    /// Bytes of a batch's finished pictures.
     fn picture_bytes(&self, frames: usize) -> usize {
         (frames * self.pixel_bytes + self.together) * self.pixels()
     }
 
-    /// Bands of so many rows with all planes, and what threads work with.
+    /// Bytes of bands of `rows` rows with all planes, and of the scratch of all threads.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
         let band = |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows);
         let sliced = self.setups.iter().any(|setup| setup.slab.is_some());
@@ -156,7 +157,7 @@ impl<'a> Budget<'a> {
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
-        // What a lattice takes in plane by plane had better be near.
+        // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
         } else {
@@ -166,10 +167,10 @@ impl<'a> Budget<'a> {
     }
 }
 
-/// Tiles across a band, at least, if it can be: blocks that reach over a band's edge are decoded for both.
+/// The preferred minimum height of a band, in tiles: a block that reaches over a band's edge is decoded for both bands.
 const FEW_ROWS: usize = 4;
 
-/// Bytes that are held whatever is rendered at a time: weights among them.
+/// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
     let more = match (&config.mode, setups.first()) {
@@ -179,12 +180,12 @@ fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     memory::FIXED + more
 }
 
-/// An upper bound of the planes that some frames of a batch need.
+/// An upper bound of the number of planes for `frames` frames of a batch.
 fn most_planes(scene: &dyn Scene, frames: usize, config: &RenderConfig) -> usize {
     scene.most_planes(frames, config) + usize::from(!config.mode.is_projection())
 }
 
-/// The most frames of one batch.
+/// The largest number of requested frames in one batch.
 fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {
     let mut most = 0;
     while let Some(first) = frames.first() {
@@ -194,7 +195,7 @@ fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {
     most
 }
 
-/// How many of some frames are of the same batch as the first.
+/// How many of `frames` belong to the same batch as the first.
 pub(super) fn in_batch(scene: &dyn Scene, first: usize, frames: &[usize]) -> usize {
     let end = scene.batch_end(first);
     frames.partition_point(|f| *f < end)

@@ -1,4 +1,4 @@
-//! What a block adds to the planes of a picture: a value for each of its voxels, one plane at a time.
+//! The values that the voxels of a block add to the planes of a picture, one plane at a time.
 
 use crate::base::error::Result;
 use crate::base::sample::{SampleType, load_as};
@@ -10,16 +10,16 @@ use crate::codec::real::Real;
 pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
-    /// One for each voxel: x fastest, then y, z.
+    /// One value for each voxel: x fastest, then y, z.
     Single(&'a [f32]),
-    /// As [`Self::Single`].
+    /// The same as [`Self::Single`], in f64.
     Double(&'a [f64]),
-    /// Those that are not zero, ascending: (place of the voxel in the block's array, value).
+    /// The nonzero values: (voxel, value), ascending by voxel.
     Few(&'a [(u32, f64)]),
 }
 
 impl PlaneValues<'_> {
-    /// Calls `visit(voxel, amount)` for all that are not zero, ascending.
+    /// Calls `visit(voxel, value)` for all nonzero values, ascending by voxel.
     pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
         let mut all = |amounts: &mut dyn Iterator<Item = f64>| {
             amounts.enumerate().filter(|(_, amount)| *amount != 0.0).for_each(|(voxel, amount)| visit(voxel, amount));
@@ -32,7 +32,7 @@ impl PlaneValues<'_> {
         }
     }
 
-    /// Adds `factor` times each to the sums of the voxels.
+    /// Adds `factor` times each value to the sum of its voxel.
     pub(super) fn add_to(&self, factor: f64, sums: &mut [f64]) {
         match self {
             Self::Nothing => {}
@@ -58,24 +58,24 @@ impl<'a> From<Plane<'a>> for PlaneValues<'a> {
     }
 }
 
-/// A block that has been read, or is read plane by plane.
+/// A block that is ready to be splatted.
 pub trait BlockPlanes: Send + Sync {
-    /// Number of voxels of the block.
+    /// Number of voxels in the block.
     fn voxels(&self) -> usize;
 
-    /// The values of a plane (0 to [`Layout::planes`](super::Layout::planes)), which may lie in `room`.
+    /// The values of a plane, 0 to [`Layout::planes`](super::Layout::planes). They may be stored in `scratch`.
     ///
     /// # Errors
-    /// Whatever keeps the block from being read; it ends the rendering.
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>>;
+    /// Any error ends the rendering.
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
-    /// Number of nonzero coefficients, and of stored bytes that were read for them; for the report.
+    /// Number of nonzero coefficients, and stored bytes that were read; for the report.
     fn held(&self) -> [u64; 2];
 }
 
-/// Where blocks come from.
+/// A source of blocks.
 pub(super) trait BlockSource: Sync {
-    /// Prepares for these blocks, which are read next.
+    /// Prepares to read these blocks next.
     fn fetch(&self, _blocks: &[usize]) -> Result<()> {
         Ok(())
     }
@@ -84,7 +84,7 @@ pub(super) trait BlockSource: Sync {
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
 
-/// Room for the values of a plane while they are made; each worker has its own.
+/// Buffers for the values of a plane, reused from call to call.
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(super) bytes: Vec<u8>,
@@ -93,17 +93,17 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Room for one value of each of so many voxels; its content is of an earlier block.
-    pub fn room(&mut self, voxels: usize) -> &mut [f64] {
+    /// A buffer for one value of each voxel. It holds values of an earlier plane.
+    pub fn values(&mut self, voxels: usize) -> &mut [f64] {
         self.double.resize(voxels, 0.0);
         &mut self.double
     }
 
-    /// The samples that lie in `bytes`, of which none is missing.
+    /// The samples in `bytes`; none of them is missing.
     pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();
         if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
-            // Singles do not hold them.
+            // f32 cannot represent these exactly.
             self.double.resize(count, 0.0);
             load_as(ty, &self.bytes, &mut self.double, |v| v);
             return PlaneValues::Double(&self.double);
@@ -113,7 +113,8 @@ impl Scratch {
         PlaneValues::Single(&self.single)
     }
 
-    /// Those with zeros for what is missing; or, if `absent`, a 1 for that and zeros else.
+    /// The samples in `bytes`, with zeros for missing samples. If `absent`, ones for missing samples and zeros
+    /// elsewhere instead.
     pub(super) fn masked(
         &mut self,
         ty: SampleType,
@@ -133,7 +134,7 @@ impl Scratch {
     }
 }
 
-/// A 1 for each of so many voxels.
+/// A block of this many voxels with the value 1.
 #[derive(Debug)]
 pub(super) struct UnitValues(pub(super) usize);
 

@@ -1,4 +1,4 @@
-//! Projections: every batch of frames is splatted into all views, and inverted at their pixels.
+//! Projections: splats every frame batch into all views, and inverts the pixels.
 
 use super::config::RenderConfig;
 use super::driver::{Job, RenderedBatch, for_each_batch};
@@ -16,7 +16,7 @@ use crate::base::progress::Progress;
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// Renders projections, of as many views together as there is memory for.
+/// Renders projections, as many views together as fit in memory.
 pub(super) fn project(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -39,7 +39,7 @@ pub(super) fn project(
     Ok(())
 }
 
-/// Renders all frames from views that go together, the first of which is number `first_view`.
+/// Renders all frames from the views of the budget. `first_view` is the index of the first of them.
 fn render_views(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -63,7 +63,7 @@ fn render_views(
     })
 }
 
-/// Adds the errors that are expected in a view: frame by frame, so that the sum does not depend on how frames are batched.
+/// Adds the expected mean square errors of a view, frame by frame, so that the sum does not depend on the batches.
 fn expect(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize, sum: &mut f64) {
     let mean = channels.iter().map(|channel| channel.expected[view]).sum::<f64>() / channels.len() as f64;
     (0..frames).for_each(|_| *sum += mean);
@@ -109,7 +109,7 @@ fn render_batch(
     Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
 }
 
-/// The selected blocks that a pixel sees; counts the others in the report.
+/// The selected blocks that reach a pixel of any view. Counts the others in the report.
 fn visible_blocks(batch: &dyn FrameBatch, weighted: &[WeightedView<'_>], report: &mut RenderReport) -> Vec<usize> {
     let all_rows = 0..weighted[0].setup.camera.size[1];
     let mut blocks = batch.selection().blocks.clone();
@@ -122,15 +122,15 @@ fn visible_blocks(batch: &dyn FrameBatch, weighted: &[WeightedView<'_>], report:
     blocks
 }
 
-/// The pictures of a channel of a batch from one view.
+/// The pictures of one channel of a batch from one view.
 struct Pictures {
     pixels: usize,
-    /// Those of the frames, and if they are certified, those of their errors.
+    /// The pictures of all frames, followed by their error bounds if pictures are certified.
     all: Vec<f32>,
 }
 
 impl Pictures {
-    /// Gives the frames of all channels to the sink, the channels of each pixel side by side.
+    /// Gives all frames to the sink, with the channels of each pixel interleaved.
     fn give(
         channels: &[&Self],
         (view, frames): (usize, &[usize]),
@@ -150,7 +150,7 @@ impl Pictures {
         Ok(())
     }
 
-    /// The picture of a number, of all channels; none if there are not so many.
+    /// Picture `i` with the channels interleaved; `None` if there is no such picture.
     fn together<'a>(channels: &[&'a Self], i: usize) -> Option<Cow<'a, [f32]>> {
         let of = |channel: &&'a Self| channel.all.get(i * channel.pixels..(i + 1) * channel.pixels);
         let [first, others @ ..] = channels else { return None };

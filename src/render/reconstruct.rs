@@ -1,4 +1,5 @@
-//! The last step of a tile: planes to pixels, by the inverse transform (eq 8) and the division by weights (eq 12).
+//! The last step of a tile: turns planes into pixels by the inverse transform (eq 8) and the division by the sum of
+//! weights (eq 12).
 
 use super::certificate::Certificate;
 use super::config::{Quantity, RenderConfig};
@@ -8,7 +9,7 @@ use super::splat::{Pixels, ResolvedTile};
 use super::weights::{PixelWeight, WeightedView, Weights};
 use crate::wavelet::{LANES, Lane};
 
-/// What turns the planes of a batch into pixels.
+/// Turns the planes of a batch into pixels.
 pub(super) struct PixelReconstructor<'a> {
     batch: &'a dyn FrameBatch,
     layout: Layout,
@@ -18,18 +19,18 @@ pub(super) struct PixelReconstructor<'a> {
 }
 
 impl<'a> PixelReconstructor<'a> {
-    /// For pictures of a view.
+    /// The reconstructor for the pictures of a view.
     pub(super) fn new(batch: &'a dyn FrameBatch, weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
         let certificate = config.certify.then(|| Certificate::new(weighted.setup, config.quantity));
         Self { batch, layout: batch.layout(), quantity: config.quantity, weights: &weighted.weights, certificate }
     }
 
-    /// Planes that a finished tile has: the frames, then their errors if they are certified.
+    /// Number of pictures of a tile: one for each frame, and one more for its error bounds if pictures are certified.
     pub(super) fn planes(&self) -> usize {
         self.layout.frames * (1 + usize::from(self.certificate.is_some()))
     }
 
-    /// Turns the planes of a tile into its pixels. Those of background are left as they are.
+    /// Turns the planes of a tile into its pixels. Leaves background pixels unchanged.
     pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f32>) {
         let mut inverse = self.batch.inverse(&tile.used());
         let mut planes = vec![Lane::default(); self.layout.planes()];
@@ -82,7 +83,7 @@ impl<'a> PixelReconstructor<'a> {
         }
     }
 
-    /// The weights that are missing in a frame, and the sums of weighted errors.
+    /// The missing weights of a frame, and the weighted sums of errors.
     fn absent_and_errors(&self, planes: &[Lane], frame: usize) -> (Lane, Lane) {
         let (mut absent, mut errors) = (Lane::default(), Lane::default());
         if self.layout.absent {
@@ -97,7 +98,7 @@ impl<'a> PixelReconstructor<'a> {
     }
 }
 
-/// The weights of neighbouring pixels of a row; behind its end those of the last one.
+/// The weights of neighbouring pixels of a row, padded with the weights of the last pixel.
 struct Lanes([PixelWeight; LANES]);
 
 impl Lanes {

@@ -1,4 +1,4 @@
-//! What a rendering did.
+//! Reports of a rendering: its pictures, counts and times.
 
 use super::scene::{LeftOut, Selection};
 use super::splat::{SplatStats, ViewSetup};
@@ -6,62 +6,63 @@ use crate::view::camera::View;
 use serde::Serialize;
 use std::time::Instant;
 
-/// A finished picture: as many numbers as the scene has channels for each of `width * height` pixels, row by row.
+/// A finished picture: `width * height` pixels, row by row, each with [`Pixel::numbers`](super::Pixel::numbers)
+/// numbers.
 pub type Picture<'a> = &'a [f32];
 
-/// A frame as it was rendered.
+/// A rendered frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Rendered<'a> {
-    /// How all views are splatted.
+    /// The reports of all views.
     pub views: &'a [ViewReport],
-    /// The number of the view.
+    /// Index of the view.
     pub view: usize,
-    /// That of the frame.
+    /// Number of the frame.
     pub frame: usize,
-    /// The quantity asked for.
+    /// The picture in the requested quantity.
     pub picture: Picture<'a>,
-    /// If pictures are certified, a bound on the error of every pixel, in the same unit: against the picture of the
-    /// source's samples splatted without a cut and without rounding. NaN is background.
+    /// The error bound of every pixel, in the same unit, if pictures are certified. The reference is the picture of the
+    /// source's samples, splatted without a cut and without rounding. NaN is background.
     pub error: Option<Picture<'a>>,
 }
 
-/// What a rendering did.
+/// The counts, errors and times of a rendering.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RenderReport {
-    /// Frames rendered, of every view.
+    /// Number of frames rendered from every view.
     pub frames: usize,
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
-    /// Blocks that the scene holds, over all windows touched and their channels; as what follows up to the parts, each time counted that frames
-    /// are rendered together, from views that are.
+    /// Blocks in the scene, over all windows and channels touched. This and the following counts of blocks and tiles
+    /// include a block or tile again for each frame batch and each group of views.
     pub blocks: u64,
-    /// Blocks that were decoded, each time counted.
+    /// Blocks that were decoded; repeated decoding counts again.
     pub blocks_read: u64,
     /// Blocks left out because they hold nothing in the region.
     pub blocks_empty: u64,
     /// Blocks left out because no pixel of any view sees them.
     pub blocks_outside: u64,
-    /// Blocks left out because they lie so deep that what they add is within the splat error.
+    /// Blocks left out because they are so deep that their contribution is within the splat error.
     pub blocks_dimmed: u64,
-    /// Tiles of all slabs, of every group of frames.
+    /// Tiles of all slabs of all frame batches.
     pub tiles: u64,
-    /// Those among them that are clear whatever their blocks hold.
+    /// Tiles that are transparent for any value in the ranges of their blocks.
     pub tiles_clear: u64,
-    /// Tiles of pictures that became opaque in all frames of a group, so that what is behind was left out.
+    /// Tiles of pictures that became opaque in all frames of a batch, so that the slabs behind were skipped.
     pub tiles_opaque: u64,
-    /// What a looser tolerance left out of the blocks in the region, over all windows touched.
+    /// The parts that a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
-    /// What of these blocks was not read because it is of frames that were not asked for.
+    /// The parts that were not read because only unrequested frames need them.
     pub other_frames: LeftOut,
-    /// No sample that was splatted is further from the source's.
+    /// Error bound of every splatted sample against the source.
     pub certified_sample_error: f64,
-    /// Of all views, the root mean square of what each view reports; NaN unless these are projections.
+    /// The root mean square of the expected errors of all views; NaN unless the pictures are projections.
     pub expected_error: f64,
-    /// The largest error that a pixel may have, if pictures are certified.
+    /// The largest error bound of any pixel, if pictures are certified.
     pub certified_error: Option<f64>,
-    /// Stored bytes that were read of blocks.
+    /// Stored bytes of blocks that were read.
     pub bytes_read: u64,
-    /// Nonzero coefficients splatted, each time counted.
+    /// Nonzero coefficients splatted; repeated splatting counts again.
     pub coefficients: u64,
     /// Seconds spent on the sums of weights.
     pub weight_seconds: f64,
@@ -69,33 +70,33 @@ pub struct RenderReport {
     pub decode_seconds: f64,
     /// Seconds spent splatting.
     pub splat_seconds: f64,
-    /// Seconds spent on pixels: from a lattice, by the inverse transform and the division by weights.
+    /// Seconds spent on pixels: gathering from the lattice, inverse transform and division by weights.
     pub inverse_seconds: f64,
-    /// Seconds from beginning to end, without the sink.
+    /// Seconds in total, without the sink.
     pub seconds: f64,
 }
 
 /// How a view was splatted.
 #[derive(Debug, Clone, Serialize)]
 pub struct ViewReport {
-    /// Degrees, as asked for.
+    /// Requested azimuth in degrees.
     pub azimuth: f64,
-    /// Degrees, as asked for.
+    /// Requested elevation in degrees.
     pub elevation: f64,
-    /// Degrees, as asked for.
+    /// Requested roll in degrees.
     pub roll: f64,
     /// Pixels per world unit.
     pub scale: f64,
     /// The world point in the middle of the picture.
     pub center: [f64; 3],
-    /// The splat method.
+    /// Name of the splat method.
     pub method: &'static str,
-    /// The slabs that the volume is cut into.
+    /// Number of slabs that the volume is cut into; `None` for projections.
     pub slabs: Option<usize>,
-    /// Its stated error, in the terms of the splat error that was asked for.
+    /// The stated error of the splat method, measured like the requested splat error.
     pub stated_splat_error: f64,
-    /// An estimate of the root mean square, over the pixels that are not background, of their errors, but for those of
-    /// splatting; in the pictures' unit.
+    /// Estimated root mean square error over the pixels that are not background, in the unit of the pictures, without
+    /// the splat error.
     pub expected_error: f64,
 }
 
@@ -109,7 +110,7 @@ impl RenderReport {
         self.certified_sample_error = self.certified_sample_error.max(selection.certified);
     }
 
-    /// Adds what splatting took.
+    /// Adds the counts and times of splatting.
     pub(super) fn add_splatted(&mut self, stats: &SplatStats) {
         self.blocks_read += stats.blocks;
         self.coefficients += stats.coefficients;
@@ -118,7 +119,7 @@ impl RenderReport {
         self.splat_seconds += stats.splat.as_secs_f64();
     }
 
-    /// Turns sums over the frames of each view into root mean squares, and all these into one.
+    /// Turns the sums over the frames of each view into root mean squares, and combines these into one for all views.
     pub(super) fn sum_up_expected_errors(&mut self) {
         let (frames, views) = (self.frames.max(1) as f64, self.views.len() as f64);
         self.views.iter_mut().for_each(|view| view.expected_error = (view.expected_error / frames).sqrt());
@@ -128,7 +129,7 @@ impl RenderReport {
 }
 
 impl ViewReport {
-    /// Of a view that is cut into slabs, or is not; before anything is splatted.
+    /// The report of a view before anything is splatted. `slabs` is `None` for projections.
     pub(super) fn new(view: &View, setup: &ViewSetup, slabs: Option<usize>) -> Self {
         let &View { azimuth, elevation, roll, .. } = view;
         let (scale, center) = (setup.camera.scale, setup.camera.beside(0.0));
@@ -138,7 +139,7 @@ impl ViewReport {
     }
 }
 
-/// Adds the seconds since `clock` to a stage, and restarts it.
+/// Adds the seconds since `clock` to a stage, and restarts the clock.
 pub(super) fn lap(clock: &mut Instant, stage: &mut f64) {
     *stage += clock.elapsed().as_secs_f64();
     *clock = Instant::now();

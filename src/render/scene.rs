@@ -1,7 +1,8 @@
-//! What is splatted: a scene gives the values of its blocks, whatever they are made of.
+//! The interface between the renderer and its data: a scene provides the values of its blocks.
 //!
-//! Coefficients, decoded samples and the frames of an archive are all sums over voxels of values in planes, and a
-//! linear map from planes to frames. That is all the rest of the renderer knows of them.
+//! Coefficients, decoded samples and the frames of an archive all take the same form: values of voxels that are summed
+//! in planes (eq 9), and a linear map from planes to frames (eq 8). The rest of the renderer knows nothing else about
+//! them.
 
 use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
@@ -15,28 +16,28 @@ use crate::view::footprint::Kernel;
 use crate::wavelet::Lane;
 use serde::Serialize;
 
-/// Something to render: a lattice of voxels with values in every frame, read block by block.
+/// A data source to render: a grid of voxels with a value in every frame, read block by block.
 ///
-/// [`super::CoefficientScene`] and [`super::FrameScene`] come with the library. Another program implements this trait for
-/// data of its own, with three types: the scene, a [`FrameBatch`] of it, and a block of that ([`BlockPlanes`]). A scene
-/// whose planes are the values of its frames takes [`Layout::of_values`], [`Selection::of_any_values`], and an inverse that
+/// The library has two scenes: [`super::CoefficientScene`] and [`super::FrameScene`]. Another program can implement this
+/// trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the planes of a
+/// scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`], and its inverse
 /// copies.
 pub trait Scene {
-    /// The lattice of voxels in the world.
+    /// The grid of voxels.
     fn grid(&self) -> &Grid;
 
-    /// How the lattice is cut into blocks.
+    /// How the grid is cut into blocks.
     fn blocks(&self) -> BlockGrid;
 
-    /// Numbers of a pixel: 1, or of colours 3.
+    /// Number of channels: 1, or 3 if the samples are colours.
     fn channels(&self) -> usize {
         1
     }
 
-    /// Number of frames, if it is known before they are read.
+    /// Number of frames; `None` if it is unknown until all are read.
     fn frames(&self) -> Option<usize>;
 
-    /// What samples may be off by, as a share of their value range, if that is known; the default splat error follows it.
+    /// The largest error of a sample as a share of the value range, if it is known. It determines the default splat error.
     fn tolerance(&self) -> Option<f64> {
         None
     }
@@ -44,21 +45,21 @@ pub trait Scene {
     /// One past the last frame that can be rendered together with `frame`.
     fn batch_end(&self, frame: usize) -> usize;
 
-    /// An upper bound of the planes that `frames` frames of a batch need.
+    /// An upper bound of the number of planes for a batch of `frames` frames.
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
 
-    /// An upper bound of the bytes that one block takes while it is read.
+    /// An upper bound of the memory of one decoded block, in bytes.
     fn block_bytes(&self) -> usize;
 
-    /// Opens one channel of some frames, and decides which blocks are read.
+    /// Opens one channel of a frame batch, and selects the blocks to read.
     ///
     /// # Errors
-    /// Whatever keeps the scene from reading them; it ends the rendering.
+    /// Any error ends the rendering.
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>>;
 }
 
 impl RenderConfig {
-    /// Means of all frames of a scene from one view, and the defaults of all else.
+    /// The defaults: means of all frames of a scene, seen from one view.
     ///
     /// ```
     /// use wavesplat::render::{FrameScene, Quantity, RenderConfig};
@@ -88,86 +89,91 @@ impl RenderConfig {
     }
 }
 
-/// Frames that are to be rendered together.
+/// A request for frames to render together.
 #[derive(Debug, Clone, Copy)]
 pub struct BatchRequest<'a> {
     /// Frame numbers, ascending, all before the same [`Scene::batch_end`].
     pub frames: &'a [usize],
-    /// The channel: 0 unless samples are colours.
+    /// Index of the channel; 0 unless samples are colours.
     pub channel: usize,
-    /// How to render.
+    /// The settings of the rendering.
     pub config: &'a RenderConfig,
-    /// The views, for errors that are expected in them; none of composites.
+    /// The views in which to estimate errors; empty for composites.
     pub views: &'a [Expectation<'a>],
 }
 
-/// Some frames that are rendered together. Several threads read its blocks.
+/// Frames that are rendered together. Several threads read the blocks of a batch.
 pub trait FrameBatch: Sync {
-    /// How the planes are used.
+    /// The meaning of each plane.
     fn layout(&self) -> Layout;
 
-    /// The blocks that are read.
+    /// The selected blocks.
     fn selection(&self) -> &Selection;
 
-    /// Prepares for these blocks, which [`Self::planes`] is asked for next: scenes far away read them together. By default
-    /// nothing is done.
+    /// Prepares to read these blocks next. A remote scene reads them in one request; by default this does nothing.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
     fn fetch(&self, _blocks: &[usize]) -> Result<()> {
         Ok(())
     }
 
-    /// What a block adds to the planes.
-    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
-
-    /// A function from planes to frames at some pixels, for planes of which all but `used` are zero: the inverse transform
-    /// (eq 8). It is given [`Layout::planes`] lanes or more, each with one plane's sums at [`LANES`](super::LANES) pixels, and
-    /// fills [`Layout::frames`] lanes.
-    fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
-
-    /// How far the samples may be from the source's, besides what the terms in error planes say.
-    fn errors(&self) -> &SampleErrors;
-
-    /// What was found on the way.
+    /// Reads a block: its values in each plane.
     ///
     /// # Errors
-    /// The data changed while they were read.
+    /// Any error ends the rendering.
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
+
+    /// The inverse transform (eq 8), from the planes of some pixels to their frames. Planes not listed in `used` are
+    /// zero. The function takes at least [`Layout::planes`] lanes and fills [`Layout::frames`] lanes; a lane holds one
+    /// number for each of [`LANES`](super::LANES) pixels.
+    fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
+
+    /// Error bounds of the samples, to be combined with the sums of the error planes.
+    fn errors(&self) -> &SampleErrors;
+
+    /// Ends the batch and reports whether its layout sufficed.
+    ///
+    /// # Errors
+    /// The input changed while it was read.
     fn finish(&self) -> Result<BatchOutcome>;
 }
 
-/// Frames at some pixels (second argument) from all planes there (first argument, which it may overwrite).
+/// Computes the frames at some pixels (second argument) from all planes (first argument). May overwrite the planes.
 pub type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
-/// What reading a batch found.
+/// The outcome of a batch after its blocks are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BatchOutcome {
-    /// Nothing else than its layout has room for.
+    /// The layout held everything that was read.
     Complete,
-    /// More than that: it must be opened and rendered again, and will then have room.
+    /// The blocks needed planes that the layout lacks. Open and render the batch again; the new layout has them.
     NeedsRelayout,
 }
 
-/// The blocks of a batch, chosen once when it is opened.
+/// The blocks of a batch, selected once when it is opened.
 #[derive(Debug, Default)]
 pub struct Selection {
     /// Blocks that touch the region and add to a plane, ascending.
     pub blocks: Vec<usize>,
-    /// Of composites: every block that touches the region, and a range that holds its samples as they are splatted; out
-    /// of order if all are missing. Empty for projections.
+    /// For composites: every block that touches the region, with a range that holds its samples as splatted. The range
+    /// is inverted if all samples are missing. Empty for projections.
     pub ranges: Vec<(usize, (f64, f64))>,
-    /// Blocks that hold nothing in the region.
+    /// Number of blocks that hold nothing in the region.
     pub empty: u64,
-    /// What a looser tolerance leaves out.
+    /// The parts that a looser tolerance leaves out.
     pub left_out: LeftOut,
-    /// What is only of frames that are not asked for.
+    /// The parts that only unrequested frames need.
     pub other_frames: LeftOut,
-    /// No sample is further from the source's, in the samples' unit.
+    /// Error bound of every sample against the source, in the unit of samples.
     pub certified: f64,
-    /// For each view of the request, the mean square over its pixels that the samples' errors are expected to come to.
+    /// For each view of the request, the expected mean square over its pixels of the error that the samples cause.
     pub expected: Vec<f64>,
 }
 
 impl Selection {
-    /// All blocks that touch the region of a request, for scenes that know no values before they read them.
-    pub fn of_any_values(blocks: BlockGrid, request: &BatchRequest<'_>) -> Self {
+    /// Selects all blocks that touch the region of the request, for scenes that know no values before they read them.
+    pub fn of_all(blocks: BlockGrid, request: &BatchRequest<'_>) -> Self {
         let region = request.config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
         let touching: Vec<usize> = blocks.touching(&region).collect();
         let any = (f64::NEG_INFINITY, f64::INFINITY);
@@ -182,16 +188,16 @@ impl Selection {
     }
 }
 
-/// What need not be read of blocks.
+/// Counts of blocks and parts that are not read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// Blocks of which nothing is read.
+    /// Blocks that are skipped entirely.
     pub blocks: u64,
-    /// Parts that are not read, those of such blocks included.
+    /// Parts that are not read, including the parts of skipped blocks.
     pub parts: u64,
-    /// Nonzero coefficients in them.
+    /// Nonzero coefficients in these parts.
     pub coefficients: u64,
-    /// Stored bytes of them.
+    /// Stored bytes of these parts.
     pub bytes: u64,
 }
 
@@ -204,22 +210,22 @@ impl std::ops::AddAssign for LeftOut {
     }
 }
 
-/// What is known of the errors of a batch's samples.
+/// Error bounds of a batch's samples.
 #[derive(Debug, Clone, Default)]
 pub struct SampleErrors {
-    /// `factors[plane][frame]`: how much the sums of an error plane count in a frame.
+    /// `factors[plane][frame]`: the factor of an error plane's sums in a frame.
     pub factors: Vec<Vec<f64>>,
-    /// What holds for all samples of a frame.
+    /// Bounds for all samples of each frame.
     pub frames: Vec<FrameBounds>,
 }
 
-/// What holds for all samples of a frame.
+/// Bounds for all samples of a frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameBounds {
-    /// No sample is further off.
+    /// The largest error of any sample.
     pub error: f64,
-    /// A range that holds the source's samples; out of order if all are missing.
+    /// A range that holds the source's samples; inverted if all are missing.
     pub range: (f64, f64),
-    /// No sample is made of terms whose absolute values sum to more.
+    /// The largest sum of absolute terms of any sample.
     pub absolute_sum: f64,
 }

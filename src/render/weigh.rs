@@ -1,4 +1,4 @@
-//! Makes the sums of weights of a view: a 1 for every voxel, splatted the way values are (eq 12).
+//! Computes the sums of weights of a view: splats a 1 for every voxel in the same way as values (eq 12).
 
 use super::certificate;
 use super::config::{BACKGROUND, Quantity, RenderConfig};
@@ -14,7 +14,7 @@ use crate::view::footprint::{Footprint, Method};
 use crate::wavelet::LANES;
 use rayon::prelude::*;
 
-/// A view with its sums of weights.
+/// Computes the sums of weights of a view.
 pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Budget<'_>) -> Result<WeightedView<'a>> {
     let by = |method: Method| Footprint::new(config.kernel, &setup.grid, setup.camera.scale, method);
     let sums = sums(setup, budget)?;
@@ -31,10 +31,11 @@ pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Bu
     Ok(WeightedView { setup, weights })
 }
 
-/// Replaces sums by uncut ones where the difference may decide what is background, so that every method has the same one.
+/// Makes the background the same for every splat method: replaces sums by uncut sums wherever the difference may decide
+/// whether a pixel is background.
 ///
-/// Sums are off by at most `off` of the largest sum anywhere. So the largest sum here is taken anew, and so are all sums
-/// near the threshold that follows from it.
+/// The error of a sum is at most `off` times the largest sum anywhere. So this computes the largest sum of the view
+/// again, without a cut, and then all sums near the threshold that follows from it.
 fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off: f64) {
     let pixel = |at: usize| [at % weights.size[0], at / weights.size[0]];
     let brighter = |best: usize, at: usize| if weights.sums[at] > weights.sums[best] { at } else { best };
@@ -49,7 +50,7 @@ fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off
     (weights.threshold, weights.reference) = (threshold, sums);
 }
 
-/// The sums of weights as the setup splats them.
+/// The sums of weights of all pixels, as splatted by the setup.
 fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<Vec<f64>> {
     let layout = Layout {
         coefficients: 1,

@@ -1,25 +1,35 @@
-//! The sums of weights that a weighted mean divides by (eq 12), and which pixels are background.
+//! The sums of weights, the divisors of weighted means, and the background.
+//!
+//! ```text
+//! g = sum of v_i w_i / sum of w_i                                                                         (eq 12)
+//! background: sum of w_i < 1 % of the largest sum in the view                                             (eq 16)
+//! ```
+//!
+//! Both sums of eq 12 are splatted in the same way, so g is a mean even if splatting leaves out weights. Eq 16 uses
+//! uncut weights, so that the background does not depend on the splat method. Missing samples have no weight: their
+//! weights are subtracted.
 
 use super::splat::ViewSetup;
 
-/// Of a pixel's weights this share must not be missing.
+/// The least share of a pixel's weights that must be present.
 const LEAST_PRESENT: f64 = 1e-6;
 
 /// The sums of weights of all voxels of a view.
 #[derive(Debug, Default)]
 pub(super) struct Weights {
     pub(super) size: [usize; 2],
-    /// As values are splatted, so that the quotient is a mean.
+    /// Sums of weights, splatted in the same way as values, so that the quotient is a mean.
     pub(super) sums: Vec<f64>,
-    /// With uncut footprints, so that the background is the same for every splat method. Empty: the same sums.
+    /// Sums of uncut footprints, so that the background is the same for every splat method. If empty, `sums` serves
+    /// instead.
     pub(super) reference: Vec<f64>,
-    /// At least what lies beyond the cut. Empty: not asked for.
+    /// Upper bounds of the weights beyond the cut. Empty unless pictures are certified.
     pub(super) beyond: Vec<f64>,
-    /// Pixels with less are background.
+    /// Pixels with a smaller sum are background.
     pub(super) threshold: f64,
 }
 
-/// A view, and its sums of weights.
+/// A view with its sums of weights.
 #[derive(Debug)]
 pub(super) struct WeightedView<'a> {
     pub(super) setup: &'a ViewSetup,
@@ -29,17 +39,17 @@ pub(super) struct WeightedView<'a> {
 /// The weights of one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PixelWeight {
-    /// C, as values are splatted.
+    /// W', the sum of weights, splatted in the same way as values.
     pub(super) sum: f64,
     reference: f64,
-    /// T, beyond the cut.
+    /// B, the sum of weights beyond the cut (eq 26).
     pub(super) beyond: f64,
     threshold: f64,
 }
 
 impl PixelWeight {
-    /// What a mean divides by, less weights that are missing; NaN in the background, and where so much is missing that
-    /// rounding is what is left.
+    /// The sum of weights of the samples that are present (eq 12). NaN in the background (eq 16), and if so many
+    /// samples are missing that rounding errors would dominate.
     pub(super) fn present(&self, absent: f64) -> f64 {
         let present = self.sum - absent;
         let enough = self.reference - absent >= self.threshold && present > LEAST_PRESENT * self.sum;
@@ -53,13 +63,13 @@ impl Weights {
         self.sums.iter().copied().filter(|sum| *sum >= self.threshold)
     }
 
-    /// The sum at a place of the picture, and that of the nearest pixel up to `reach` pixels beside it; at least what is
-    /// not background.
-    pub(super) fn near(&self, place: [f64; 2], reach: f64) -> Option<f64> {
-        let within = |a: usize| place[a] >= -reach && place[a] < self.size[a] as f64 + reach;
-        let pixel = |a: usize| (place[a].max(0.0) as usize).min(self.size[a] - 1);
-        let seen = within(0) && within(1) && self.threshold > 0.0;
-        seen.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
+    /// The sum at a point of the picture, or of the nearest pixel for points up to `reach` pixels outside; at least the
+    /// background threshold. `None` for other points.
+    pub(super) fn near(&self, point: [f64; 2], reach: f64) -> Option<f64> {
+        let within = |a: usize| point[a] >= -reach && point[a] < self.size[a] as f64 + reach;
+        let pixel = |a: usize| (point[a].max(0.0) as usize).min(self.size[a] - 1);
+        let is_visible = within(0) && within(1) && self.threshold > 0.0;
+        is_visible.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
     }
 
     /// The weights of the pixel in a column and a row.

@@ -35,14 +35,17 @@ impl ArraySource {
     /// Frames of samples of any type, little-endian, in the same order.
     ///
     /// # Errors
-    /// [`Error::Usage`] unless the samples are a whole number of frames, at least one, of at least one voxel.
+    /// [`Error::Setting`] unless the samples are a whole number of frames, at least one, of at least one voxel.
     pub fn new(grid: Grid, sample: SampleType, samples: Vec<u8>) -> Result<Self> {
         let voxels = grid.dims.into_iter().try_fold(1_usize, usize::checked_mul);
         let frame = voxels.and_then(|voxels| voxels.checked_mul(sample.size())).filter(|bytes| *bytes > 0);
         let frames = frame.filter(|frame| samples.len().is_multiple_of(*frame)).map(|frame| samples.len() / frame);
         let Some(frames) = frames.filter(|frames| *frames > 0) else {
             let (bytes, [x, y, z]) = (samples.len(), grid.dims);
-            return Err(Error::usage(format!("{bytes} bytes are no whole frames of {x} x {y} x {z} {sample} samples")));
+            return Err(Error::setting(
+                "samples",
+                format!("{bytes} bytes are no whole frames of {x} x {y} x {z} {sample} samples"),
+            ));
         };
         Ok(Self { archive: Archive::new(grid, sample, Some(frames)), samples: samples.into() })
     }
@@ -61,7 +64,7 @@ impl FrameSource for ArraySource {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         match first.checked_add(count).filter(|end| *end <= self.len()) {
             Some(_) => Ok(Box::new(ArrayWindow { source: self.clone(), first, count })),
-            None => Err(Error::usage(format!("{count} frames from {first}: the array has {}", self.len()))),
+            None => Err(Error::setting("frames", format!("{count} from {first} on, but the array has {}", self.len()))),
         }
     }
 }

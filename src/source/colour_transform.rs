@@ -1,4 +1,9 @@
-//! Samples as the colours that a transfer function gives them: three channels before any transform (method.md section 7).
+//! Samples as the colours of a transfer function: three channels before any transform, as in
+//! [Dobashi](crate::bibliography), section 4.1.
+//!
+//! ```text
+//! v_i^colour(t_j) = map_colour(v_i(t_j))        colour = red, green, blue                                 (eq 28)
+//! ```
 
 use super::FrameWindow;
 use crate::base::error::Result;
@@ -26,10 +31,10 @@ impl ColourTransform {
     /// The type of a channel's samples: 0 to 1, NaN what is missing.
     pub const SAMPLE: SampleType = SampleType::F32;
 
-    /// The names of its settings in a file of colours, and of the options that they are from: the transfer function, the type of
+    /// The names of its settings in a file of colours, and what messages call them: the transfer function, the type of
     /// the source's samples, and if one was declared the value that means "missing" among these.
     pub const SETTINGS: [(&'static str, &'static str); 3] =
-        [("colours", "--transfer-function"), ("dtype", "--dtype"), ("missing-value", "--missing-value")];
+        [("colours", "transfer function"), ("dtype", "type of samples"), ("missing-value", "missing value")];
 
     /// What a file remembers of it.
     pub fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {

@@ -1,10 +1,10 @@
 //! What input files say of themselves, in the same words for every format.
 
-use super::Parsed;
 use super::layout::{Layout, Shape, Strides};
 use super::packing::Packing;
 use super::spill_buffer::SpillBuffer;
-use crate::base::error::{Error, Result};
+use super::{Advised, Parsed};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{FileBytes, State};
 use crate::base::sample::SampleType;
@@ -26,7 +26,7 @@ pub(super) struct Files {
     /// Time of each where a list says so, else empty.
     pub(super) times: Vec<f64>,
     /// What a user should know about how they were found.
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
 }
 
 impl Files {
@@ -169,7 +169,7 @@ pub(super) struct FileHeader {
     /// What stands for missing samples, if the file says that some may be: NaN, or another value.
     pub(super) missing: Option<f64>,
     /// What a user should know about how the file is read.
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
     /// Where the frames are.
     pub(super) parts: Vec<Part>,
 }
@@ -191,7 +191,7 @@ impl FileHeader {
     ///
     /// # Errors
     /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
-    pub(super) fn follows(&self, first: &Self, name: &str) -> Parsed<Mismatch> {
+    pub(super) fn follows(&self, first: &Self, name: &str) -> Advised<Mismatch> {
         let said = |text: &Option<String>| text.clone().unwrap_or_else(|| "none".into());
         let value = |missing: Option<f64>| missing.map_or_else(|| "none".into(), |value| value.to_string());
         let same = |what: &str, own: String, theirs: String| {
@@ -199,7 +199,7 @@ impl FileHeader {
         };
         same("", self.shape.to_string(), first.shape.to_string())?;
         same("the array ", said(&self.variable), said(&first.variable))
-            .map_err(|e| format!("{e}; --variable chooses one"))?;
+            .map_err(|e: String| Note::with(e, Remedy::ChooseVariable))?;
         same("samples in the unit ", said(&self.units.samples), said(&first.units.samples))?;
         same("places in the unit ", said(&self.units.space), said(&first.units.space))?;
         same("the missing value ", value(self.missing), value(first.missing))?;

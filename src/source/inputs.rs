@@ -3,7 +3,7 @@
 use super::file_header::Files;
 use super::formats::{self, Format, SUPPORTED, file_series, pvd};
 use super::{OpenOptions, numbering};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::STANDARD;
 use std::collections::HashSet;
 use std::fs;
@@ -37,7 +37,7 @@ pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
     let mut files = visible_files(input)?;
     files.retain(|file| formats::extension(file) == extension);
     if files.is_empty() {
-        return Err(Error::usage(format!("{}: has no .{extension} file", input.display())));
+        return Err(Error::path(input, format!("has no .{extension} file")));
     }
     Ok(files)
 }
@@ -58,17 +58,17 @@ fn expand_one(input: &Path, options: &OpenOptions) -> Result<Files> {
 
 fn listed(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     if inputs.is_empty() {
-        return Err(Error::usage("no input was given"));
+        return Err(Error::setting("inputs", "no input was given"));
     }
     for input in inputs {
         if input == Path::new(STANDARD) {
-            return Err(Error::usage("standard input (-) must be the only input"));
+            return Err(Error::path(STANDARD, "standard input must be the only input"));
         }
         if input.is_dir() {
-            return Err(Error::usage(format!("{}: a directory must be the only input", input.display())));
+            return Err(Error::path(input, "a directory must be the only input"));
         }
         if !input.exists() && is_pattern(input) {
-            return Err(Error::usage(format!("{}: a pattern must be the only input", input.display())));
+            return Err(Error::path(input, "a pattern must be the only input"));
         }
     }
     Ok(inputs.to_vec())
@@ -78,7 +78,7 @@ fn refuse_twice(paths: &[PathBuf]) -> Result<()> {
     let mut seen = HashSet::new();
     let plain = |p: &Path| p.components().filter(|c| !matches!(c, std::path::Component::CurDir)).collect::<PathBuf>();
     match paths.iter().find(|p| !seen.insert(plain(p))) {
-        Some(path) => Err(Error::usage(format!("{}: is given twice", path.display()))),
+        Some(path) => Err(Error::path(path, "is given twice")),
         None => Ok(()),
     }
 }
@@ -88,7 +88,7 @@ fn is_pattern(path: &Path) -> bool {
 }
 
 fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
-    let refused = |what: String| Error::usage(format!("{}: {what}", pattern.display()));
+    let refused = |what: String| Error::path(pattern, what);
     let text = pattern.to_str().ok_or_else(|| refused("a pattern must be UTF-8".into()))?;
     let rules =
         glob::MatchOptions { require_literal_separator: true, require_literal_leading_dot: true, ..Default::default() };
@@ -119,7 +119,7 @@ fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
         [list] if options.dims.is_none() => return with_list(list),
         [a, b, ..] if of(Format::Vti).chain(of(Format::Vtk)).next().is_none() => {
             let what = format!("has several lists of files, {} and {}: name the one", name(a), name(b));
-            return Err(Error::usage(format!("{}: {what}", folder.display())));
+            return Err(Error::path(folder, what));
         }
         _ => {}
     }
@@ -140,7 +140,7 @@ fn with_list(list: &Path) -> Result<Files> {
         Some(Format::FileSeries) => file_series::read(list)?,
         _ => pvd::read(list)?,
     };
-    files.notes.push(format!("the frames and times are those of {}", list.display()));
+    files.notes.push(format!("the frames and times are those of {}", list.display()).into());
     Ok(files)
 }
 
@@ -158,15 +158,15 @@ fn visible_files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let Some(first) = files.first() else {
-        let what = format!("has no file of frames. Supported are {SUPPORTED} if --dims and --dtype say what it is");
-        return Err(Error::usage(format!("{}: {what}", folder.display())));
+        let what = format!("has no file of frames. Supported are {SUPPORTED}");
+        return Err(Error::path(folder, Note::with(what, Remedy::DescribeSamples)));
     };
     let extension = formats::extension(first);
     if let Some(other) = files.iter().find(|p| formats::extension(p) != extension) {
         let what = format!("mixes formats, for example {} and {}", name(first), name(other));
         let pattern = folder.join(format!("*.{extension}"));
         let hint = format!("a pattern in quotes such as '{}' chooses", pattern.display());
-        return Err(Error::usage(format!("{}: {what}; {hint}", folder.display())));
+        return Err(Error::path(folder, format!("{what}; {hint}")));
     }
     Ok(files)
 }
@@ -274,10 +274,16 @@ mod tests {
     fn options_for_headerless_data_are_refused_elsewhere() {
         let folder = Folder::new();
         let file = [folder.write("a.npy", "x")];
-        refused(&file, &raw(), "--dims is for headerless data");
-        refused(&file, &OpenOptions { offset: 1, ..OpenOptions::default() }, "--offset is for");
-        refused(&file, &OpenOptions { big_endian: true, ..OpenOptions::default() }, "--endian is for");
-        refused(&file, &OpenOptions { sample: Some(TY), ..OpenOptions::default() }, "--dtype is for");
-        refused(&file, &OpenOptions { variable: Some("a".into()), ..OpenOptions::default() }, "--variable is for");
+        let headerless = format!("{} says itself what it holds; this is for headerless data", file[0].display());
+        for (options, setting) in [
+            (raw(), "dims"),
+            (OpenOptions { offset: 1, ..OpenOptions::default() }, "offset"),
+            (OpenOptions { big_endian: true, ..OpenOptions::default() }, "big_endian"),
+            (OpenOptions { sample: Some(TY), ..OpenOptions::default() }, "sample"),
+        ] {
+            refused(&file, &options, &format!("{setting}: {headerless}"));
+        }
+        let named = OpenOptions { variable: Some("a".into()), ..OpenOptions::default() };
+        refused(&file, &named, "a.npy has one array; this is for files that have names");
     }
 }

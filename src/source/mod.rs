@@ -27,9 +27,10 @@ pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;
 pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
+pub use scan::value_range;
 pub use select::{Selection, select};
 
-use crate::base::error::Result;
+use crate::base::error::{Note, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::mapped::Access;
 use crate::base::output::STANDARD;
@@ -39,6 +40,9 @@ use std::path::{Path, PathBuf};
 
 /// What was found in a file, or why not, in words that follow the file's name.
 type Parsed<T> = std::result::Result<T, String>;
+
+/// As [`Parsed`], where something may help.
+type Advised<T> = std::result::Result<T, Note>;
 
 /// What a user may say about inputs.
 #[derive(Debug, Clone)]
@@ -134,7 +138,7 @@ pub struct Archive {
     /// Bytes that the source takes for a window, of those that it was opened with.
     pub memory: usize,
     /// What a user should know about how the files are read.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
 }
 
 impl Archive {

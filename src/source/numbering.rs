@@ -1,6 +1,6 @@
 //! Missing frames, seen from the numbers in file names.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -43,8 +43,8 @@ pub(super) fn check_one_series(paths: &[PathBuf]) -> Result<()> {
     }
     let names = [first, other].map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned());
     let what = format!("{} and {} look like two series", names[0], names[1]);
-    let hint = "choose one by a pattern in quotes, or take the files as they are with --allow-gaps";
-    Err(Error::input(other, format!("{what}; {hint}")))
+    let text = format!("{what}; a pattern in quotes chooses one");
+    Err(Error::input(other, Note::with(text, Remedy::AllowGaps)))
 }
 
 fn irregular(before: &Path, after: &Path, step: i64, usual: i64) -> Error {
@@ -59,7 +59,7 @@ fn irregular(before: &Path, after: &Path, step: i64, usual: i64) -> Error {
     } else {
         format!("the numbers usually go in steps of {usual}")
     };
-    Error::input(after, format!("{a} is followed by {b}: {why}; --allow-gaps takes the files as they are"))
+    Error::input(after, Note::with(format!("{a} is followed by {b}: {why}"), Remedy::AllowGaps))
 }
 
 /// The most frequent step, the smallest of several.
@@ -116,7 +116,7 @@ mod tests {
     fn a_missing_frame_is_named_by_its_neighbours() {
         let message = message(checked(&["d/f_08.npy", "d/f_09.npy", "d/f_10.npy", "d/f_12.npy", "d/f_13.npy"]));
         assert!(message.contains("f_10.npy is followed by f_12.npy: a frame seems to be missing"), "{message}");
-        assert!(message.contains("--allow-gaps"), "{message}");
+        assert!(message.contains("AllowGaps"), "{message}");
     }
 
     #[test]

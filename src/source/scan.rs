@@ -54,7 +54,10 @@ pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declar
 
 /// The range of all samples of an archive whose frames can be read again; none if all are missing. `declared` stands for a
 /// missing sample.
-pub(crate) fn value_range(
+///
+/// # Errors
+/// Frames that cannot be read.
+pub fn value_range(
     source: &mut dyn FrameSource,
     declared: Option<f64>,
     progress: &dyn Progress,

@@ -23,7 +23,7 @@ pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<
     let whole = archive.grid.whole();
     if !whole.contains(&selection.region) || selection.region.is_empty() {
         let [x, y, z] = archive.grid.dims;
-        return Err(Error::usage(format!("--region: not within the volume of {x}x{y}x{z} voxels, or empty")));
+        return Err(Error::setting("region", format!("not within the volume of {x}x{y}x{z} voxels, or empty")));
     }
     archive.grid = archive.grid.crop(&selection.region);
     archive.frames = selection.frames;

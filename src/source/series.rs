@@ -5,7 +5,7 @@ use super::frames::{Bytes, Frame, Frames};
 use super::layout::Shape;
 use super::spill_buffer::{SpillBuffer, Spool};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
 use std::mem;
@@ -38,7 +38,7 @@ impl Series {
     /// Reads the header of every file.
     pub(super) fn open(files: &Files, options: &OpenOptions) -> Result<Self> {
         let Some((first_path, rest)) = files.paths.split_first() else {
-            return Err(Error::usage("no input was given"));
+            return Err(Error::setting("inputs", "no input was given"));
         };
         let mut first = describe(first_path, options)?;
         let mut series = Self::of(&mut first, options);
@@ -95,7 +95,7 @@ impl Series {
             note_once(&mut self.archive.notes, note.clone());
         }
         let Some(frames) = self.archive.frames else {
-            return Err(Error::usage("the inputs have too many frames to count"));
+            return Err(Error::setting("inputs", "they have too many frames to count"));
         };
         if frames == files.times.len() {
             self.archive.times.clone_from(&files.times);
@@ -117,7 +117,7 @@ impl Series {
             self.drop_times("times are not all finite");
         } else if times.windows(2).any(|t| t[1] <= t[0]) {
             let what = "the times do not ascend; frames are taken in the order of the files, or of the list of them";
-            note_once(&mut self.archive.notes, what.into());
+            note_once(&mut self.archive.notes, what);
         }
     }
 
@@ -222,7 +222,7 @@ impl FrameSource for Series {
         let all = self.archive.frames.unwrap_or(0);
         let span = count.checked_sub(1).map_or(Some(0), |gaps| gaps.checked_mul(step)?.checked_add(1));
         let Some(end) = span.and_then(|span| first.checked_add(span)).filter(|end| *end <= all) else {
-            return Err(Error::usage(format!("{count} frame(s) from {first} were asked for, but there are {all}")));
+            return Err(Error::setting("frames", format!("{count} from {first} were asked for, but there are {all}")));
         };
         let mut window = Frames { shape: self.shape, bytes: Vec::new(), frames: Vec::new() };
         let mut spool = Spool::default();
@@ -247,7 +247,8 @@ fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     Ok(file)
 }
 
-fn note_once(notes: &mut Vec<String>, note: String) {
+fn note_once(notes: &mut Vec<Note>, note: impl Into<Note>) {
+    let note = note.into();
     if !notes.contains(&note) {
         notes.push(note);
     }
@@ -262,17 +263,17 @@ pub(super) fn override_grid(grid: &mut Grid, options: &OpenOptions) {
 /// Refuses a grid that cannot be drawn.
 pub(super) fn check_grid(grid: &Grid, options: &OpenOptions, path: &Path) -> Result<()> {
     if grid.spacing.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        let what = format!("the spacing {:?} is not positive", grid.spacing);
+        let what = format!("{:?} is not positive", grid.spacing);
         return Err(match options.spacing {
-            Some(_) => Error::usage(what),
-            None => Error::input(path, format!("{what}; --spacing gives another")),
+            Some(_) => Error::setting("spacing", what),
+            None => Error::input(path, Note::with(format!("the spacing {what}"), Remedy::Set("spacing"))),
         });
     }
     if grid.origin.iter().any(|o| !o.is_finite()) {
-        let what = format!("the origin {:?} is not finite", grid.origin);
+        let what = format!("{:?} is not finite", grid.origin);
         return Err(match options.origin {
-            Some(_) => Error::usage(what),
-            None => Error::input(path, format!("{what}; --origin gives another")),
+            Some(_) => Error::setting("origin", what),
+            None => Error::input(path, Note::with(format!("the origin {what}"), Remedy::Set("origin"))),
         });
     }
     Ok(())

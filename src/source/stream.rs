@@ -7,8 +7,9 @@ use super::layout::Shape;
 use super::series::{check_grid, override_grid};
 use super::spill_buffer::{SpillBuffer, read_some};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
+use crate::base::npy::MAGIC;
 use crate::base::output::STANDARD;
 use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
@@ -32,18 +33,18 @@ impl<R: Read> Stream<R> {
     /// Reads what comes before the first frame.
     pub(super) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
         let mut head = Vec::new();
-        let magic = npy::MAGIC.len() as u64;
+        let magic = MAGIC.len() as u64;
         reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;
-        let is_npy = head == npy::MAGIC;
+        let is_npy = head == MAGIC;
         let mut reader = Cursor::new(head).chain(reader);
         let (shape, frames, big_endian) = match (&options.dims, is_npy) {
             (Some(_), false) => headerless(&mut reader, options)?,
             (Some(_), true) => {
-                return Err(Error::usage("-: is an npy stream, which says its own --dims; leave them out"));
+                return Err(Error::setting("dims", "the npy stream says them itself; leave them out"));
             }
             (None, true) => numpy(&mut reader, options)?,
             (None, false) => {
-                return Err(Error::usage("-: is no npy stream; headerless data needs --dims NXxNYxNZ and --dtype"));
+                return Err(Error::path(STANDARD, Note::with("is no npy stream", Remedy::DescribeSamples)));
             }
         };
         let mut grid = Grid::unit(shape.dims());
@@ -94,9 +95,8 @@ impl<R: Read> Stream<R> {
         self.ended = true;
         let (frame, bytes) = (self.next, self.shape.frame_bytes());
         if got > 0 {
-            let what =
-                format!("ends inside frame {frame}: expected {bytes} bytes, got {got}; check --dims and --dtype");
-            return Err(Error::input(STANDARD, what));
+            let what = format!("ends inside frame {frame}: expected {bytes} bytes, got {got}");
+            return Err(Error::input(STANDARD, Note::with(what, Remedy::CorrectSamples)));
         }
         match self.archive.frames {
             Some(all) => Err(Error::input(STANDARD, format!("ends after {frame} of {all} frames"))),
@@ -138,7 +138,7 @@ impl<R: Read + Send> FrameSource for Stream<R> {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         let Some(skip) = first.checked_sub(self.next) else {
             let what = format!("frame {first} is over: a stream only goes forward, and frame {} comes next", self.next);
-            return Err(Error::usage(what));
+            return Err(Error::setting("frames", what));
         };
         self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
@@ -156,7 +156,7 @@ fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, O
     let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
     match skipped.map_err(|e| Error::io(STANDARD, "reading", e))? {
         n if n == options.offset => Ok((shape, frames, options.big_endian)),
-        n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the --offset of {}", options.offset))),
+        n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the offset of {}", options.offset))),
     }
 }
 

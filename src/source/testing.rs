@@ -102,11 +102,11 @@ pub(super) fn check_inputs(inputs: &[PathBuf], options: &OpenOptions, ty: Sample
     }
 }
 
-/// The message of an error that must come.
+/// The message of an error that must come, and its remedy.
 pub(super) fn message<T>(result: Result<T>) -> String {
     match result {
         Ok(_) => panic!("an error was expected"),
-        Err(e) => e.to_string(),
+        Err(e) => e.remedy().map_or(e.to_string(), |remedy| format!("{e}; {remedy:?}")),
     }
 }
 

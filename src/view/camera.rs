@@ -1,4 +1,24 @@
-//! The parallel camera of method.md section 2: world positions to pixels and depth.
+//! The parallel camera: world positions to pixels and depth.
+//!
+//! With azimuth a and elevation e, the view looks along `forward`, and `right` is forward x up:
+//!
+//! ```text
+//! forward = (sin a cos e, -cos a cos e, -sin e)
+//! up      = (sin a sin e, -cos a sin e,  cos e)
+//! right   = (-cos a, -sin a, 0)
+//! ```
+//!
+//! At a = e = 0 it looks along -y with z up. The azimuth turns counter-clockwise seen from +z. The roll turns the
+//! picture counter-clockwise. The camera maps a world position p to a pixel position and a depth ([`crate::method`],
+//! section 2):
+//!
+//! ```text
+//! x = W/2 + S right.(p - c)    y = H/2 - S up.(p - c)    z = forward.(p - c) - least over the corners     (eq 14)
+//! ```
+//!
+//! W and H are the size of the picture, S is pixels per world unit, and c is the world point in the middle of the
+//! picture. Pixel (a, b) has its centre at (a + 1/2, b + 1/2). Depths are at least 0: they count from the nearest
+//! corner of the grid.
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -47,13 +67,17 @@ const FIT: f64 = 0.9;
 impl Camera {
     /// The camera that shows `grid` as `view` asks.
     pub fn new(view: &View, grid: &Grid) -> Result<Self> {
-        let numbers = [view.azimuth, view.elevation, view.roll, view.scale.unwrap_or(1.0)];
         let center = view.center.unwrap_or_else(|| middle(grid));
-        if !numbers.iter().chain(&center).all(|n| n.is_finite()) || view.scale.is_some_and(|s| s <= 0.0) {
-            return Err(Error::usage("a view takes finite angles and positions, and a scale above 0"));
+        let numbers = [("azimuth", view.azimuth), ("elevation", view.elevation), ("roll", view.roll)];
+        let all = numbers.into_iter().chain(center.map(|n| ("center", n)));
+        if let Some((setting, _)) = all.into_iter().find(|(_, n)| !n.is_finite()) {
+            return Err(Error::setting(setting, "takes finite numbers"));
+        }
+        if view.scale.is_some_and(|scale| !(scale.is_finite() && scale > 0.0)) {
+            return Err(Error::setting("scale", "takes a finite number above 0"));
         }
         if view.size.iter().any(|n| *n == 0 || *n > MOST_PIXELS) {
-            return Err(Error::usage(format!("--size: a picture is 1 to {MOST_PIXELS} pixels wide and high")));
+            return Err(Error::setting("size", format!("a picture is 1 to {MOST_PIXELS} pixels wide and high")));
         }
         let [right, up, forward] = axes(view);
         let mut camera = Self { size: view.size, scale: 1.0, right, up, forward, center, nearest: 0.0 };
@@ -62,7 +86,8 @@ impl Camera {
         Ok(camera)
     }
 
-    /// The pixel position (x, y) and the depth z of a world position; z >= 0 in world units behind the nearest corner.
+    /// The pixel position (x, y) and the depth z of a world position (eq 14); z is in world units behind the nearest
+    /// corner.
     pub fn project(&self, position: [f64; 3]) -> [f64; 3] {
         let q = minus(position, self.center);
         [
@@ -98,7 +123,8 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of depth.
+    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of
+    /// depth.
     pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
         let far = corners(grid).map(size).fold(size(self.center), f64::max);

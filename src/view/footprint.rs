@@ -1,7 +1,25 @@
-//! The attenuated projection of the Gaussian kernel (method.md section 2), cut at a stated radius.
+//! The footprint: the projection of the attenuated Gaussian kernel, cut at a stated radius.
 //!
-//! f(x, y) = sx sy sz exp(tau^2 sigma^2 / 2) / (2 pi sigma^2) exp(-(x^2 + y^2) / (2 sigma^2)) is a product of one
-//! Gaussian along x and one along y, so a footprint is a row of weights times a column of weights.
+//! A voxel of value 1 at depth z adds the weight w to a pixel (x, y) pixels away from it. That is
+//! [Westover](crate::bibliography)'s splatting, with the attenuation of [Dobashi](crate::bibliography):
+//!
+//! ```text
+//! f(x, y) = integral over z of h(x, y, z) exp(-tau z)                                                     (eq 2)
+//!         = sx sy sz exp(tau^2 sigma^2 / 2) / (2 pi sigma^2) exp(-(x^2 + y^2) / (2 sigma^2))
+//! w = exp(-tau z) f(x, y)                                                                                 (eq 3)
+//! ```
+//!
+//! h is a Gaussian of standard deviation sigma, whose integral is the volume of a cell. Completing the square of -z^2 /
+//! (2 sigma^2) - tau z gives the factor exp(tau^2 sigma^2 / 2). f is a product of one Gaussian along x and one along y,
+//! so a footprint is a row of weights times a column of weights.
+//!
+//! The cut leaves out little. Take all voxels that lie more than R sigma to one side of a place. Seen from the place
+//! that is R sigma further to that side, each of them weighs at least exp(R^2 / 2) times as much, since (q + R)^2 >=
+//! q^2 + R^2 for q >= 0. A square cut has four sides, so
+//!
+//! ```text
+//! what lies beyond a cut at radius R sigma <= 4 exp(-R^2 / 2) * largest sum of w_i                        (eq 15)
+//! ```
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -28,9 +46,11 @@ impl Kernel {
     /// A sigma that is not above 0, a tau below 0, or either not finite.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
         let sigma = sigma.unwrap_or(Self::of_grid(grid).sigma);
-        let sensible = sigma.is_finite() && sigma > 0.0 && tau.is_finite() && tau >= 0.0;
-        if !sensible {
-            return Err(Error::usage("--sigma takes a number above 0, and --tau a number of 0 or more"));
+        if !(sigma.is_finite() && sigma > 0.0) {
+            return Err(Error::setting("sigma", "takes a number above 0"));
+        }
+        if !(tau.is_finite() && tau >= 0.0) {
+            return Err(Error::setting("tau", "takes a number of 0 or more"));
         }
         Ok(Self { sigma, tau })
     }
@@ -43,11 +63,8 @@ pub struct Method {
     pub name: &'static str,
     /// Where the kernel is cut, in standard deviations.
     pub radius: f64,
-    /// What of the largest sum of weights, anywhere in the plane of the picture, sums may be off by. Of footprints it is what
-    /// may lie beyond the cut: 4 exp(-R^2 / 2).
-    ///
-    /// For what lies more than R to one side of a place weighs there at most exp(-R^2 / 2) times what it weighs at the
-    /// place R further to that side, as (q + R)^2 >= q^2 + R^2 for q >= 0; and the cut has four sides.
+    /// How far a sum of weights may be off, as a share of the largest sum anywhere in the plane of the picture. For
+    /// footprints it is 4 exp(-R^2 / 2), what may lie beyond the cut (eq 15).
     pub stated_error: f64,
 }
 
@@ -86,7 +103,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Of a kernel seen at `scale` pixels per world unit, splatted by `method`.
+    /// The footprint of a kernel seen at `scale` pixels per world unit, splatted by `method` (eq 2).
     pub fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Result<Self> {
         let Kernel { sigma, tau } = kernel;
         let cell: f64 = grid.spacing.iter().product();
@@ -97,19 +114,20 @@ impl Footprint {
         let reach = (method.radius * in_pixels).max(1.0);
         let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
-            let what = "the kernel's weights are beyond numbers: choose another --sigma, --tau or --scale";
-            return Err(Error::usage(format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
+            let what = "the kernel's weights are beyond numbers: choose another sigma, tau or scale";
+            return Err(Error::setting("kernel", format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
         }
         Ok(Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) })
     }
 
-    /// The weight w = exp(-tau z) f(0, 0) that a voxel at depth `z` has at its centre.
+    /// The weight exp(-tau z) f(0, 0) that a voxel at depth `z` has at its centre (eq 3).
     pub fn at_depth(&self, z: f64) -> f64 {
         self.peak * libm::exp(-self.tau * z)
     }
 
-    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at depth `z`,
-    /// and each next one a `step` in pixels and in depth from the one before. They should not be much further than reach.
+    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at
+    /// depth `z`, and each next one a `step` in pixels and in depth from the one before. They should not be much
+    /// further than reach.
     pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
@@ -129,7 +147,7 @@ impl Footprint {
         sum
     }
 
-    /// What a weight so many pixels from a voxel is of the one at its centre.
+    /// The weight so many pixels from a voxel, as a share of the one at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
     pub fn share(&self, [x, y]: [f64; 2]) -> f64 {
         libm::exp(-self.decay * (x * x + y * y))
     }
@@ -159,7 +177,7 @@ impl Footprint {
         if first < end { first as usize..end as usize } else { 0..0 }
     }
 
-    /// The Gaussian factors at all pixels of `span`, as [`Self::span`] gave it for `centre`.
+    /// The Gaussian factors of eq 2 at all pixels of `span`, as [`Self::span`] gave it for `centre`.
     ///
     /// Each is the one before times a quotient that itself changes by a constant factor: two exponentials for a run.
     pub fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {

@@ -1,14 +1,16 @@
-//! The Haar basis, orthonormal on the samples of a window of any length.
+//! The basis of [Haar](crate::bibliography), orthonormal on the samples of a window of any length.
 //!
-//! Each step turns two neighbours, means of m1 and m2 samples, into a sum and a difference by the rotation
+//! Each step turns two neighbours, means of m1 and m2 samples, into a sum and a difference by a rotation:
 //!
 //! ```text
-//! s =  a x1 + b x2        a = sqrt(m1 / (m1 + m2))
-//! d =  b x1 - a x2        b = sqrt(m2 / (m1 + m2))
+//! s = a x1 + b x2    d = b x1 - a x2    a = sqrt(m1 / (m1 + m2))    b = sqrt(m2 / (m1 + m2))              (eq 17)
 //! ```
 //!
-//! which for m1 = m2 is Haar's own (x1 +- x2) / sqrt 2. An odd one at the end is carried up as it is; its smaller
-//! weight there keeps constants in one coefficient, so that a last, short window needs no invented frames.
+//! With m1 = m2 this is (x1 +- x2) / sqrt 2. A node without a neighbour at the end goes up unchanged. It keeps its
+//! smaller weight, so a constant series still has one coefficient, and a short last window needs no invented frames.
+//!
+//! Rotations keep sums of squares: the squared error of a series is the sum of the squares of what its coefficients
+//! lost (eq 6).
 
 use super::{LANES, Lane, TimeBasis};
 
@@ -33,6 +35,7 @@ impl Haar {
     }
 }
 
+/// a and b of eq 17.
 fn rotation(m1: f64, m2: f64) -> (f64, f64) {
     ((m1 / (m1 + m2)).sqrt(), (m2 / (m1 + m2)).sqrt())
 }

@@ -1,5 +1,8 @@
-//! An orthonormal basis of the window's own series: a few learned functions, completed by Haar functions (and, should some of these be sums of others, by single
-//! frames).
+//! An orthonormal basis of the window's own series: the principal components that the encoder found (eq 20).
+//!
+//! The file stores the first functions as 16-bit numbers. They are made orthonormal one after another, by the
+//! Gram-Schmidt process done twice, since once leaves rounding errors. Haar functions complete the basis. Where Haar
+//! functions depend on those before them, functions of single frames follow.
 
 use super::{Haar, LANES, Lane, TimeBasis, synthesis};
 
@@ -43,7 +46,7 @@ impl Learned {
     }
 }
 
-/// What of a function no row gives, with norm 1; none if that is next to nothing.
+/// The part of a function that is orthogonal to all rows, with norm 1; none if next to nothing is left.
 fn orthonormal(mut f: Vec<f64>, rows: &[Vec<f64>]) -> Option<Vec<f64>> {
     let before = dot(&f, &f);
     for row in rows.iter().chain(rows) {
@@ -97,7 +100,7 @@ impl TimeBasis for Learned {
     }
 }
 
-/// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last.
+/// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last (eq 5, or its transpose).
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
     let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();

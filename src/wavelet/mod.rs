@@ -1,7 +1,12 @@
-//! Temporal bases (method.md section 3): the series of one window to coefficients and back.
+//! Temporal bases: the series of one window to coefficients and back.
 //!
-//! Everything downstream only sees [`TimeBasis`]: a linear pair of transforms whose coefficients are ordered from
-//! coarse to fine. Series are transformed [`LANES`] voxels at a time, so that plain loops become vector code.
+//! ```text
+//! v(t_j) = sum over k of c_k u_k(t_j)                                                                     (eq 5)
+//! ```
+//!
+//! The rest of the crate only sees [`TimeBasis`]: a linear pair of transforms whose coefficients are ordered from
+//! coarse to fine. [`crate::method`], section 3, lists the bases. Series are transformed [`LANES`] voxels at a time, so
+//! that plain loops become vector code.
 
 mod haar;
 mod learned;
@@ -68,7 +73,8 @@ pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
     if fits && frames <= most {
         return Ok(());
     }
-    Err(Error::usage(format!("--window {frames}: the {kind:?} basis takes {rule}, at most {most}").to_lowercase()))
+    let problem = format!("the {kind:?} basis takes {rule}, at most {most}, not {frames}");
+    Err(Error::setting("window", problem.to_lowercase()))
 }
 
 /// The basis functions as numbers: `rows[k][t]` is u_k(t), with K rows of `frames` columns.
@@ -84,7 +90,7 @@ pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// The largest sum over k of |u_k(t)|: how much a change of 1/2 in every coefficient can move a sample, doubled.
+/// The largest sum over k of |u_k(t)| (eq 25). A change of at most e in every coefficient moves a sample by at most gain * e.
 pub fn gain(synthesis: &[Vec<f64>]) -> f64 {
     let frames = synthesis.first().map_or(0, Vec::len);
     (0..frames).map(|t| synthesis.iter().map(|u| u[t].abs()).sum()).fold(0.0, f64::max)

@@ -1,10 +1,29 @@
-//! The piecewise fractal multiwavelet of Geronimo, Hardin and Massopust on an interval (method.md section 3).
+//! The piecewise fractal multiwavelet of [GHM](crate::bibliography) on an interval.
 //!
-//! 2N + 1 functions on N unit intervals, one at each node and one at each midpoint; N is a power of two. The basis is
-//! orthonormal for functions; coefficients are scaled by sqrt 2 so that their squares are near those of samples. On
-//! samples, errors must be checked on samples.
+//! It has 2N + 1 functions on N unit intervals, one at each node and one at each midpoint; N is a power of two. Samples
+//! sit at nodes (even t) and midpoints (odd t). The prefilter makes the finest coefficients of samples s:
 //!
-//! A window of another length is continued by its last sample, inside this file only, up to the next 2N + 1.
+//! ```text
+//! node: s sqrt(2/3)    end node: s sqrt(1/3)    midpoint: (s + 3/10 (left + right)) 5/(4 sqrt 3)          (eq 18)
+//! ```
+//!
+//! One step turns the 2N + 1 coefficients of N intervals [node, midpoint, node, ..., node] into N + 1 coefficients of
+//! N/2 intervals and N wavelets, until N is 1. Its rows are orthonormal; q = sqrt 2:
+//!
+//! ```text
+//! midpoint (6, 8q, 6)/10q                    node (-1, -3q, 9, 10q, 9, -3q, -1)/20                        (eq 19)
+//! end node (10, 9, -3q, -1)/10q              end wavelet (-10, 9, -3q, -1)/10q
+//! even (-1, -3q, 9, -10q, 9, -3q, -1)/20     odd (-1, -3q, 9, 0, -9, 3q, 1)/10q
+//! ```
+//!
+//! A midpoint's row stands on the fine [midpoint, node, midpoint] of its interval, rows of seven on the fine functions
+//! around their coarse node, rows of four on the end and inwards from it. Straight lines have three coefficients.
+//!
+//! The basis is orthonormal for functions, not for samples. Coefficients are scaled by sqrt 2, which eq 18 includes, so
+//! that their squares are near those of samples: for 33 samples, the squared error of samples is 0.96 to 3.67 times the
+//! energy of dropped coefficients. So a bound on samples is checked on samples.
+//!
+//! A window of another length is continued by its last sample up to the next 2N + 1, inside this file only.
 
 use super::{LANES, Lane, TimeBasis};
 
@@ -105,7 +124,7 @@ enum Target {
     Wavelet(usize),
 }
 
-/// Calls `apply(target, first fine index, taps)` for every filter of one level with `intervals` fine intervals.
+/// Calls `apply(target, first fine index, taps)` for every row of eq 19 on a level with `intervals` fine intervals.
 #[inline(always)]
 fn for_each_filter(intervals: usize, mut apply: impl FnMut(Target, usize, &[f64])) {
     let reversed = |taps: [f64; 4]| [taps[3], taps[2], taps[1], taps[0]];
@@ -151,7 +170,7 @@ const END_SCALE: f64 = 0.577_350_269_189_625_8; // sqrt(1 / 3)
 /// c = (s + 3/10 (s_left + s_right)) * 5 / (4 sqrt 6) at a midpoint. Times sqrt 2.
 const MID_SCALE: f64 = 0.721_687_836_487_032_2; // 5 / (4 sqrt 3)
 
-/// Samples to the finest coefficients.
+/// Samples to the finest coefficients (eq 18).
 #[inline(always)]
 fn prefilter(values: &mut [Lane]) {
     for m in (1..values.len()).step_by(2) {
@@ -163,7 +182,7 @@ fn prefilter(values: &mut [Lane]) {
     for_each_node(values, |value, scale| *value *= scale);
 }
 
-/// The finest coefficients to samples.
+/// The finest coefficients to samples: the inverse of eq 18.
 #[inline(always)]
 fn undo_prefilter(values: &mut [Lane]) {
     for_each_node(values, |value, scale| *value /= scale);

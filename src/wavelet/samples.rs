@@ -1,4 +1,4 @@
-//! No transform along time: the samples are the coefficients.
+//! No transform along time: the samples are the coefficients, and u_k(t) is 1 at t = k and 0 elsewhere (eq 5).
 
 use super::{Lane, TimeBasis};
 

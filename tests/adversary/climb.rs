@@ -1,4 +1,4 @@
-//! Hill climbing: every voxel of an archive is a climber that changes its series so that the error it gets back grows.
+//! Hill climbing: every voxel of an archive changes its series so that the error of the decoded series grows.
 
 use super::Target;
 use crate::bounds::Trial;
@@ -10,13 +10,13 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::wavelet::Basis;
 
-/// Without a better series for so many rounds, a climber starts again elsewhere.
+/// After this many rounds without a better series, a climber restarts elsewhere.
 const PATIENCE: usize = 12;
 const ROUNDS: usize = 60;
 
 struct Climber {
     series: Vec<f64>,
-    /// The largest share of the bound that its error took.
+    /// The largest share of the bound that its error used.
     height: f64,
     stuck: usize,
 }
@@ -27,7 +27,7 @@ impl Climber {
         Self { series: vec![level; target.case.frames], height: 0.0, stuck: 0 }
     }
 
-    /// A series near its own: some samples moved by parts of the bound.
+    /// A series near its own: some samples moved by fractions of the bound.
     fn neighbour(&self, target: &Target, random: &mut Random) -> Vec<f64> {
         let (delta, frames) = (target.delta(), self.series.len());
         let size = delta * 0.5f64.powi(random.below(8) as i32 - 2);
@@ -44,7 +44,7 @@ impl Climber {
     }
 }
 
-/// Climbs for some rounds; returns the number of series that were tried and the highest share of the bound.
+/// Climbs for some rounds. Returns the number of series tried and the highest share of the bound.
 fn climb(target: &Target, seed: u64) -> (usize, f64) {
     let mut random = Random(seed);
     let mut climbers = Vec::from_iter((0..target.voxels()).map(|_| Climber::new(target, &mut random)));
@@ -70,7 +70,7 @@ fn climb(target: &Target, seed: u64) -> (usize, f64) {
     (tried, best)
 }
 
-/// What of the bound the errors of a series take, whose samples are at `places`.
+/// The share of the bound that the errors of a series use; its samples are at `places`.
 fn share(trial: &Trial, places: impl ExactSizeIterator<Item = usize>) -> f64 {
     let (frames, delta) = (places.len() as f64, trial.file.metadata().windows[0].delta);
     let errors = places.map(|at| (trial.source[at], (trial.found[at] - trial.source[at]).abs()));
@@ -106,7 +106,8 @@ fn no_climber_gets_over_the_bound() {
     for (n, ty) in (0..times()).flat_map(|_| TYPES).enumerate() {
         for (m, target) in targets(ty).into_iter().enumerate() {
             let (tried, best) = climb(&target, (n * 10 + m) as u64);
-            // They come near: what climbs is worth its time. A sampled bound moves with the data.
+            // The climbers must come near the bound, or the search would prove nothing. A sampled bound moves with the
+            // data.
             let near = if matches!(target.case.bound, Bound::Sampled { .. }) { 0.6 } else { 0.9 };
             assert!(best > near, "climbing is worth its time: {best} of the bound, {target:?}");
             series += tried;

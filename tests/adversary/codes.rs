@@ -1,4 +1,4 @@
-//! Series at the edges of codes, and of what may be dropped.
+//! Series at the edges of codes, and at the edge of what may be dropped.
 
 use super::{Target, inverse, targets};
 use crate::bounds::search;
@@ -7,26 +7,26 @@ use crate::common::tried;
 use std::time::Instant;
 use wavesplat::wavelet::{TimeBasis, synthesis};
 
-/// What a series is aimed at.
+/// The target of a series.
 #[derive(Debug, Clone, Copy)]
 enum Aim {
     /// Coefficients half a step from their codes.
     HalfSteps,
-    /// All of them to that side which moves one sample furthest.
+    /// All coefficients rounded to the side that moves one sample furthest.
     Aligned,
-    /// What codes give, and the bound up or down.
+    /// The decoded values of codes, plus or minus the bound.
     Delta,
     /// Multiples of half the bound or half the step.
     Multiples,
-    /// One coefficient whose loss moves a sample by just the bound.
+    /// One coefficient whose loss moves a sample by exactly the bound.
     Loss,
-    /// A constant, and one sample at just the bound from it.
+    /// A constant, with one sample at exactly the bound from it.
     Flash,
 }
 
 const AIMS: [Aim; 6] = [Aim::HalfSteps, Aim::Aligned, Aim::Delta, Aim::Multiples, Aim::Loss, Aim::Flash];
 
-/// A little to one side or the other, or neither.
+/// A small offset to either side, or none.
 fn nudge(x: f64, random: &mut Random) -> f64 {
     match random.below(7) {
         0 => x.next_up(),
@@ -96,7 +96,7 @@ impl Attack<'_> {
     }
 }
 
-/// Attacks with every aim; returns the number of series.
+/// Runs attacks with every aim. Returns the number of series.
 fn attack(target: &Target, seed: u64) -> usize {
     let basis = target.basis();
     let functions = synthesis(basis.as_ref());

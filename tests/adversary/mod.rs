@@ -1,6 +1,6 @@
-//! Series made to break a bound: they know the step, the basis and the bound that the encoder uses.
+//! Series made to break a bound, with knowledge of the encoder's step, basis and bound.
 //!
-//! What attacks may look inside; what judges may not: it is [`crate::bounds::Trial`], in exact arithmetic.
+//! The attack may look inside the library. The check may not: it is [`crate::bounds::Trial`], in exact arithmetic.
 
 mod climb;
 mod codes;
@@ -15,7 +15,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::codec::bound::Bound;
 use wavesplat::wavelet::{Basis, LANES, Lane, TimeBasis, basis};
 
-/// What is attacked: one window in one block, whose first two voxels pin the range.
+/// The attacked encoder: one window in one block, whose first two voxels fix the range.
 #[derive(Debug, Clone)]
 struct Target {
     case: Case,
@@ -24,7 +24,7 @@ struct Target {
 }
 
 impl Target {
-    /// With `frames` frames, and so many voxels besides the two that pin the range.
+    /// A target with `frames` frames, and this many voxels in addition to the two that fix the range.
     fn new(
         ty: SampleType,
         (lo, hi): (f64, f64),
@@ -53,7 +53,7 @@ impl Target {
         basis(self.case.basis, &[], self.case.frames)
     }
 
-    /// The samples of the archive whose voxels, after the two that pin the range, are these series.
+    /// The samples of an archive with these series, after the two voxels that fix the range.
     fn samples(&self, series: &[Vec<f64>]) -> Vec<u8> {
         assert_eq!(series.len(), self.voxels());
         let frame = |t: usize| [self.lo, self.hi].into_iter().chain(series.iter().map(move |s| s[t]));
@@ -61,7 +61,7 @@ impl Target {
         bytes(self.case.ty, &Vec::from_iter(all))
     }
 
-    /// The same with holes in the series.
+    /// Like the above, with missing samples in the series.
     fn punctured(&self, series: &[Vec<f64>], random: &mut Random) -> Vec<u8> {
         let mut samples = self.samples(series);
         let voxels = self.voxels() + 2;
@@ -73,7 +73,7 @@ impl Target {
         samples
     }
 
-    /// The step that the encoder takes; none if it stores the block exactly.
+    /// The step that the encoder chooses; none if it stores the block exactly.
     fn step(&self) -> Option<f64> {
         let rest = vec![vec![self.lo; self.case.frames]; self.voxels()];
         let file = self.case.trial(&self.samples(&rest)).file;
@@ -81,7 +81,7 @@ impl Target {
         Some(entries[0].stats.step).filter(|step| *step > 0.0)
     }
 
-    /// The distance from a value to the next that its type has, near the larger end of the range.
+    /// The distance from a value to the next one of the sample type, near the larger end of the range.
     fn ulp(&self) -> f64 {
         let largest = self.lo.abs().max(self.hi.abs());
         match self.case.ty {
@@ -93,7 +93,7 @@ impl Target {
     }
 }
 
-/// The samples that coefficients give.
+/// The samples that coefficients decode to.
 fn inverse(basis: &dyn TimeBasis, coefficients: &[f64]) -> Vec<f64> {
     let mut lanes: Vec<Lane> = coefficients.iter().map(|c| [*c; LANES]).collect();
     let mut series = vec![Lane::default(); basis.frames()];
@@ -101,7 +101,7 @@ fn inverse(basis: &dyn TimeBasis, coefficients: &[f64]) -> Vec<f64> {
     series.iter().map(|lane| lane[0]).collect()
 }
 
-/// Ranges within what a type has.
+/// Ranges that fit a sample type.
 fn ranges(ty: SampleType) -> Vec<(f64, f64)> {
     let (lo, hi, least) = extremes(ty);
     if !ty.is_float() {

@@ -1,4 +1,4 @@
-//! Short series whose very values are searched, and shrunk where one breaks its bound.
+//! Searches the values of short series, and shrinks a series that breaks its bound.
 
 use super::{Target, targets};
 use crate::bounds::search;
@@ -6,7 +6,7 @@ use crate::common::tried;
 use proptest::prelude::*;
 use std::time::Instant;
 
-/// A sample as halves of the bound, halves of the step and ulps away from the middle of the range.
+/// A sample as multiples of half the bound, half the step and ulps from the middle of the range.
 type Parts = (i8, i8, i8);
 
 fn value(target: &Target, step: f64, (deltas, steps, ulps): Parts) -> f64 {

@@ -18,7 +18,7 @@ fn below_an_ulp_every_bit_is_kept() {
             &Vec::from_iter((0..40 * 20).map(|i| if i < 40 { 1.0 + (i % 2) as f64 } else { 1.0 + random.unit() })),
         );
         for share in [1e-300, 1e-9, 0.1, 0.499, 0.999] {
-            // Samples in [1, 2] are an ulp apart: less than that leaves no other.
+            // Samples in [1, 2] are at least an ulp apart, so a smaller bound allows no other sample.
             for trial in kept(ty, Mask::None, 40, &samples, share * ulp).iter().step_by(2) {
                 assert_eq!(trial.found, trial.source, "{ty} {share}");
             }

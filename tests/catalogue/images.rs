@@ -1,4 +1,4 @@
-//! Pictures where sums are long, weights small, or values large.
+//! Pictures with long sums, small weights or large values.
 
 use crate::common::computed::Computed;
 use crate::common::memory::Memory;
@@ -18,7 +18,7 @@ use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 
-/// A sum that keeps what its roundings lose.
+/// A compensated sum, which keeps the rounding errors.
 #[derive(Default)]
 struct Sum {
     high: f64,
@@ -46,7 +46,7 @@ fn a_hundred_million_splats_in_one_pixel_are_summed_right() {
     let grid = Grid::unit(LONG);
     let sample = |_, voxel| [long_value([voxel % LONG[0], voxel / LONG[0] % LONG[1], voxel / (LONG[0] * LONG[1])])];
     let mut scene = FrameScene::new(Box::new(Computed::new(grid, SampleType::U8, 1, sample)), None);
-    // From the front, at tau 0: a weight depends on x and z alone, so that whole numbers can be summed along y.
+    // From the front, at tau 0: a weight depends on x and z alone, so the sums along y are sums of integers.
     let view = View { scale: Some(1.0 / 600.0), ..view(0.0, 0.0, [1, 1]) };
     let plain = looking(view, 0.0, Quantity::Emission, &grid, 1);
     let config = RenderConfig { kernel: Kernel::new(Some(300.0), 0.0, &grid).unwrap(), ..plain };
@@ -69,7 +69,7 @@ fn a_hundred_million_splats_in_one_pixel_are_summed_right() {
     assert!(off <= most, "{} for {expected}", found[0]);
 }
 
-/// Means by brute force with weights as their logarithms, which no depth makes vanish. None is background.
+/// Means by brute force. Weights are kept as logarithms, so that no depth makes them vanish. No pixel is background.
 fn deep_means(grid: &Grid, config: &RenderConfig, scale: f64, values: &[f64]) -> Vec<Option<f64>> {
     let (lattice, view) = of_reference(grid, config, scale);
     let shown = |v: &[usize; 3]| config.region.is_none_or(|r| (0..3).all(|a| (r.start[a]..r.end[a]).contains(&v[a])));
@@ -99,7 +99,7 @@ fn depths_beyond_an_exponential_are_right_or_refused() {
     let mut random = Random(18);
     let values = Vec::from_iter((0..1200).map(|_| random.unit()));
     let memory = archive(grid, SampleType::F64, &values);
-    let behind = Region { start: [0; 3], end: [4, 10, 3] }; // from the front, y grows towards the eye
+    let behind = Region { start: [0; 3], end: [4, 10, 3] }; // from the front, y grows towards the viewer
     let mut refused = Vec::new();
     for sigma in [0.3, 0.75, 3.0] {
         for depths in
@@ -140,7 +140,7 @@ fn depths_beyond_an_exponential_are_right_or_refused() {
 #[test]
 fn depths_of_less_than_nothing_or_without_end_are_refused() {
     for tau in [-1e-300, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert!(matches!(Kernel::new(None, tau, &SKEWED), Err(Error::Usage(what)) if what.contains("--tau")), "{tau}");
+        assert!(matches!(Kernel::new(None, tau, &SKEWED), Err(Error::Setting { setting: "tau", .. })), "{tau}");
     }
 }
 
@@ -148,7 +148,7 @@ fn depths_of_less_than_nothing_or_without_end_are_refused() {
 fn pixels_that_nothing_reaches_are_background_or_nothing() {
     let memory = archive(SKEWED, SampleType::F32, &field(&SKEWED, 3, 19));
     let file = stored(&mut memory.clone(), &settings(Basis::Haar, 4, 0.01));
-    // Half of the picture is far from the volume; then all of it.
+    // First half of the picture is far from the volume; then all of it.
     for (center, some) in [(None, true), (Some([1e4, 0.0, 0.0]), false)] {
         let view = View { scale: Some(1.0), center, ..view(30.0, 20.0, [120, 24]) };
         for quantity in [Quantity::Mean, Quantity::Emission] {
@@ -209,7 +209,7 @@ fn pictures_of_the_largest_samples_are_numbers() {
             let most = file.report.delta + report.views[0].stated_splat_error * range + rounding(*found);
             assert!(found.is_nan() || (f64::from(*found) - expected).abs() <= most, "{found} for {expected}");
         }
-        // What a single cannot hold is infinite, never background.
+        // A number that an `f32` cannot hold is infinite, never background.
         let emission = RenderConfig { quantity: Quantity::Emission, memory: MEMORY, ..config };
         let (found, _) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &emission);
         assert!(found.iter().all(|v| !v.is_nan()) && found.iter().any(|v| v.is_infinite()));

@@ -1,4 +1,4 @@
-//! Missing samples: NaN, infinities, declared values; where they are, and what is under them.
+//! Missing samples: NaN, infinities and declared values; their positions, and the values under the mask.
 
 use super::kept;
 use crate::common::memory::Memory;
@@ -16,7 +16,7 @@ use wavesplat::wavelet::Basis;
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
 const FRAMES: usize = 11;
 
-/// Every exponent of ones with any sign and fraction: NaN of both kinds, and infinities.
+/// Every bit pattern with all exponent bits set: quiet and signalling NaN, and infinities, of either sign.
 fn not_finite(ty: SampleType, random: &mut Random, infinite: bool) -> Vec<u8> {
     let fraction = if infinite { 0 } else { random.bits() | 1 };
     let sign = random.bits() & 1;
@@ -40,7 +40,7 @@ fn with_holes(ty: SampleType, infinite: bool) -> Vec<u8> {
     out
 }
 
-/// What comes back is compared bit for bit where the source is not finite, and is finite everywhere else.
+/// Samples that are not finite in the source must come back bit for bit; all others must be finite.
 #[test]
 fn nan_comes_back_with_its_payload_and_nowhere_else() {
     for ty in FLOATS {
@@ -62,7 +62,7 @@ fn infinities_come_back_with_their_sign_and_nowhere_else() {
 /// Voxel and frame.
 type Missing = fn([usize; 3], usize) -> bool;
 
-/// Faces, edges, corners, the ends of time, shells, and everything but them.
+/// Faces, edges, corners, the first and last frame, shells, and their complements.
 const BORDERS: [Missing; 10] = [
     |[x, _, _], _| x == 0,
     |[x, _, _], _| x == SKEWED.dims[0] - 1,
@@ -116,7 +116,7 @@ fn masks_that_touch_every_border_are_kept_and_not_shown() {
     }
 }
 
-/// Whatever stands in the holes: what is not missing comes back the same, and the pictures are the same.
+/// Values under the mask change neither the other samples nor the pictures.
 #[test]
 fn what_is_under_a_mask_changes_nothing_else() {
     let (memory, _, holes) = masked(|[x, y, z], t| (x * 7 + y * 3 + z * 5 + t * t) % 6 == 0 || x == 2);
@@ -144,7 +144,7 @@ fn what_is_under_a_mask_changes_nothing_else() {
     }
 }
 
-/// Also where the sample's type rounds the declared value.
+/// Includes types to which the declared value must be rounded.
 #[test]
 fn a_declared_value_widens_no_bound_and_an_undeclared_one_does() {
     for (ty, value) in
@@ -168,7 +168,7 @@ fn a_declared_value_widens_no_bound_and_an_undeclared_one_does() {
         let back = extracted(&file.open());
         let kept = (2..values.len()).step_by(5).all(|i| back[i * size..][..size] == memory.frames[i * size..][..size]);
         assert!(kept, "{ty} {value}");
-        // An ordinary number otherwise: it is part of the range, and so of the bound.
+        // If the value is not declared, it is an ordinary number: it is part of the range, and so of the bound.
         let file = stored(&mut memory.clone(), &settings(Basis::Haar, 16, 0.1));
         assert!(file.report.missing == 0 && file.report.delta >= 0.09 * value.abs());
     }

@@ -1,5 +1,5 @@
-//! The catalogue of numerical stability: what comes of every kind of difficult number. `tests/README.md` lists it row by
-//! row, and the test below holds it to that.
+//! The catalogue of numerical stability: the result for every kind of difficult number. `tests/README.md` lists it row
+//! by row, and a test below checks that list.
 
 mod arithmetic;
 mod images;
@@ -15,8 +15,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::sample::SampleType;
 
-/// Samples of voxels in a row, t slowest, with every basis and every bound: converts, extracts and compares exactly.
-/// Returns what came back.
+/// Converts, extracts and exactly compares samples of a row of voxels (t slowest), with every basis and every bound.
+/// Returns the extracted samples.
 fn kept(ty: SampleType, mask: Mask, voxels: usize, samples: &[u8], tolerance: f64) -> Vec<Trial> {
     let frames = samples.len() / (voxels * ty.size());
     let codings = BASES.map(|basis| BOUNDS.map(|bound| (basis, bound)));
@@ -36,7 +36,7 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files.filter(|p| p.extension().is_some_and(|e| e == "rs")).collect()
 }
 
-/// Every test below `tests/` by its full name.
+/// The full name of every test below `tests/`.
 fn tests() -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let mut names = Vec::new();

@@ -1,4 +1,4 @@
-//! How values run along time.
+//! Shapes of series along time.
 
 use super::kept;
 use crate::bounds::Trial;
@@ -25,7 +25,7 @@ fn neighbours_of_a_spike_keep_the_bound_of_the_range() {
         let samples = bytes(ty, &values);
         kept(ty, Mask::None, 10, &samples, 1e-3);
         kept(ty, Mask::None, 10, &samples, 1e-34);
-        // A range that leaves the spike out bounds its neighbours by theirs.
+        // A range without the spike gives its neighbours their own bound.
         for (basis, window) in windows(32) {
             let config = ConvertConfig { range: Some((-1e-3, 1e-3)), ..settings(basis, window, 0.01) };
             let file = stored(&mut Memory::new(Grid::unit([10, 1, 1]), ty, samples.clone()), &config);
@@ -42,7 +42,7 @@ fn constants_are_kept_exactly_or_in_one_coefficient() {
     for ty in TYPES {
         let (lo, hi, least) = extremes(ty);
         for value in [lo, hi, least, 1.0, 0.1, 0.0] {
-            // Without a range there is no room for an error.
+            // Without a range, no error is allowed.
             let trials = kept(ty, Mask::None, 40, &bytes(ty, &vec![value; 40 * 33]), 0.1);
             let of_range = |t: &&Trial| matches!(t.case.bound, Bound::Pointwise | Bound::Rms);
             trials.iter().filter(of_range).for_each(|t| assert_eq!(t.found, t.source));

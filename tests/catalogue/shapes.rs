@@ -1,4 +1,4 @@
-//! Sizes of axes, and types of samples that are not taken.
+//! Lengths of axes, and sample types that are not supported.
 
 use crate::cli::{Work, npy};
 use crate::common::samples::bytes;

@@ -1,4 +1,4 @@
-//! Single values: zeros, subnormals, the largest, and those that another type could not tell apart.
+//! Single values: zeros, subnormals, the largest numbers, and numbers that a narrower type could not distinguish.
 
 use super::kept;
 use crate::common::random::Random;
@@ -9,7 +9,7 @@ use wavesplat::codec::bound::Bound;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
 
-/// `frames` frames of 40 voxels.
+/// An archive with `frames` frames of 40 voxels.
 fn archive(ty: SampleType, frames: usize, value: impl FnMut(usize) -> f64) -> Vec<u8> {
     bytes(ty, &Vec::from_iter((0..40 * frames).map(value)))
 }
@@ -19,7 +19,7 @@ fn zeros_keep_their_sign_without_a_tolerance_and_their_bound_with_one() {
     for ty in FLOATS {
         let mut random = Random(6);
         let samples = archive(ty, 9, |_| [0.0, -0.0, 1.0][random.below(3)]);
-        // With a tolerance of 0, what comes back is compared bit for bit.
+        // With a tolerance of 0, samples are compared bit for bit.
         kept(ty, Mask::None, 40, &samples, 0.0);
         kept(ty, Mask::None, 40, &samples, 0.1);
         kept(ty, Mask::None, 40, &archive(ty, 9, |i| if i % 2 == 0 { 0.0 } else { -0.0 }), 0.5);
@@ -55,7 +55,7 @@ fn the_largest_numbers_do_not_overflow() {
             kept(ty, Mask::None, 40, &near, tolerance);
         }
     }
-    // The code of the largest double may stand for more than that.
+    // The code of the largest `f64` may decode to more than that.
     for tolerance in (1..200).map(|n| 1e-9 * f64::from(n) / 1.234) {
         let one = archive(SampleType::F64, 1, |i| if i == 1 { f64::MAX } else { 0.0 });
         kept(SampleType::F64, Mask::None, 40, &one, tolerance);
@@ -71,7 +71,7 @@ fn integers_reach_both_ends_of_their_range() {
         let (lo, hi, _) = extremes(ty);
         let mut random = Random(21);
         let all = archive(ty, 20, |_| [lo, lo + 1.0, hi - 1.0, hi, (lo + hi) / 2.0, 0.0][random.below(6)]);
-        let sure = 0.499 / (hi - lo); // whole numbers that are nearer than a half are the same
+        let sure = 0.499 / (hi - lo); // integers nearer than a half are equal
         for trial in kept(ty, Mask::None, 40, &all, sure).iter().step_by(2) {
             assert_eq!(trial.found, trial.source, "{ty}");
         }
@@ -88,7 +88,7 @@ fn doubles_are_not_rounded_to_singles() {
         let samples = archive(SampleType::F64, 33, |_| middle + width * random.signed());
         let trials = kept(SampleType::F64, Mask::None, 40, &samples, 1e-3);
         for trial in trials.iter().filter(|t| t.case.bound == Bound::Pointwise) {
-            // The bound itself is checked exactly; a single could not have told the samples apart.
+            // The bound itself is checked exactly; an `f32` could not distinguish the samples.
             let far = trial.found.iter().zip(&trial.source).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(far < 1e-2 * width && f64::from(middle as f32) == f64::from((middle + width) as f32));
         }

@@ -1,9 +1,9 @@
-//! Composites and largest values as pictures of the program.
+//! The programs' pictures of composites and largest values.
 
 use super::render::decode_png;
 use super::{Work, floats, read_npy};
 
-/// The header of an array of singles, and its numbers.
+/// The header of an array of `f32`, and its numbers.
 fn singles(work: &Work, name: &str) -> (String, Vec<f32>) {
     let (header, bytes) = read_npy(&work.read(name));
     (header, floats(&bytes))

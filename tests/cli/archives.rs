@@ -1,4 +1,4 @@
-//! Archives as others write them, from the outside: one command converts, one makes pictures, and what files say goes along.
+//! Archives written by other programs: one command converts them, one makes pictures, and their metadata is kept.
 
 use super::render::decode_png;
 use super::{Archive, Work};
@@ -67,12 +67,12 @@ fn what_is_ambiguous_is_listed_and_chosen() {
     work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
     work.wavesplat(&format!("info {source}")).fails(3, &listed);
     work.wavesplat(&format!("convert {source} -o a.wspl --variable density")).ok();
-    work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // it remembers which
+    work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // uses the variable that the file remembers
     work.wavesplat(&format!("convert {source} -o b.wspl --variable nothing")).fails(3, &["has no variable nothing"]);
     let order = input("hdf5/axes_xyzt.h5");
     work.wavesplat(&format!("convert {order} -o c.wspl --axes xyzt")).ok();
     work.wavesplat(&format!("verify c.wspl --against {order}")).ok();
-    work.wavesplat(&format!("convert {order} -o d.wspl --axes xyz")).fails(3, &["--axes xyz names 3"]);
+    work.wavesplat(&format!("convert {order} -o d.wspl --axes xyz")).fails(3, &["the axes xyz are 3", "--axes"]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Limits of the system on the size of files and on memory.
+//! System limits on the size of files and on memory.
 #![cfg(target_os = "linux")]
 
 use super::job::Job;
@@ -7,7 +7,7 @@ use crate::common::report;
 use std::io::{Read, Write};
 use std::time::Instant;
 
-/// Runs a command with ever larger limits on the size of a file, until it fits.
+/// Runs a command with larger and larger limits on the size of a file, until it succeeds.
 fn climb(job: &Job, step: usize) -> usize {
     for blocks in (0..).step_by(step) {
         job.reset();
@@ -44,7 +44,7 @@ fn under_any_limit_on_the_size_of_a_file_the_work_is_kept_and_resumed() {
     assert!(steps.iter().all(|steps| *steps > 4), "{steps:?}");
 }
 
-/// A GiB: a ramp, and every third frame noise.
+/// A GiB: a ramp, with noise in every third frame.
 struct Gibibyte {
     at: u64,
 }
@@ -76,7 +76,7 @@ fn a_gibibyte_goes_through_192_mib_and_back() {
     while source.at < FRAME * FRAMES {
         source.fill(&mut chunk);
         if input.write_all(&chunk).is_err() {
-            break; // its message is looked at
+            break; // the caller checks its message
         }
     }
     drop(input);

@@ -1,22 +1,22 @@
-//! Files of colours by the programs: what they say, refuse and go on with.
+//! Files of colours in the programs: reports, refusals and resuming.
 
 use super::{Archive, Run, Work, floats, npy, read_npy};
 
-/// An archive in `a.npy` of values beyond those of the colours, and a transfer function in `a.csv`, if it is needed.
+/// Writes an archive `a.npy` with values beyond the colour map's, and a transfer function `a.csv`.
 fn work() -> (Work, Archive) {
     let (work, archive) = (Work::new(), Archive::smooth([20, 14, 10], 40));
     work.write("a.npy", archive.npy());
     (work, archive)
 }
 
-/// The same, and a file of colours in `a.wspl`.
+/// Like the above, with a file of colours `a.wspl`.
 fn with_file(more: &str) -> (Work, Archive) {
     let (work, archive) = work();
     work.wavesplat(&format!("convert a.npy -o a.wspl --transfer-function rainbow --range -1,1.5 {more}")).ok();
     (work, archive)
 }
 
-/// The paper's map, red, green or blue: from blue over cyan, green and yellow to red.
+/// The red, green or blue of the paper's map: from blue over cyan, green and yellow to red.
 fn rainbow(value: f32, channel: usize) -> f64 {
     let share = ((f64::from(value) + 1.0) / 2.5).clamp(0.0, 1.0);
     let ramp = |from: f64, to: f64| ((share - from) / (to - from)).clamp(0.0, 1.0);
@@ -168,7 +168,7 @@ fn missing_samples_have_no_colour() {
     work.wavesplat(&format!("{convert} --missing-value -9998 --resume --missing mask")).fails(2, &["other settings"]);
 }
 
-/// Numbers of pixels of an `.npy`.
+/// The pixel values of an `.npy`.
 fn pixels(work: &Work, name: &str, shape: &str) -> Vec<f32> {
     let (header, bytes) = read_npy(&work.read(name));
     assert!(header.contains(shape) && header.contains("'<f4'"), "{header}");
@@ -226,7 +226,7 @@ fn damaged_channels_are_named_left_out_and_recovered() {
     let mut bad = file.clone();
     let blocks: Vec<usize> = file.windows(4).enumerate().filter(|(_, w)| w == b"BLCK").map(|(at, _)| at).collect();
     assert_eq!(blocks.len(), 5 * 3 * 3 * 2 * 2);
-    let lost = 12 + 5; // of the first window's second channel
+    let lost = 12 + 5; // in the first window's second channel
     let middle = blocks[lost].midpoint(blocks[lost + 1]);
     bad[middle..middle + 8].iter_mut().for_each(|byte| *byte ^= 0x55);
     work.write("bad.wspl", &bad);

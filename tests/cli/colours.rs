@@ -1,4 +1,4 @@
-//! Colour maps and their files, what is drawn into pictures, and files that hold all pictures of a run.
+//! Colour maps and their files, annotations in pictures, and files that hold all pictures of a run.
 
 use super::render::decode_png;
 use super::{Work, read_npy};

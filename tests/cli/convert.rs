@@ -1,4 +1,4 @@
-//! Every way in gives the same file, for any number of threads and any memory.
+//! Every kind of input gives the same file, for any number of threads and any memory budget.
 
 use super::{Archive, Work, npy, small};
 
@@ -20,7 +20,7 @@ fn the_file_does_not_depend_on_how_frames_are_stored() {
     let ways = [
         "all.npy",
         "frames",
-        "frames/f_*.npy", // no shell is between
+        "frames/f_*.npy", // no shell expands this
         &list,
         "big.npy",
         "all.raw --dims 20x14x10x40 --dtype f32",

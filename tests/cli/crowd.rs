@@ -1,11 +1,11 @@
-//! Several processes that want the same file at once: one gets it, the others say who has it.
+//! Several processes that write the same file at once: one succeeds, the others name the process that holds it.
 
 use super::job::{FILE, Job};
 use super::{Archive, Run};
 use crate::common::{report, times};
 use std::time::Instant;
 
-/// As many as there are lines, at once.
+/// Runs one process per command line, all at once.
 fn together(job: &Job, more: &[&str]) -> Vec<Run> {
     let children: Vec<_> = more.iter().map(|more| job.command("exec", more).spawn().unwrap()).collect();
     children.into_iter().map(|child| Run::of(&job.line, child.wait_with_output().unwrap())).collect()
@@ -17,7 +17,7 @@ fn of_many_conversions_to_one_file_one_wins() {
     let (started, mut held, mut existed) = (Instant::now(), 0, 0);
     for round in 0..25 * times() {
         job.reset();
-        let resumes = round % 3 == 2; // then the late ones find that all is done
+        let resumes = round % 3 == 2; // then the later ones find the file finished
         let runs = together(&job, &[if resumes { "--resume" } else { "" }; 8]);
         let winners = runs.iter().filter(|run| run.code == Some(0)).count();
         assert!(winners == 1 || resumes && winners > 1, "{runs:?}");
@@ -64,7 +64,7 @@ fn an_append_and_a_conversion_at_once_leave_what_one_of_them_makes() {
         let runs = [appending, converting].map(|c| Run::of("both", c.wait_with_output().unwrap()));
         let [appended, converted] = &runs;
         let found = work.read(FILE);
-        // The one may end before the other begins: then frames are added to another file than before.
+        // One may finish before the other starts. Then the second appends to a different file.
         match [appended.code, converted.code] {
             [Some(0), Some(2)] => assert!(append.is_done()),
             [Some(2 | 4), Some(0)] => assert!(found == other, "{runs:?}"),

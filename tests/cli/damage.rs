@@ -1,4 +1,4 @@
-//! Damaged coefficient files: code 3, the place, and never a wrong answer.
+//! Damaged coefficient files: exit code 3, the place, and never a wrong answer.
 
 use super::{Archive, Work};
 
@@ -52,7 +52,7 @@ fn longer_files_are_refused() {
 fn a_damaged_block_stops_what_needs_it_and_leaves_no_output() {
     let (work, file) = some_file();
     let mut bad = file.clone();
-    bad[file.len() / 3] ^= 0x10; // in a block: they are most of the file
+    bad[file.len() / 3] ^= 0x10; // in a block, because blocks make up most of the file
     work.write("bad.wspl", &bad);
     work.wavesplat("info bad.wspl").ok();
     work.wavesplat("verify bad.wspl").finds(3, &["bad.wspl", "block", "window"]);

@@ -1,4 +1,4 @@
-//! Inputs and outputs that fail: the code, a message with file, place and reason, and nothing left behind.
+//! Inputs and outputs that fail: the exit code, a message with file, place and reason, and no files left behind.
 
 use super::{Archive, Work, npy, npy_ordered, small};
 

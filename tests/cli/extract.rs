@@ -1,4 +1,4 @@
-//! Looking after a file: info, verify, extract.
+//! Using a file: info, verify and extract.
 
 use super::{Archive, Work, floats, npy, read_npy, small};
 

@@ -1,5 +1,5 @@
-// Preloaded into a program: its FAULT_AT-th operation on a file with a relative name goes wrong as FAULT_KIND says, and is
-// named in the file FAULT_LOG; with FAULT_AT=0 all of them are named and none goes wrong.
+// Preloaded into a program. Operation number FAULT_AT on a file with a relative name fails as FAULT_KIND says, and its
+// name is written to the file FAULT_LOG. With FAULT_AT=0 no operation fails and all are logged.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -34,7 +34,7 @@ static int is(const char *word) { return strcmp(kind, word) == 0; }
 static int held(int fd) { return at >= 0 && fd >= 0 && fd < 1024 && tracked[fd]; }
 static int named(const char *path) { return at >= 0 && path && path[0] && path[0] != '/'; }
 
-// Whether this operation is to go wrong.
+// Whether this operation must fail.
 static int due(const char *op) {
     long n = atomic_fetch_add(&calls, 1) + 1;
     int now = n == at || (n > at && at > 0 && is("always"));
@@ -52,7 +52,7 @@ static int failed(void) {
     return -1;
 }
 
-// Of so many bytes, those that are still moved.
+// The number of bytes, out of `count`, that are still moved.
 static size_t fewer(size_t count) { return is("short") ? count - (count > 1) : count / 2 + (count == 1); }
 static int shortens(void) { return is("short") || is("half") || is("torn"); }
 
@@ -94,7 +94,7 @@ int close(int fd) {
     int bad = held(fd) && due("close") && !shortens();
     if (held(fd)) tracked[fd] = 0;
     int done = real(fd);
-    return bad ? failed() : done; // closed all the same, as on Linux
+    return bad ? failed() : done; // closes the file in any case, as Linux does
 }
 
 static int opened(int (*real)(const char *, int, ...), const char *path, int flags, int mode) {

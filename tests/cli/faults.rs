@@ -1,5 +1,6 @@
-//! Every operation on files fails once, or from then on, moves fewer bytes, is interrupted, or is the last that is done: an
-//! error that names a file, nothing but whole files under final names, and the right bytes in the end.
+//! Every operation on files fails once or from then on, moves fewer bytes, is interrupted, or is the last before a
+//! kill. The program must report an error that names a file, leave only complete files under final names, and produce
+//! the right bytes after resuming.
 #![cfg(target_os = "linux")]
 
 use super::job::Job;
@@ -9,7 +10,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::time::Instant;
 
-/// A library to load before the programs', and what it says.
+/// A library to preload into the programs, and its log.
 struct Shim(Work);
 
 impl Shim {
@@ -20,27 +21,27 @@ impl Shim {
         Self(work)
     }
 
-    /// Runs a command in which the `at`th operation goes wrong, if there are so many.
+    /// Runs a command in which operation number `at` fails, if there are that many.
     fn run(&self, job: &Job, kind: &str, at: usize) -> Run {
         let (library, log) = (self.0.path("faults.so"), self.0.path("log"));
-        let _ = fs::remove_file(&log); // if it is there
+        let _ = fs::remove_file(&log); // if it exists
         let (library, log) = (library.display(), log.display());
         let shim = format!("exec env LD_PRELOAD={library} FAULT_LOG={log} FAULT_KIND={kind} FAULT_AT={at}");
         Run::of(&format!("{} with {kind} at {at}", job.line), job.command(&shim, "").output().unwrap())
     }
 
-    /// The names of the operations that were told of.
+    /// The names of the logged operations.
     fn operations(&self) -> Vec<String> {
         let log = fs::read_to_string(self.0.path("log")).unwrap_or_default();
         log.lines().map(|line| line.split(' ').nth(1).unwrap().into()).collect()
     }
 }
 
-/// Operations that may move fewer bytes than asked.
+/// Operations that may move fewer bytes than requested.
 const MOVING: [&str; 5] = ["read", "pread64", "write", "pwrite64", "copy_file_range"];
-/// Those that are tried again when they are interrupted.
+/// Operations that are retried when interrupted.
 const RETRIED: [&str; 7] = ["read", "pread64", "write", "open", "fsync", "fdatasync", "ftruncate64"];
-/// Ways to go wrong, and whether for operations that move bytes alone.
+/// The kinds of faults, and whether each applies only to operations that move bytes.
 const KINDS: [(&str, bool); 8] = [
     ("enospc", false),
     ("eio", false),
@@ -52,7 +53,7 @@ const KINDS: [(&str, bool); 8] = [
     ("torn", true),
 ];
 
-/// What each way of going wrong must come to.
+/// The required outcome of each kind of fault.
 #[track_caller]
 fn check(job: &Job, run: &Run, kind: &str, operation: &str) {
     let Run { args, code, err, .. } = run;
@@ -91,7 +92,7 @@ fn disturb(jobs: &[Job], least: usize) {
             }
             job.reset();
             let run = shim.run(job, kind.0, at);
-            let Some(operation) = shim.operations().pop() else { continue }; // with threads their number varies
+            let Some(operation) = shim.operations().pop() else { continue }; // with threads, the number of operations varies
             if !kind.1 || MOVING.contains(&operation.as_str()) {
                 check(job, &run, kind.0, &operation);
             }

@@ -6,10 +6,10 @@ use std::process::Command;
 use wavesplat::base::mapped::Access;
 use wavesplat::file::CoefficientFile;
 
-/// What is extracted of [`with_places`], and the file it makes.
+/// The part of [`with_places`] that is extracted, and the file it is written to.
 const PART: &str = "--frames 3:20:4 --region 5:17,:3,4:";
 
-/// The small archive as `a.wspl`, every bit of it, with places and times.
+/// The small archive as a lossless `a.wspl`, with positions and times.
 fn with_places() -> Work {
     let work = Work::new();
     let header = "NRRD0004\ntype: float\ndimension: 4\nspace dimension: 3\nsizes: 20 14 10 40\n\
@@ -20,7 +20,7 @@ fn with_places() -> Work {
     work
 }
 
-/// The part's samples.
+/// The samples of that part.
 fn part() -> Vec<u8> {
     let whole = small();
     Archive::of([12, 3, 6], 5, |x, y, z, t| whole.at([x + 5, y, z + 4], 3 + 4 * t)).bytes()
@@ -119,7 +119,7 @@ fn samples_keep_their_type_where_a_format_has_it() {
     }
 }
 
-/// The bytes of a normal half-precision number that a float has.
+/// The `f16` bytes of a number that is normal in half precision.
 fn half_of(value: f32) -> [u8; 2] {
     let bits = value.to_bits();
     (((bits >> 13) - ((127 - 15) << 10)) as u16).to_le_bytes()

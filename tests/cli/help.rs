@@ -1,4 +1,4 @@
-//! What the programs say about themselves.
+//! The programs' help texts.
 
 use super::{Run, Work};
 
@@ -13,7 +13,7 @@ fn every_command_has_help_with_examples() {
     assert!(run.text().contains("--splat-error"));
 }
 
-/// Two examples at least, after what the command does and before its options.
+/// Checks for at least two examples, after the description of the command and before its options.
 fn begins_with_examples(run: &Run) {
     let (before, help) = run.text().split_once("Examples:\n").unwrap();
     assert!(before.contains("Usage:") && !before.contains("--help"), "{before}");

@@ -1,4 +1,4 @@
-//! Programs that are asked to end: by Ctrl-C, or by whoever schedules them.
+//! Programs that are asked to end by Ctrl-C or by a scheduler.
 #![cfg(target_os = "linux")]
 
 use super::{Archive, Run, Work};
@@ -7,7 +7,7 @@ use std::io::Write;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-/// A program that runs with signals as a terminal's programs have them.
+/// A program that handles signals as if started from a terminal.
 fn start(work: &Work, line: &str) -> Child {
     let line = format!("exec env --default-signal=INT,TERM {line}");
     work.command("sh").args(["-c", &line]).spawn().unwrap()
@@ -18,7 +18,7 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-/// Waits until a file is there, with bytes in it if `filled`; false if the program ended before.
+/// Waits until a file exists, with bytes in it if `filled`. Returns false if the program ended first.
 fn appears(work: &Work, child: &mut Child, name: &str, filled: bool) -> bool {
     let started = Instant::now();
     while started.elapsed() < Duration::from_secs(60) {
@@ -46,7 +46,7 @@ fn a_conversion_from_a_slow_pipe_is_interrupted_and_resumed_to_the_same_bytes() 
     for (name, code) in [("INT", 130), ("TERM", 143)] {
         let mut child = start(&work, line);
         let mut pipe = child.stdin.take().unwrap();
-        pipe.write_all(&bytes[..bytes.len() / 2]).unwrap(); // and no more, for as long as it may take
+        pipe.write_all(&bytes[..bytes.len() / 2]).unwrap(); // the rest never comes
         assert!(appears(&work, &mut child, "a.wspl.part", true));
         signal(&child, name);
         let run = Run::of(line, child.wait_with_output().unwrap());
@@ -61,7 +61,7 @@ fn a_conversion_from_a_slow_pipe_is_interrupted_and_resumed_to_the_same_bytes() 
     }
 }
 
-/// Interrupts a program once a file is there; whether it was in time for that.
+/// Interrupts a program once a file exists. Returns whether the program was still running.
 fn interrupted(work: &Work, line: &str, name: &str, filled: bool) -> Option<Run> {
     (0..20).find_map(|_| {
         let mut child = start(work, &format!("{line} --force"));

@@ -1,4 +1,4 @@
-//! A command that is disturbed, what its files may be meanwhile, and how it is brought to its end.
+//! A command that is disturbed, the permitted states of its files, and how to bring it to its end.
 
 use super::{Archive, Run, Work};
 use std::fs;
@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 pub(super) struct Job {
     pub(super) work: Work,
     pub(super) line: String,
-    /// What completes what a disturbed run left.
+    /// The command that completes a disturbed run.
     again: String,
-    /// What a run says that went on after no more than there was before.
+    /// The message of a run that could resume nothing new.
     pub(super) before_alone: String,
-    /// The first output, if there is one before.
+    /// The initial output, if one exists before the run.
     before: Option<Vec<u8>>,
     pub(super) outputs: Vec<(String, Vec<u8>)>,
-    /// What an undisturbed run takes.
+    /// The duration of an undisturbed run.
     pub(super) duration: Duration,
 }
 
@@ -48,7 +48,7 @@ impl Job {
         job
     }
 
-    /// A conversion; `input` is `a.npy`, or `-` for what is in it.
+    /// A conversion. `input` is `a.npy`, or `-` for its content on standard input.
     pub(super) fn convert(archive: &Archive, input: &str, options: &str) -> Self {
         let work = Work::new();
         work.write("a.npy", archive.npy());
@@ -56,7 +56,7 @@ impl Job {
         Self::new(work, &format!("convert {input} -o {FILE} {options} {from}"), "--resume", &[FILE])
     }
 
-    /// The last frames added to a file of the first.
+    /// Appends the last frames to a file of the first ones.
     pub(super) fn append(archive: &Archive, first: usize, options: &str) -> Self {
         let work = Work::new();
         let of = |range: std::ops::Range<usize>| {
@@ -86,11 +86,11 @@ impl Job {
         }
     }
 
-    /// As before any run.
+    /// Restores the state before any run.
     pub(super) fn reset(&self) {
         for (name, _) in &self.outputs {
             for name in [name.clone(), format!("{name}.part")] {
-                let _ = fs::remove_file(self.work.path(name)); // if it is there
+                let _ = fs::remove_file(self.work.path(name)); // if it exists
             }
         }
         self.put_back();
@@ -107,7 +107,7 @@ impl Job {
         Run::of(&self.line, self.command("exec", more).output().unwrap())
     }
 
-    /// Whether its outputs are all there; each is as before or whole, nothing else.
+    /// Checks that each output is complete or as before the run. Returns whether all are complete.
     #[track_caller]
     pub(super) fn is_done(&self) -> bool {
         let is_whole = |(name, right): &(String, Vec<u8>)| {
@@ -119,7 +119,7 @@ impl Job {
         self.outputs.iter().filter(|output| is_whole(output)).count() == self.outputs.len()
     }
 
-    /// Brings what was disturbed to its end; what that run said.
+    /// Completes a disturbed run. Returns the message of the completing run.
     #[track_caller]
     pub(super) fn complete(&self) -> Option<Run> {
         let done = self.is_done();
@@ -128,7 +128,8 @@ impl Job {
         let known =
             |name: &str| self.outputs.iter().any(|(output, _)| output == name) || self.work_files().contains(&name);
         for name in self.work.names().iter().filter(|name| !known(name)) {
-            // Another name of the finished file is all that a run may leave that died between giving one and taking one.
+            // A run that dies between linking the final name and removing the old one may leave only a second name of
+            // the finished file.
             let same = done && name.strip_suffix(".part").is_some_and(known);
             assert!(same, "{}: left {name}", self.line);
         }

@@ -1,4 +1,4 @@
-//! Programs killed at any time: nothing under a final name but what belongs there, and the same bytes in the end.
+//! Programs killed at any time: only the right content under final names, and the same bytes in the end.
 #![cfg(unix)]
 
 use super::job::{FILE, Job};
@@ -13,11 +13,11 @@ use std::time::{Duration, Instant};
 struct Tally {
     rounds: usize,
     kills: usize,
-    /// Kills that the program did not outrun.
+    /// Kills that came before the program ended.
     hits: usize,
     /// Runs that completed a killed one.
     resumes: usize,
-    /// Those that found whole windows.
+    /// Of these, the runs that found complete windows.
     went_on: usize,
     verified: usize,
 }
@@ -27,7 +27,7 @@ impl Tally {
         job.reset();
         let kills = match random.below(20) {
             0 | 1 => 3,
-            2..=6 => 2, // the second one during a resume
+            2..=6 => 2, // the second kill hits a resume
             _ => 1,
         };
         for kill in 0..kills {
@@ -99,7 +99,7 @@ fn a_killed_append_leaves_the_file_and_is_resumed_to_the_same_bytes() {
         (12, "--window 4 --threads 1 --basis haar"),
         (9, "--window 9 --basis multi --bound rms"),
         (8, "--window 4 --transfer-function coolwarm --range -1,1.5 --basis haar"),
-        (13, "--window 5 --basis pyramid --tolerance 0"), // after a window that is short
+        (13, "--window 5 --basis pyramid --tolerance 0"), // after a short window
     ];
     let jobs = jobs.map(|(first, options)| Job::append(&archive(), first, options));
     rounds(&jobs, 90, 2);

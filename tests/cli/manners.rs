@@ -1,4 +1,4 @@
-//! What the programs say when they are not understood, and what they can say about themselves.
+//! The programs' messages for input that they do not understand, and their descriptions of themselves.
 
 use super::{CONVERT, RENDER, Work, small};
 

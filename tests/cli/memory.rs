@@ -1,11 +1,11 @@
-//! The budget holds: archives twenty times its size, under a limit of the system.
+//! Memory stays within the budget: archives of twenty times its size, under a limit of the system.
 #![cfg(target_os = "linux")]
 
 use super::Work;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
-/// What the programs may take besides `--memory`: code, stacks, the allocator's slack.
+/// Memory that the programs may take in addition to `--memory`: code, stacks and the allocator's overhead.
 const SLACK_MIB: usize = 40;
 
 /// A sparse archive with some structure in every frame.
@@ -36,7 +36,7 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
         format!("$WAVESPLAT convert big.raw --dims {x}x{y}x{z}x{t} {options} --memory {memory}MiB -o file.wspl");
     work.shell(&format!("{limit} exec {files}")).ok();
     let pipe = format!("$WAVESPLAT convert - --dims {x}x{y}x{z} {options} -o pipe.wspl");
-    let memory = work.shell(&format!("exec {pipe} --memory {memory}MiB < big.raw")).fails(2, &["--memory"]).mebibytes(); // the pipe takes a part
+    let memory = work.shell(&format!("exec {pipe} --memory {memory}MiB < big.raw")).fails(2, &["--memory"]).mebibytes(); // a pipe needs part of the budget
     let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
     work.shell(&format!("{limit} exec {pipe} --memory {memory}MiB < big.raw")).ok();
     assert!(work.read("file.wspl") == work.read("pipe.wspl"));

@@ -1,4 +1,4 @@
-//! The programs as programs: arguments, files, pipes, messages and exit codes.
+//! The programs from the outside: arguments, files, pipes, messages and exit codes.
 
 mod along;
 mod archives;
@@ -98,7 +98,7 @@ impl Work {
         Run::of(line, self.command("sh").args(["-c", line]).output().unwrap())
     }
 
-    /// A command in the folder, all its streams piped.
+    /// A command that runs in the folder with all its streams piped.
     fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
         command.current_dir(self.0.path()).env("WAVESPLAT", CONVERT).env("RENDER", RENDER);
@@ -115,7 +115,7 @@ impl Work {
     }
 }
 
-/// What a program left.
+/// The result of a program.
 #[derive(Debug)]
 pub(crate) struct Run {
     args: String,
@@ -137,7 +137,8 @@ impl Run {
         self
     }
 
-    /// It failed with this code, said all these words on standard error and nothing on standard output.
+    /// Asserts that it failed with this code, and printed all these words on standard error and nothing on standard
+    /// output.
     #[track_caller]
     pub(crate) fn fails(self, code: i32, words: &[&str]) -> Self {
         let Self { args, err, out, .. } = &self;
@@ -149,7 +150,8 @@ impl Run {
         self
     }
 
-    /// It failed with this code, and said all these words on standard error; what it found is on standard output.
+    /// Asserts that it failed with this code and printed all these words on standard error. Its findings are on
+    /// standard output.
     #[track_caller]
     pub(crate) fn finds(self, code: i32, words: &[&str]) -> Self {
         assert!(!self.out.is_empty(), "{}: nothing on standard output", self.args);
@@ -157,7 +159,7 @@ impl Run {
         found.fails(code, words)
     }
 
-    /// [`Self::fails`] or [`Self::finds`], as the program came to it.
+    /// [`Self::fails`] or [`Self::finds`], as the program requires.
     #[track_caller]
     fn fails_or_finds(self, code: i32, words: &[&str]) -> Self {
         if self.out.is_empty() { self.fails(code, words) } else { self.finds(code, words) }
@@ -171,7 +173,7 @@ impl Run {
         serde_json::from_slice(&self.out).unwrap()
     }
 
-    /// The MiB that a message about `--memory` asks for.
+    /// The MiB that a message about `--memory` requests.
     #[track_caller]
     fn mebibytes(&self) -> usize {
         let digits = self.err.split("MiB").next().unwrap().rsplit(' ').next().unwrap();
@@ -187,7 +189,7 @@ struct Archive {
     values: Vec<f32>,
 }
 
-/// Two windows, the second one short, of a volume with no two lengths the same.
+/// Two windows, the second one short, of a volume whose dimensions are all different.
 fn small() -> Archive {
     Archive::smooth([20, 14, 10], 40)
 }
@@ -233,21 +235,21 @@ impl Archive {
         npy("<f4", &format!("{z}, {y}, {x}"), &self.frame_bytes(frame))
     }
 
-    /// Writes one `.npy` a frame, named with the frame's number.
+    /// Writes one `.npy` per frame, named by the frame's number.
     fn write_frames(&self, work: &Work, folder: &str) {
         for frame in 0..self.frames {
-            work.write(&format!("{folder}/f_{frame}.npy"), self.frame_npy(frame)); // natural order, no zeros
+            work.write(&format!("{folder}/f_{frame}.npy"), self.frame_npy(frame)); // in natural order, without leading zeros
         }
     }
 
-    /// Largest less smallest value.
+    /// The largest value minus the smallest.
     fn range(&self) -> f32 {
         let [lo, hi] = [f32::min, f32::max].map(|pick| self.values.iter().copied().reduce(pick).unwrap());
         hi - lo
     }
 }
 
-/// An `.npy` file by hand.
+/// An `.npy` file, assembled here byte by byte.
 pub(crate) fn npy(descr: &str, shape: &str, samples: &[u8]) -> Vec<u8> {
     npy_ordered(descr, shape, "False", samples)
 }

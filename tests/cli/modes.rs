@@ -1,4 +1,4 @@
-//! The four bounds: what convert, info and verify say of them.
+//! The four bounds as convert, info and verify report them.
 
 use super::{Run, Work, small};
 use crate::common::memory::Memory;
@@ -47,7 +47,7 @@ fn every_bound_is_promised_reached_and_verified() {
         let against = json(&work, "verify a.wspl --against a.npy")["against"].clone();
         let share = windows.iter().map(|w| number(&w["share"])).fold(0.0, f64::max);
         let found = number(&against["largest_share_of_bound"]);
-        // Both are rounded up, each in its own way.
+        // Both are rounded up, each in a different way.
         assert!((found / share - 1.0).abs() < 1e-9, "{options}: {found} for {share}");
         let text = work.wavesplat("verify a.wspl --against a.npy").ok();
         assert!(text.text().contains(&format!("{name} bound kept")), "{}", text.text());
@@ -120,7 +120,7 @@ fn samples_outside_a_bound_give_code_4() {
     }
 }
 
-/// Block 5 of window 1 of an archive lies; what `verify --against` says to that.
+/// Block 5 of window 1 of an archive holds wrong samples. Returns the report of `verify --against`.
 fn verify_a_lie(lie: impl Fn(&mut EncodedBlock, &mut Metadata)) -> Run {
     let (work, archive) = (Work::new(), small());
     work.write("a.npy", archive.npy());

@@ -1,4 +1,5 @@
-//! Files that others change while they are read: noticed and named, or the result is that of one state of the file.
+//! Files that change while they are read: the change is reported by name, or the result is that of one state of the
+//! file.
 #![cfg(unix)]
 
 use super::{Archive, Run, Work};
@@ -9,7 +10,7 @@ use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::time::{Duration, Instant};
 
-/// What happens to a file.
+/// The kinds of changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Change {
     CutInHalf,
@@ -40,7 +41,7 @@ impl Change {
             Self::CutByOne => file().set_len(len - 1).unwrap(),
             Self::Emptied => file().set_len(0).unwrap(),
             Self::Longer => file().write_all_at(b"more", len).unwrap(),
-            // One page, which a reader sees as it was or as it is.
+            // One page, which a reader sees either before or after the change.
             Self::Overwritten => file().write_all_at(&[0x3f; 16], (len / 2) & !0xfff).unwrap(),
             Self::Replaced => fs::rename(work.path(format!("other_{name}")), &path).unwrap(),
             Self::Removed => fs::remove_file(&path).unwrap(),
@@ -48,7 +49,7 @@ impl Change {
     }
 }
 
-/// What a run said and left.
+/// The message and the outputs of a run.
 #[derive(Debug, PartialEq, Eq)]
 struct Outcome {
     code: Option<i32>,
@@ -56,7 +57,7 @@ struct Outcome {
     left: Option<Vec<u8>>,
 }
 
-/// A command, the file of it that is changed, and what it writes.
+/// A command, the input that is changed, and its output.
 struct Reading {
     work: Work,
     line: String,
@@ -88,7 +89,7 @@ impl Reading {
         self.kept.iter().for_each(|(name, bytes)| self.work.write(name, bytes));
     }
 
-    /// What the command says and leaves when nothing is changed meanwhile.
+    /// The message and output of an undisturbed run.
     fn result(&mut self) -> Outcome {
         let started = Instant::now();
         let run = self.work.shell(&self.line);
@@ -105,7 +106,7 @@ impl Reading {
         }
     }
 
-    /// The results of both states of the file.
+    /// The results for both states of the file.
     fn results(&mut self, change: Change) -> [Outcome; 2] {
         self.reset();
         change.apply(&self.work, self.victim);
@@ -150,7 +151,7 @@ fn what_changes_while_it_is_read_is_noticed_or_makes_no_difference() {
     report(&format!("{found:?} in {:.1?}", started.elapsed()));
 }
 
-/// Whether a run says of the file that it changed or is damaged, and leaves nothing.
+/// Whether a run reports that the file changed or is damaged, and leaves no output.
 fn noticed(run: &Outcome, change: Change, victim: &str) -> bool {
     let code = matches!(run.code, Some(3 | 4)) || run.code == Some(1) && change == Change::Removed;
     code && run.error.as_ref().is_some_and(|error| error.contains(victim)) && run.left.is_none()

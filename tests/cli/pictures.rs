@@ -1,4 +1,4 @@
-//! What pictures hold besides colours of 8 bits: 16 bits a channel, numbers as they are, and what made them.
+//! Pictures beyond 8-bit colours: 16 bits per channel, unchanged numbers, and provenance.
 
 use super::render::decode_png;
 use super::{Work, floats, read_npy};
@@ -7,7 +7,7 @@ use std::io::Cursor;
 
 const SIZE: &str = "--size 48x40";
 
-/// The levels of a PNG with 16 bits a channel, and how many channels it has.
+/// The levels of a PNG with 16 bits per channel, and its number of channels.
 fn decode_deep(bytes: &[u8]) -> (Vec<u16>, usize) {
     let reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
     let (colours, depth) = reader.output_color_type();
@@ -16,7 +16,7 @@ fn decode_deep(bytes: &[u8]) -> (Vec<u16>, usize) {
     (levels, colours.samples())
 }
 
-/// What a PNG says of itself.
+/// The description that a PNG holds.
 fn texts(bytes: &[u8]) -> BTreeMap<String, String> {
     let reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
     let texts = reader.info().uncompressed_latin1_text.iter();
@@ -104,7 +104,7 @@ fn a_png_says_what_made_it_and_nothing_else() {
     let of_error = texts(&work.read("e_one.png"));
     assert_eq!(of_error["wavesplat:shows"], "certified-error");
     assert_ne!(of_error["wavesplat:range"], "0.0,1.5");
-    // The same picture again, from what it says of itself.
+    // Makes the same picture again from its own description.
     let again = format!("--scale {} --center {}", said["wavesplat:scale"], said["wavesplat:center"]);
     assert!(decode_png(&render(&again, "again.png")) == decode_png(&one));
 }
@@ -160,7 +160,7 @@ fn an_exr_that_was_not_built_in_says_how_to_get_it() {
     assert_eq!(work.names(), ["a.npy", "a.wspl"]);
 }
 
-/// The channels of an OpenEXR file by their names, and its comments.
+/// The channels of an OpenEXR file by name, and its comments.
 #[cfg(feature = "exr")]
 fn decode_exr(bytes: &[u8]) -> (BTreeMap<String, Vec<f32>>, String) {
     use exr::prelude::*;

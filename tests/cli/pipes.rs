@@ -7,7 +7,7 @@ use std::process::Child;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Noise, which compresses to its own size: 32 MiB in one window.
+/// Noise, which does not compress: 32 MiB in one window.
 fn noise() -> Archive {
     Archive::of([64, 64, 64], 32, |x, y, z, t| {
         let i = (x + 64 * (y + 64 * (z + 64 * t))) as u32;
@@ -107,7 +107,8 @@ fn an_input_that_shrinks_under_a_map_is_named_and_gives_code_4() {
         }
         let line = format!("exec $WAVESPLAT convert {name} -o - --tolerance 0 --block 16 --memory 24MiB");
         let mut child = work.command("sh").args(["-c", &line]).spawn().unwrap();
-        // Once a byte came out, a window is being gathered; it cannot be done before its 32 MiB are taken from the pipe.
+        // After the first byte of output, a window is being gathered. It cannot finish before its 32 MiB are taken
+        // from the pipe.
         child.stdout.as_mut().unwrap().read_exact(&mut [0]).unwrap();
         let victim = if frames == 1 { work.path(name) } else { work.path("many/f_20.npy") };
         File::options().write(true).open(&victim).unwrap().set_len(200).unwrap();

@@ -1,15 +1,15 @@
-//! Progress for programs that watch.
+//! Progress reports for programs that watch.
 
 use super::{Archive, Run, Work};
 use serde_json::Value;
 
-/// The lines of a run's progress.
+/// The lines of progress that a run prints.
 fn lines(run: &Run) -> Vec<Value> {
     let lines = run.err.lines().filter(|line| line.starts_with('{'));
     lines.map(|line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"))).collect()
 }
 
-/// Every stage of a run counts up and ends with all done.
+/// Checks that every stage of a run counts up and ends complete.
 #[track_caller]
 fn counts(run: &Run, stages: &[&str]) {
     let lines = lines(run);

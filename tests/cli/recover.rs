@@ -1,4 +1,4 @@
-//! What is whole of a damaged file is saved and shown; what is not is named, and never shown for what it was.
+//! Recovery of damaged files: intact blocks are recovered and shown; lost blocks are named and never shown as data.
 
 use super::{Archive, Work, floats, read_npy};
 
@@ -107,16 +107,16 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
         let same = |(a, b): (&f32, &f32)| a.is_nan() && b.is_nan() || (a - b).abs() <= 1e-6;
         assert!(skipped.iter().zip(&masked).all(same), "{name}: as if the block's samples were missing");
     }
-    work.render("bad.wspl --frames 0 --size 40x40 -o first.npy").ok(); // the block is not in this frame
+    work.render("bad.wspl --frames 0 --size 40x40 -o first.npy").ok(); // this frame does not include the block
 }
 
 #[test]
 fn what_no_one_can_save_is_said() {
     let (work, file) = work();
     work.write("text.wspl", "hello\n".repeat(1000));
-    work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be saved"]);
+    work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be recovered"]);
     work.write("start.wspl", &file[..700]);
-    work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be saved"]);
+    work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be recovered"]);
     let mut newer = file.clone();
     newer[16] = 1; // a feature of a later version
     let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();

@@ -1,4 +1,4 @@
-//! Pictures in every format, and the two methods against each other.
+//! Pictures in every format, and the two methods compared with each other.
 
 use super::{Work, floats, read_npy, small};
 use std::collections::HashSet;
@@ -56,7 +56,7 @@ fn each_view_has_a_name_of_its_own() {
     run.fails(2, &["x%d.png", "2 views", "%v"]);
     work.render(&format!("a.wspl {SIZE} --orbit 2 -o -")).fails(2, &["one view"]);
     work.render(&format!("a.wspl {SIZE} --orbit 0 -o x%v.npy")).fails(2, &["--orbit"]);
-    // Nothing is written twice, nor over what is read.
+    // No output is written twice, or over an input.
     let twice = work.render(&format!("a.wspl {SIZE} --frames 1,11 --orbit 12 -o x%v%d.png --force"));
     twice.fails(2, &["x111.png", "twice"]);
     let twice = work.render(&format!("a.wspl {SIZE} --orbit 11 -o p%v.npy --error-image p%02v.npy --force"));

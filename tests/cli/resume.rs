@@ -1,4 +1,4 @@
-//! Files that are gone on with: those of killed runs, and finished ones to which frames are added.
+//! Resuming killed runs, and appending frames to finished files.
 
 use super::{Archive, Work, npy};
 
@@ -9,7 +9,7 @@ fn some_frames(archive: &Archive, range: std::ops::Range<usize>) -> Vec<u8> {
     npy("<f4", &format!("{}, {z}, {y}, {x}", range.len()), &bytes)
 }
 
-/// An archive of 40 frames that grow, whole and in pieces.
+/// An archive of 40 frames with growing values, complete and in pieces.
 fn work() -> (Work, Archive) {
     let (work, archive) = (Work::new(), Archive::smooth([20, 14, 10], 40));
     work.write("all.npy", archive.npy());
@@ -97,7 +97,7 @@ fn a_run_that_met_the_end_of_an_archive_does_not_go_on_where_that_has_grown() {
     work.wavesplat("convert few.npy -o few.wspl --window 8").ok();
     let file = work.read("few.wspl");
     let end = file.windows(4).position(|bytes| bytes == b"META").unwrap();
-    work.write("a.wspl.part", &file[..end]); // killed before it was finished
+    work.write("a.wspl.part", &file[..end]); // as if killed before it was finished
     work.wavesplat("convert all.npy -o a.wspl --window 8 --resume").fails(4, &["a.wspl", "has grown", "--frames 0:13"]);
     work.wavesplat("convert few.npy -o a.wspl --window 8 --resume").ok();
     assert!(work.read("a.wspl") == file);
@@ -112,7 +112,7 @@ fn frames_of_a_growing_archive_are_appended_by_number() {
     work.wavesplat("convert frames -o a.wspl --window 8 --frames 0:16 --region 2:18,:,1:9").ok();
     work.wavesplat("append a.wspl frames --frames 16:").ok();
     work.wavesplat("verify a.wspl --against frames --frames :").ok();
-    work.wavesplat("verify a.wspl --against frames").ok(); // all of them, since it has as many
+    work.wavesplat("verify a.wspl --against frames").ok(); // all frames, because the file has as many
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn what_does_not_belong_to_a_file_is_not_appended_and_leaves_it_as_it_is() {
     work.wavesplat("append a.wspl other.npy").fails(2, &["a.wspl", "another size"]);
     work.write("type.npy", npy("<f8", "2, 10, 14, 20", &[0; 2 * 2800 * 8]));
     work.wavesplat("append a.wspl type.npy").fails(2, &["a.wspl", "another type of samples: f32, now f64"]);
-    work.wavesplat("append a.wspl rest.npy --spacing 2,2,2").fails(2, &["a.wspl", "another --spacing"]);
+    work.wavesplat("append a.wspl rest.npy --spacing 2,2,2").fails(2, &["a.wspl", "another spacing"]);
     work.wavesplat("append a.wspl missing.npy").fails(1, &["missing.npy"]);
     work.wavesplat("append missing.wspl rest.npy").fails(1, &["missing.wspl"]);
     let mut nan = archive.clone();

@@ -12,14 +12,14 @@ fn archive() -> Archive {
     Archive::smooth([7, 6, 5], 10)
 }
 
-/// Feeds a conversion piece by piece, until it no longer wants any.
+/// Feeds a conversion piece by piece until it closes the pipe.
 fn fed<'a>(work: &Work, args: &str, pieces: impl Iterator<Item = (&'a [u8], Duration)>) -> Run {
     let mut child = work.command(CONVERT).args(args.split(' ')).spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
     for (piece, pause) in pieces {
         std::thread::sleep(pause);
         if input.write_all(piece).is_err() {
-            break; // its message is looked at
+            break; // the caller checks its message
         }
     }
     drop(input);

@@ -1,4 +1,4 @@
-//! Requests that make no sense: code 2, a message that names the option, nothing written.
+//! Invalid requests: exit code 2, a message that names the option, and no output.
 
 use super::{Work, small};
 
@@ -10,9 +10,9 @@ fn bad_values_of_convert_are_named() {
         ("--tolerance -1", &["--tolerance", "0 to 1"]),
         ("--tolerance nan", &["--tolerance", "0 to 1"]),
         ("--tolerance much", &["--tolerance"]),
-        ("--basis haar --window 30", &["--window 30", "haar", "32"]),
-        ("--window 0", &["--window 0"]),
-        ("--basis multi --window 32", &["--window 32", "multi", "33"]),
+        ("--basis haar --window 30", &["--window", "not 30", "haar", "32"]),
+        ("--window 0", &["--window", "not 0"]),
+        ("--basis multi --window 32", &["--window", "not 32", "multi", "33"]),
         ("--basis fourier", &["--basis", "haar", "multi"]),
         ("--range 2,1", &["--range", "lower"]),
         ("--range 1", &["--range", "2 numbers"]),
@@ -40,7 +40,7 @@ fn bad_values_of_convert_are_named() {
         ("--level 99", &["--level", "19"]),
         ("--threads 0", &["--threads"]),
         ("--dims 3x3x3", &["a.npy", "--dims"]),
-        ("--spacing 0,1,1", &["spacing", "positive"]),
+        ("--spacing 0,1,1", &["--spacing", "positive"]),
     ];
     for (options, words) in cases {
         work.wavesplat(&format!("convert a.npy -o a.wspl {options}")).fails(2, words);
@@ -60,17 +60,17 @@ fn bad_values_of_render_are_named() {
         ("--colormap jet", &["--colormap jet", "viridis", "turbo", "rainbow"]),
         ("--colormap maps.xml", &["--colormap maps.xml", ".json", ".csv"]),
         ("--range 2,1", &["--range", "lower"]),
-        ("--range 1,1", &["--range 1,1", "shows nothing"]),
+        ("--range 1,1", &["--range", "shows nothing", "not 1,1"]),
         ("--norm sqrt", &["--norm", "linear", "log"]),
-        ("--norm log --range=-1,1 --colormap grey", &["--norm log", "above 0", "--range"]),
+        ("--norm log --range=-1,1 --colormap grey", &["--norm", "above 0", "-1,1", "--range", "--norm linear"]),
         ("--annotate", &["--annotate", "npy", "--colormap"]),
         ("--annotate --format gray16", &["--annotate", "gray16", "no colours"]),
         ("--frames 99", &["--frames", "40"]),
         ("--region 0:21,:,:", &["--region", "20x14x10"]),
         ("--tau -1", &["--tau", "0 or more"]),
-        ("--sigma 0", &["--sigma"]),
-        ("--scale 0", &["scale"]),
-        ("--roll nan", &["finite"]),
+        ("--sigma 0", &["--sigma", "above 0"]),
+        ("--scale 0", &["--scale", "above 0"]),
+        ("--roll nan", &["--roll", "finite"]),
         ("--splat-error -1", &["--splat-error", "0 or more"]),
         ("--background red", &["--background", "ffffff"]),
         ("--format gif", &["--format", "png npy y4m rgb24 gray16"]),
@@ -89,7 +89,7 @@ fn an_ending_that_says_no_format_is_refused_with_those_that_do() {
     work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", "png npy y4m rgb24 gray16"]);
     work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);
     work.write("in.xyz", [7; 300]);
-    work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", "--dims", ".npy", ".nrrd", ".vti"]);
+    work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", "--dims", "--dtype", ".npy", ".nrrd", ".vti"]);
     work.piped("convert - -o b.wspl", &[7; 300]).fails(2, &["-:", "--dims"]);
     work.wavesplat("convert a.wspl -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "in.xyz"]);

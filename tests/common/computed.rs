@@ -1,4 +1,4 @@
-//! Archives whose samples are computed where they are read.
+//! Archives whose samples are computed when they are read.
 
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::{Grid, Region};

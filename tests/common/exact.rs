@@ -1,8 +1,8 @@
-//! Comparisons of differences with bounds in exact arithmetic: whole numbers of any length, in units of 2^-1074.
+//! Compares differences with bounds in exact arithmetic: integers of any length, in units of 2^-1074.
 
 use std::cmp::Ordering;
 
-/// A whole number, 64 bits a word, the least first.
+/// An integer of any length in 64-bit words, the least significant first.
 type Whole = Vec<u64>;
 
 /// |x| in units of 2^-1074; x is finite.
@@ -97,7 +97,7 @@ pub(crate) struct Limit {
     hi: f64,
 }
 
-/// Below this share of a bound, rounding in `f64` cannot be what decides.
+/// Below this share of a bound, rounding in `f64` cannot decide the comparison.
 const CLEAR: f64 = 1.0 - 1e-12;
 
 impl Limit {
@@ -106,17 +106,17 @@ impl Limit {
         Self { share: 1.0, tolerance, lo, hi }
     }
 
-    /// A plain number.
+    /// A bound given as a number.
     pub(crate) fn of(number: f64) -> Self {
         Self::range(1.0, 0.0, number)
     }
 
-    /// What a relative bound allows a sample: tolerance * max(|value|, floor).
+    /// The relative bound of a sample: tolerance * max(|value|, floor).
     pub(crate) fn relative(tolerance: f64, floor: f64, value: f64) -> Self {
         Self::range(tolerance, 0.0, value.abs().max(floor))
     }
 
-    /// A share of it.
+    /// A share of the bound.
     pub(crate) fn used(self, share: f64) -> Self {
         Self { share, ..self }
     }
@@ -157,7 +157,7 @@ impl Limit {
         self.share * self.tolerance * (self.hi - self.lo)
     }
 
-    /// share * tolerance as a whole number and the power of 2 that it is divided by.
+    /// share * tolerance as an integer and the power of 2 by which it is divided.
     fn factor(&self) -> (Whole, usize) {
         assert!(self.lo <= self.hi && [self.share, self.tolerance].iter().all(|f| (0.0..=1.0).contains(f)));
         let [(a, down), (b, further)] = [self.share, self.tolerance].map(parts);
@@ -173,7 +173,7 @@ fn exact_comparisons_see_the_last_bit() {
     assert!(Limit::of(1.0).holds(1.0, 0.0) && !Limit::of(1.0).holds(1.0, -5e-324));
     assert!(!Limit::of(0.0).holds(5e-324, 0.0) && Limit::of(5e-324).holds(5e-324, 0.0));
     assert!(Limit::of(1e-300).holds(0.0, -0.0));
-    // 0.1 is a little more than a tenth, 0.3 a little less than three.
+    // As floats, 0.1 is a little more than a tenth and 0.3 a little less than three tenths.
     assert!(Limit::range(0.1, 0.0, 3.0).holds(0.3, 0.0));
     assert!(!Limit::range(0.1, 0.0, 3.0).holds(0.1 * 3.0, 0.0));
     assert!(Limit::relative(0.25, 1.0, -8.0).holds(-6.0, -8.0) && !Limit::relative(0.25, 1.0, -8.0).holds(-5.9, -8.0));

@@ -6,7 +6,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, FrameSource, FrameWindow};
 
-/// An archive that is nowhere but in memory.
+/// An archive in memory.
 #[derive(Clone)]
 pub(crate) struct Memory {
     archive: Archive,

@@ -1,4 +1,4 @@
-//! What several topics share.
+//! Helpers that several topics share.
 
 pub(crate) mod computed;
 pub(crate) mod exact;
@@ -26,24 +26,24 @@ use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord, Writer};
 
-/// Plenty for every test.
+/// A memory budget that suffices for every test.
 pub(crate) const MEMORY: usize = 256 << 20;
 
-/// Every basis; those beyond the paper's come with a pyramid.
+/// Every basis; those that [Dobashi](wavesplat::bibliography) does not have come with a pyramid.
 pub(crate) const BASES: [Basis; 4] = [Basis::Haar, Basis::Multi, Basis::Samples, Basis::Learned];
 
-/// The paper's bases, and a window's length of `n`, or of one more where the basis asks for it, for every basis.
+/// Every basis with a window length of `n`, or `n + 1` if the basis needs it.
 pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
     BASES.map(|basis| (basis, n + usize::from(basis == Basis::Multi)))
 }
 
-/// Pointwise, missing samples kept.
+/// A pointwise bound; missing samples are kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
     let (coding, missing) = (basis.into(), MissingPolicy::Mask);
     ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..ConvertConfig::new(tolerance) }
 }
 
-/// A coefficient file in a folder of its own.
+/// A coefficient file in its own folder.
 pub(crate) struct Stored {
     folder: TempDir,
     pub(crate) report: ConvertReport,
@@ -71,7 +71,7 @@ pub(crate) fn stored(source: &mut dyn FrameSource, config: &ConvertConfig) -> St
     stored
 }
 
-/// A coefficient file one of whose blocks, (window, block), lies, and whose metadata goes along with it.
+/// A coefficient file in which one block, (window, block), holds wrong samples. The metadata is consistent with them.
 pub(crate) fn stored_with_a_lie(
     memory: &Memory,
     config: &ConvertConfig,
@@ -84,8 +84,9 @@ pub(crate) fn stored_with_a_lie(
     let mut writer = Writer::new(Vec::new(), file.id(), &metadata).unwrap();
     for window in 0..file.metadata().windows.len() as u32 {
         let times = metadata.times.get(file.window_range(window)).unwrap_or_default().to_vec();
-        let begun = WindowEnd::of_nothing(window);
-        let record = WindowRecord { number: window, window: metadata.windows[window as usize].with(&begun), times };
+        let begun = WindowEnd::empty(window);
+        let record =
+            WindowRecord { number: window, window: metadata.windows[window as usize].with_totals(&begun), times };
         writer.begin_window(record).unwrap();
         let (codec, frames) = (file.codec(window).unwrap(), file.window_range(window));
         let samples = memory.clone().window(frames.start, frames.len()).unwrap();
@@ -99,7 +100,7 @@ pub(crate) fn stored_with_a_lie(
             }
             writer.append(&encoded).unwrap();
         }
-        writer.end_window(&WindowEnd::of(window, &metadata.windows[window as usize])).unwrap();
+        writer.end_window(&WindowEnd::from_window(window, &metadata.windows[window as usize])).unwrap();
     }
     writer.finish().unwrap().0
 }
@@ -117,7 +118,7 @@ pub(crate) fn extracted_channel(file: &CoefficientFile, channel: usize) -> Vec<u
     out
 }
 
-/// All frames, all voxels, by the exact method, default kernel.
+/// All frames and voxels by the exact method with the default kernel.
 pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, frames: usize) -> RenderConfig {
     let kernel = Kernel::new(None, tau, grid).unwrap();
     let frames = (0..frames).collect();
@@ -136,18 +137,18 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
     }
 }
 
-/// The pictures, one after another.
+/// Renders the pictures, one after another.
 pub(crate) fn pictures(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, RenderReport) {
     let (pictures, _, report) = rendered(scene, config);
     (pictures, report)
 }
 
-/// The pictures, and their certified errors if those are asked for.
+/// Renders the pictures and, if requested, their certified errors.
 pub(crate) fn rendered(scene: &mut dyn Scene, config: &RenderConfig) -> (Vec<f32>, Vec<f32>, RenderReport) {
     rendered_if_it_can_be(scene, config).unwrap()
 }
 
-/// The same, or why it cannot be.
+/// Like the above; returns the error if rendering is refused.
 pub(crate) fn rendered_if_it_can_be(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -164,23 +165,23 @@ pub(crate) fn rendered_if_it_can_be(
     Ok((pictures, errors, report))
 }
 
-/// The frames of `memory` as they are.
+/// The unchanged frames of `memory`.
 pub(crate) fn direct(memory: &Memory, missing_value: Option<f64>) -> wavesplat::render::FrameScene {
     wavesplat::render::FrameScene::new(Box::new(memory.clone()), missing_value)
 }
 
-/// Says something on standard error, whether or not the test fails.
+/// Prints a line on standard error, whether or not the test fails.
 pub(crate) fn report(what: &str) {
     std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{what}\n")).unwrap();
 }
 
-/// How many times as much to try as usual: `WAVESPLAT_CASES`.
+/// The multiple of the usual number of cases to try: `WAVESPLAT_CASES`.
 pub(crate) fn times() -> usize {
     let asked = std::env::var("WAVESPLAT_CASES").ok();
     asked.map_or(1, |n| n.parse().unwrap_or_else(|_| panic!("WAVESPLAT_CASES={n}: takes a whole number")))
 }
 
-/// Says how many series were tried since `started`, and fails if they are fewer than `least` times [`times`].
+/// Reports how many series were tried since `started`; fails if there are fewer than `least` times [`times`].
 pub(crate) fn tried(series: usize, least: usize, started: Instant) {
     report(&format!("{series} series in {:.1?}", started.elapsed()));
     assert!(series >= least * times(), "only {series} series");

@@ -1,4 +1,4 @@
-//! Numbers to little-endian samples and back, without the library.
+//! Converts numbers to little-endian samples and back, without the library.
 
 use half::f16;
 use wavesplat::base::sample::SampleType;
@@ -15,7 +15,7 @@ pub(crate) const TYPES: [SampleType; 9] = [
     SampleType::F64,
 ];
 
-/// The nearest finite sample.
+/// Rounds a number to the nearest finite sample.
 pub(crate) fn append(ty: SampleType, value: f64, out: &mut Vec<u8>) {
     match ty {
         SampleType::U8 => out.push(value.round() as u8),
@@ -36,7 +36,7 @@ pub(crate) fn bytes(ty: SampleType, values: &[f64]) -> Vec<u8> {
     out
 }
 
-/// Exactly what the samples say.
+/// The exact values of samples.
 pub(crate) fn numbers(ty: SampleType, bytes: &[u8]) -> Vec<f64> {
     bytes.chunks_exact(ty.size()).map(|b| number(ty, b)).collect()
 }
@@ -55,7 +55,7 @@ fn number(ty: SampleType, b: &[u8]) -> f64 {
     }
 }
 
-/// A NaN with a payload, an infinity, or a negative NaN; floats only.
+/// A NaN with a payload, an infinity, or a negative NaN; for floats only.
 pub(crate) fn special(ty: SampleType, which: usize) -> Vec<u8> {
     match ty {
         SampleType::F16 => [0x7e12_u16, 0x7c00, 0xfc00, 0xfd01][which % 4].to_le_bytes().into(),
@@ -69,9 +69,9 @@ pub(crate) fn special(ty: SampleType, which: usize) -> Vec<u8> {
     }
 }
 
-/// The nearest half-precision number, of two the one whose last bit is 0: a search among all.
+/// The nearest half-precision number, with ties to the even one. Searches all numbers.
 fn nearest_half(value: f64) -> f16 {
-    let (mut low, mut high) = (0_u16, f16::MAX.to_bits()); // magnitudes grow with bits
+    let (mut low, mut high) = (0_u16, f16::MAX.to_bits()); // magnitudes grow with their bits
     while low < high {
         let middle = low + (high - low).div_ceil(2);
         if f64::from(f16::from_bits(middle)) <= value.abs() { low = middle } else { high = middle - 1 }

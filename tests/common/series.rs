@@ -1,10 +1,10 @@
-//! Series that are hard to keep a promise on.
+//! Series for which error bounds are hard to keep.
 
 use super::random::Random;
 use super::samples::{append, special};
 use wavesplat::base::sample::SampleType;
 
-/// How the values of a series run.
+/// The shape of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Constant,
@@ -21,7 +21,7 @@ pub(crate) enum Kind {
     Wave,
     BelowSingle,
     Steps,
-    /// Every voxel of another kind.
+    /// A different kind for every voxel.
     Mixed,
 }
 
@@ -47,7 +47,7 @@ pub(crate) const KINDS: [Kind; 15] = [
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Mask {
     None,
-    /// NaN and infinities here and there (floats only).
+    /// NaN and infinities at scattered samples (floats only).
     Special,
     /// This declared value, wherever it occurs.
     Declared(f64),
@@ -70,7 +70,7 @@ pub(crate) fn extremes(ty: SampleType) -> (f64, f64, f64) {
     }
 }
 
-/// The values of one series before they become samples; `offset` and `height` are those of the volume.
+/// The values of one series before conversion to samples; `offset` and `height` are those of the volume.
 fn values(
     kind: Kind,
     ty: SampleType,

@@ -33,7 +33,7 @@ pub(crate) fn archive(grid: Grid, ty: SampleType, values: &[f64]) -> Memory {
     Memory::new(grid, ty, bytes(ty, values))
 }
 
-/// What an archive's samples are.
+/// The values of an archive's samples.
 pub(crate) fn values(memory: &Memory, ty: SampleType) -> Vec<f64> {
     numbers(ty, &memory.frames)
 }
@@ -50,7 +50,7 @@ pub(crate) fn truth(
     images(&lattice, &view, values, missing)
 }
 
-/// The lattice and the view in the reference's own terms.
+/// The lattice and the view in the reference's terms.
 pub(crate) fn of_reference(grid: &Grid, config: &RenderConfig, scale: f64) -> (Lattice, camera::View) {
     let View { azimuth, elevation, roll, size: [width, height], center, .. } = config.views[0];
     let (sigma, tau) = (config.kernel.sigma, config.kernel.tau);
@@ -58,12 +58,12 @@ pub(crate) fn of_reference(grid: &Grid, config: &RenderConfig, scale: f64) -> (L
     (lattice, camera::View { azimuth, elevation, roll, width, height, scale, center, sigma, tau })
 }
 
-/// The largest absolute number that is one.
+/// The largest absolute value, without NaN.
 pub(crate) fn largest<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> f64 {
     numbers.into_iter().filter(|v| v.is_finite()).fold(0.0, |m, v| m.max(v.abs()))
 }
 
-/// What rounding to a picture's `f32` may have moved a number by: half a unit in its last place.
+/// The largest rounding error of a number stored in a picture's `f32`: half a unit in its last place.
 pub(crate) fn rounding(pixel: f32) -> f64 {
     f64::from(pixel.abs()) * 2f64.powi(-24) + 2f64.powi(-150)
 }

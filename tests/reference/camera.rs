@@ -1,4 +1,4 @@
-//! The parallel camera of method.md section 2.
+//! The parallel camera (eq 14).
 //!
 //! Azimuth a, elevation e and roll q are in degrees.
 //!

@@ -1,9 +1,9 @@
-//! Colours from the method alone: piecewise linear between points of values, those of the ends beyond them.
+//! Colours from the method alone: piecewise linear between points of values, constant beyond the first and last point.
 
-/// The red, green and blue, each 0 to 1, of a value.
+/// Red, green and blue of a value, each 0 to 1.
 pub(crate) type Point = (f64, [f64; 3]);
 
-/// The colour of a value that is there. Where two points have one value, the second holds from there on.
+/// The colour of a present value. If two points have the same value, the second applies from there on.
 pub(crate) fn colour(points: &[Point], value: f64) -> [f64; 3] {
     let mut found = points[0].1;
     for pair in points.windows(2) {

@@ -1,7 +1,7 @@
-//! From codes to samples, as `format/FORMAT.md` section 8 says, node by node.
+//! Decodes codes to samples as `format/FORMAT.md` section 8 says, node by node.
 //!
-//! Arithmetic is in `f64`. What the page asks for in 32-bit floats is rounded to `f32` after every operation: with more
-//! than twice the digits, rounding twice gives what rounding once does.
+//! Arithmetic is in `f64`. Results that FORMAT.md computes in 32-bit floats are rounded to `f32` after every
+//! operation. `f64` has more than twice the digits, so rounding twice gives the same as rounding once.
 
 /// The pyramid of a window's record; axes are 0 to 3.
 #[derive(Debug, Clone)]
@@ -13,7 +13,7 @@ pub(crate) struct Pyramid {
     pub(crate) single: bool,
 }
 
-/// A pass: its level, and the axis along which it adds nodes (none: the first one).
+/// A pass: its level, and the axis along which it adds nodes (none for the first pass).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pass {
     pub(crate) level: u32,
@@ -76,7 +76,7 @@ impl Pyramid {
         if self.single { f64::from(x as f32) } else { x }
     }
 
-    /// What a node of a pass is predicted to be.
+    /// The prediction of a node in a pass.
     fn prediction(&self, pass: Pass, extents: [usize; 4], node: [usize; 4], values: &[f64]) -> f64 {
         let Some(axis) = pass.axis else { return 0.0 };
         let even = 2 << pass.level;
@@ -100,7 +100,7 @@ impl Pyramid {
         sum.unwrap()
     }
 
-    /// All nodes from all codes of a block, pass after pass.
+    /// Computes all nodes from all codes of a block, pass after pass.
     pub(crate) fn decode(&self, extents: [usize; 4], step: f64, codes: &[i32]) -> Vec<f64> {
         let mut values = vec![f64::NAN; nodes(extents).count()];
         let mut codes = codes.iter();
@@ -132,7 +132,7 @@ pub(crate) fn nodes(extents: [usize; 4]) -> impl Iterator<Item = [usize; 4]> {
     })
 }
 
-/// The frames of one voxel from its coefficients, `haar`.
+/// The frames of one voxel from its `haar` coefficients.
 pub(crate) fn haar(coefficients: &[f64]) -> Vec<f64> {
     // The weights of the sums after each step, finest first.
     let mut weights = vec![vec![1.0_f64; coefficients.len()]];
@@ -158,7 +158,7 @@ pub(crate) fn haar(coefficients: &[f64]) -> Vec<f64> {
     sums
 }
 
-/// The frames of one voxel from its 2N + 1 coefficients, `multi`; all 2N + 1 of them.
+/// The frames of one voxel from its 2N + 1 `multi` coefficients; returns all 2N + 1.
 pub(crate) fn multi(coefficients: &[f64]) -> Vec<f64> {
     let intervals = (coefficients.len() - 1) / 2;
     let mut coarse = coefficients[..3].to_vec();

@@ -1,6 +1,6 @@
-//! The slow, obvious truth against which the library is tested.
+//! A slow and obvious reference implementation against which the library is tested.
 //!
-//! Written from `shared/method.md` alone, and `decode` from `format/FORMAT.md`: nothing here calls the library, and only
+//! Written from `src/method.md` alone, and `decode` from `format/FORMAT.md`: nothing here calls the library, and only
 //! `std` arithmetic is used.
 
 pub(crate) mod camera;

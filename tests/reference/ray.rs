@@ -1,5 +1,5 @@
-//! Colour and opacity along the ray, by brute force: slab by slab as method.md section 7 has it, and the integral that this
-//! tends to as slabs become thinner.
+//! Colour and opacity along the ray, by brute force: slab by slab (eq 29-31), and the integral of
+//! [Max](wavesplat::bibliography) that this tends to as slabs become thinner.
 //!
 //! ```text
 //! C = sum over slabs of  T (1 - exp(-kappa(g) l)) c(g)        T = product over the slabs before of  exp(-kappa(g) l)
@@ -10,10 +10,10 @@
 use super::camera::{Lattice, View, project};
 use std::f64::consts::PI;
 
-/// What a test sees through: red, green, blue and kappa of a value.
+/// The transfer function of a test: red, green, blue and kappa of a value.
 pub(crate) type Medium<'a> = &'a dyn Fn(f64) -> [f64; 4];
 
-/// A voxel that is not missing: x and y in world units from the pixel, depth, value.
+/// A voxel that is not missing: its x and y in world units from the pixel, depth and value.
 struct Voxel {
     squared: f64,
     z: f64,
@@ -22,7 +22,7 @@ struct Voxel {
 
 /// Slabs of a view.
 pub(crate) struct Cut {
-    /// Of each slab those of the voxels.
+    /// For each slab, the voxels' shares.
     shares: Vec<Vec<f64>>,
     least: f64,
 }
@@ -54,14 +54,15 @@ impl Rays<'_> {
         cell / (2.0 * PI * variance) * (-voxel.squared / (2.0 * variance)).exp()
     }
 
-    /// The depths that slabs are cut in: three deviations in front of the first voxels and behind the last.
+    /// The range of depths that is cut into slabs: from three deviations in front of the first voxels to three behind
+    /// the last.
     pub(crate) fn depths(&self) -> [f64; 2] {
         let depths = || self.lattice.corners().into_iter().map(|corner| project(self.lattice, self.view, corner)[2]);
         let ends = [depths().fold(f64::INFINITY, f64::min), depths().fold(f64::NEG_INFINITY, f64::max)];
         [ends[0] - 3.0 * self.view.sigma, ends[1] + 3.0 * self.view.sigma]
     }
 
-    /// What of every voxel's kernel is in each slab, front to back; the first and the last have no end.
+    /// The part of every voxel's kernel in each slab, front to back. The first and the last slab are unbounded.
     pub(crate) fn cut(&self, count: usize) -> Cut {
         let [from, to] = self.depths();
         let mut shares = Vec::new();
@@ -75,7 +76,7 @@ impl Rays<'_> {
         Cut { shares, least: 0.01 * (to - from) / count as f64 }
     }
 
-    /// Length and mean of the slabs at a pixel; those that are next to nothing thick do not count.
+    /// Length and mean of the slabs at a pixel. Slabs of almost no thickness are ignored.
     pub(crate) fn slabs(&self, pixel: [usize; 2], cut: &Cut) -> Vec<(f64, f64)> {
         let voxels = self.voxels(pixel);
         let mut slabs = Vec::new();
@@ -98,7 +99,7 @@ impl Rays<'_> {
         blend(self.slabs(pixel, cut).into_iter(), medium)
     }
 
-    /// The integral along the ray in so many steps, where the kernels add up to anything.
+    /// The integral along the ray in `steps` steps, where the sum of the kernels is not zero.
     pub(crate) fn integral(&self, pixel: [usize; 2], steps: usize, medium: Medium<'_>) -> [f64; 4] {
         let ([from, to], voxels) = (self.depths(), self.voxels(pixel));
         let (width, sigma) = ((to - from) / steps as f64, self.view.sigma);

@@ -1,15 +1,15 @@
-//! The bound of the paper's section 3.4 (method.md section 5, `sampled`), voxel by voxel.
+//! The bound of [Dobashi](wavesplat::bibliography), section 3.4 (eq 11-13), voxel by voxel.
 
 use super::camera::Lattice;
 
-/// A line of sight along `axis` (0, 1, 2) through a place in voxels; its own axis does not count.
+/// A line of sight along `axis` (0, 1, 2) through a place in voxels; the coordinate along that axis is ignored.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line {
     pub(crate) axis: usize,
     pub(crate) at: [f64; 3],
 }
 
-/// g of one frame on a line: the mean of the samples that are not missing, with the Gaussian weights of eq (9), tau = 0.
+/// g of one frame on a line: the mean of the samples that are not missing, with the Gaussian weights of eq 3, tau = 0.
 /// None if all that have any weight are missing. No voxel is too far away to count.
 pub(crate) fn mean(lattice: &Lattice, sigma: f64, line: &Line, values: &[f64], missing: &[bool]) -> Option<f64> {
     let (mut sum, mut weights) = (0.0, 0.0);

@@ -1,8 +1,8 @@
-//! Images by brute force: method.md section 2, every pixel times every voxel times every frame, kernel never cut.
+//! Images by brute force (eq 4 and 12): every pixel times every voxel times every frame, kernel never cut.
 
 use super::camera::{Lattice, View, project};
 
-/// Where the sum of weights is below this part of the view's largest, the weighted mean is background (eq 12).
+/// Where the sum of weights is below this part of the view's largest, the weighted mean is background (eq 16).
 pub(crate) const BACKGROUND: f64 = 0.01;
 
 /// The images of all frames, each [t][y][x] with y from the top of the image.
@@ -43,7 +43,7 @@ fn weight(lattice: &Lattice, view: &View, [x, y, z]: [f64; 3], a: usize, b: usiz
     (-view.tau * z).exp() * footprint(lattice, view, right, below)
 }
 
-/// Section 2, eq (1-4) and eq (12). `values` are [t][z][y][x].
+/// Eq 1-4 and eq 12. `values` are `[t][z][y][x]`.
 ///
 /// `missing` has one entry per value. A missing sample is absent: it counts neither in I nor in the sum of weights of its
 /// frame. The 1 % rule compares that frame's sum of weights with the largest that the view would have if none were missing.
@@ -185,7 +185,7 @@ mod tests {
         assert!((seen - held).abs() < 1e-9, "{seen} {held}");
     }
 
-    /// Eq (1) as it stands: the integral over the whole ray through a pixel of exp(-tau z) times the field of
+    /// Eq 1 as it stands: the integral over the whole ray through a pixel of exp(-tau z) times the field of
     /// three-dimensional kernels, by the midpoint rule on points in the world. The projection of voxels is not used.
     fn integral_along_the_ray(lattice: &Lattice, view: &View, values: &[f64], a: usize, b: usize) -> f64 {
         let Directions { d, r, u } = directions(view.azimuth, view.elevation, view.roll);

@@ -1,4 +1,5 @@
-//! The temporal bases of method.md section 3 as explicit matrices.
+//! The temporal bases as explicit matrices: [Haar](wavesplat::bibliography) (eq 17) and [GHM](wavesplat::bibliography)
+//! (eq 18 and 19).
 //!
 //! An analysis matrix A has one row per coefficient and one column per sample: c = A v. The synthesis matrix is its
 //! inverse: v = S c. Rows are ordered coarse to fine and, within a level, by time.
@@ -26,12 +27,12 @@
 //! all coefficients: the scaling functions [node, middle, node] of the one coarsest interval, then the wavelets of the
 //! level 2 -> 1, of 4 -> 2, ..., of N -> N/2. N = 1 (T = 3) has no level, only the prefilter.
 //!
-//! What method.md leaves to the reader, and what settled it. A coarse node's seven numbers stand on
+//! What eq 19 leaves to the reader, and what settled it. A coarse node's seven numbers stand on
 //! [mid, node, mid, NODE, mid, node, mid]: centred on the node, the coarse middles (54 - 48 - 6 = 0) and the neighbouring
 //! nodes (-9 + 18 - 9 = 0) are orthogonal to it. "Inward" mirrors the four numbers of the last end, because they are half
 //! of the symmetric seven. Orthonormality cannot settle SIGNS: they are as printed, the odd wavelet's read in order of
 //! increasing time, and both end wavelets have -10 on their end node. The coefficients are the prefilter's own: the factor
-//! sqrt 2 with which section 3 compares dropped energy and sample error is NOT applied.
+//! sqrt 2 of eq 18, which makes dropped energy comparable with sample error, is NOT applied.
 
 /// A matrix as a list of rows.
 pub(crate) type Matrix = Vec<Vec<f64>>;

@@ -1,15 +1,16 @@
-//! The fewest coefficients of method.md section 4, by trying every subset of them. For tiny series.
+//! The fewest coefficients that keep a series within a bound (eq 7), by trying every subset of them. For tiny series.
 //!
-//! Kept coefficients have their exact values: nothing is quantised, and none is adjusted to make up for dropped ones.
+//! Kept coefficients have their exact values: nothing is quantised, and none is adjusted to compensate for dropped
+//! ones.
 
 use super::transform::{Matrix, apply};
 
-/// What is compared with the bound.
+/// The error measure that is compared with the bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Measure {
-    /// The largest |error| over the samples (section 5, `pointwise`).
+    /// The largest |error| over the samples (eq 21).
     Largest,
-    /// The square root of the mean over the samples of the squared error (section 5, `rms`).
+    /// The square root of the mean over the samples of the squared error (eq 23).
     Rms,
 }
 
@@ -27,7 +28,7 @@ pub(crate) fn error(measure: Measure, samples: &[f64], found: &[f64]) -> f64 {
 pub(crate) struct Kept {
     /// Indices of the kept coefficients, ascending.
     pub(crate) indices: Vec<usize>,
-    /// The error that their reconstruction reaches.
+    /// The error of their reconstruction.
     pub(crate) error: f64,
 }
 

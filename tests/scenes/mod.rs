@@ -1,4 +1,4 @@
-//! Pictures of coefficients in random views against brute force on the source's own samples.
+//! Pictures of coefficients in random views, compared with brute force on the source's own samples.
 
 mod random;
 
@@ -18,7 +18,7 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, RenderReport, SplatSource};
 use wavesplat::view::footprint::Method;
 
-/// Everything that a picture follows from.
+/// All inputs of a picture.
 #[derive(Debug, Clone)]
 struct Scene {
     grid: Grid,
@@ -30,15 +30,16 @@ struct Scene {
     what: SplatSource,
 }
 
-/// What brute force says of a scene.
+/// The brute-force result for a scene.
 struct Truth {
     images: Images,
-    /// The largest sum of weights of any pixel if no sample were missing; and of any place, in the picture or not.
+    /// The largest sum of weights if no sample were missing: over the pixels, and over all places inside and outside
+    /// of the picture.
     largest_weight: f64,
     brightest: f64,
-    /// Of the samples that are in the picture's volume and not missing.
+    /// Range of the samples that are in the picture's volume and not missing.
     range: (f64, f64),
-    /// The largest absolute sample of the archive, and whether any is missing.
+    /// The largest absolute sample of the archive, and whether any sample is missing.
     largest: f64,
     masked: bool,
 }
@@ -71,7 +72,7 @@ impl Scene {
         (0..3).all(|a| (region.start[a]..region.end[a]).contains(&voxel[a]))
     }
 
-    /// The bound of every sample of a frame that the conversion promises.
+    /// The conversion's error bound for every sample of a frame.
     fn delta(&self, file: &CoefficientFile, frame: usize) -> f64 {
         let window = &file.metadata().windows[file.window_of(frame) as usize];
         match self.convert.bound {
@@ -80,7 +81,7 @@ impl Scene {
         }
     }
 
-    /// The largest sum of weights at the place of any voxel, whether or not that is in the picture.
+    /// The largest sum of weights at the place of any voxel, inside or outside of the picture.
     fn brightest(&self, scale: f64) -> f64 {
         let (lattice, view) = of_reference(&self.grid, &self.look, scale);
         let shown = self.grid.whole().iter().filter(|v| self.shows(*v));
@@ -93,7 +94,7 @@ impl Scene {
         places.iter().map(sum).fold(0.0, f64::max)
     }
 
-    /// Renders, compares every pixel, and returns what was compared.
+    /// Renders and compares every pixel. Returns the numbers of compared pixels.
     fn check(&self) -> Compared {
         let mut memory = Memory::new(self.grid, self.ty, self.samples.clone());
         let stored = stored(&mut memory, &self.convert);
@@ -130,11 +131,11 @@ impl Scene {
 #[derive(Debug, Clone, Copy, Default)]
 struct Compared {
     pixels: usize,
-    /// Not background.
+    /// Pixels that are not background.
     shown: usize,
-    /// Of these, compared with the bound and the stated splat error.
+    /// Of these, the pixels compared with the bound and the stated splat error.
     promised: usize,
-    /// Of these, compared with their certificates.
+    /// Of these, the pixels compared with their certificates.
     certified: usize,
 }
 
@@ -157,8 +158,9 @@ impl Truth {
         weight == 0.0 || weight < BACKGROUND * self.largest_weight
     }
 
-    /// Whether a pixel of means may be background or not. The exact method cuts, too; missing samples are splatted with
-    /// the cut; and where the cut can leave out all that there is, as far from the volume, there is no mean.
+    /// Whether a pixel of means may either be background or not. The exact method cuts the kernel, too; missing
+    /// samples are splatted with the cut kernel; and so far from the volume that the cut can omit everything, there is
+    /// no mean.
     fn is_border(&self, at: usize, report: &RenderReport) -> bool {
         let weight = self.images.weight[at];
         let stated = report.views[0].stated_splat_error;
@@ -173,13 +175,13 @@ impl Truth {
         }
     }
 
-    /// How far a pixel may be off before it is rounded.
+    /// The largest allowed error of a pixel before rounding.
     fn promise(&self, quantity: Quantity, at: usize, delta: f64, report: &RenderReport) -> f64 {
         let (lo, hi) = self.range;
         let magnitude = if lo <= hi { lo.abs().max(hi.abs()) } else { 0.0 };
         match quantity {
             Quantity::Emission => {
-                // What sums in f64 leave of coefficients where samples are missing.
+                // Rounding that sums in f64 leave where coefficients of missing samples are subtracted.
                 let left = if self.masked { 1e-15 * self.largest * self.brightest } else { 0.0 };
                 delta * self.images.weight[at] + report.views[0].stated_splat_error * magnitude * self.brightest + left
             }
@@ -190,7 +192,7 @@ impl Truth {
     }
 }
 
-/// Checks so many scenes times [`times`]; says which of them fail when all are done.
+/// Checks this many scenes times [`times`]. Reports the failing scenes at the end.
 fn check_all(limits: &Limits, count: u64) {
     let (started, mut all, mut failed) = (Instant::now(), Compared::default(), Vec::new());
     let count = count * times() as u64;
@@ -198,7 +200,7 @@ fn check_all(limits: &Limits, count: u64) {
         let scene = scene(limits, seed);
         match std::panic::catch_unwind(|| scene.check()) {
             Ok(compared) => all = all + compared,
-            Err(_) => failed.push(seed), // said why already
+            Err(_) => failed.push(seed), // the reason was already printed
         }
     }
     report(&format!("{count} scenes, {all:?}, in {:.1?}", started.elapsed()));

@@ -15,21 +15,21 @@ use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
 use wavesplat::wavelet::Basis;
 
-/// Which scenes are drawn.
+/// The ranges from which scenes are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     /// Sigma in units of the largest spacing.
     pub(super) sigma: (f64, f64),
-    /// Times the scale at which the volume fits.
+    /// Multiple of the scale at which the volume fits the picture.
     pub(super) scale: (f64, f64),
-    /// Whether the middle of the picture may be elsewhere than the middle of the volume.
+    /// Whether the centre of the picture may differ from the centre of the volume.
     pub(super) moved: bool,
-    /// Of tau times the depth of the volume.
+    /// Range of tau times the depth of the volume.
     pub(super) tau: f64,
 }
 
 impl Random {
-    /// Between two positive numbers, evenly in their logarithms.
+    /// A number between two positive numbers, uniform in its logarithm.
     fn about(&mut self, (lo, hi): (f64, f64)) -> f64 {
         lo * (hi / lo).powf(self.unit())
     }
@@ -43,7 +43,7 @@ impl Random {
     }
 }
 
-/// The scene of a seed.
+/// The scene for a seed.
 pub(super) fn scene(limits: &Limits, seed: u64) -> Scene {
     let mut random = Random(seed);
     let grid = grid(&mut random);
@@ -84,7 +84,7 @@ fn samples(grid: &Grid, ty: SampleType, frames: usize, random: &mut Random) -> (
         return (smooth, missing_value);
     }
     let kind = random.of(&KINDS);
-    // Doubles whose sums overflow are for the catalogue.
+    // `f64` samples whose sums overflow are tested in the catalogue.
     let huge = ty == SampleType::F64 && matches!(kind, Kind::AnyBits | Kind::NearTheLargest | Kind::Mixed);
     let kind = if huge { Kind::Noise } else { kind };
     (volume(kind, ty, mask, voxels, frames, random.bits()), missing_value)
@@ -111,7 +111,7 @@ fn look(grid: &Grid, frames: usize, limits: &Limits, random: &mut Random) -> Ren
     let plain = looking(view, tau, quantity, grid, frames);
     let widest = grid.spacing.iter().copied().fold(0.0, f64::max);
     let sigma = if random.one_in(3) { None } else { Some(widest * random.about(limits.sigma)) };
-    let sigma = sigma.filter(|sigma| sigma * tau < 30.0); // beyond 37 the kernel's weights are no numbers
+    let sigma = sigma.filter(|sigma| sigma * tau < 30.0); // beyond 37 the kernel's weights overflow
     let error = random.about((1e-8, 2e-2)) * if quantity == Quantity::Mean { 100.0 } else { 1.0 };
     RenderConfig {
         kernel: Kernel::new(sigma, tau, grid).unwrap(),

@@ -5,7 +5,6 @@ use wavesplat::base::error::Result;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
-use wavesplat::cli::{CommonArgs, ProgressKind, Size};
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
 use wavesplat::render::{Mode, Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::FrameSource;
@@ -14,19 +13,6 @@ use wavesplat::view::footprint::Kernel;
 
 /// Bytes that a conversion or a rendering may allocate.
 pub(crate) const MEMORY: usize = 512 << 20;
-
-/// What the programs' functions want of options, where there are none.
-pub(crate) fn quietly() -> CommonArgs {
-    CommonArgs {
-        config: None,
-        threads: None,
-        memory: Size(MEMORY),
-        progress: ProgressKind::None,
-        quiet: true,
-        verbose: false,
-        json: false,
-    }
-}
 
 /// Converts an archive to the file `path`, which is replaced.
 pub(crate) fn converted(source: &mut dyn FrameSource, config: &ConvertConfig, path: &Path) -> Result<ConvertReport> {

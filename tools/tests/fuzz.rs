@@ -91,8 +91,8 @@ fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
     let like = Reader::open(like).unwrap().metadata().clone();
     let window =
         Window { frames: 1, coefficients: 1, levels: vec![1], basis: Basis::Samples, ..like.windows[0].clone() };
-    let known = WindowEnd::of(0, &Window { missing: 0, coded: 0, outliers: 0, ..window.clone() });
-    let window = Window { pyramid: None, functions: Vec::new(), ..window }.with(&WindowEnd::of_nothing(0));
+    let known = WindowEnd::from_window(0, &Window { missing: 0, coded: 0, outliers: 0, ..window.clone() });
+    let window = Window { pyramid: None, functions: Vec::new(), ..window }.with_totals(&WindowEnd::empty(0));
     let metadata = Metadata { dims: [blocks, 1, 1], block_edge: 1, channels, ..like };
     let mut writer = Writer::new(Vec::new(), FileId([7; 16]), &metadata).unwrap();
     let mut compressor = Compressor::new(3).unwrap();
@@ -156,13 +156,13 @@ fn changes(corpus: &mut Corpus) {
             corpus.push((target, format!("{name}-twice"), [&[seed][..], &edit, &[4, 0, 16, 0, 5, 4]].concat()));
             corpus.push((target, format!("{name}-whole"), vec![seed]));
         }
-        corpus.push(("unfinished", name.clone(), vec![seed, 0xFF, 0xFF]));
-        corpus.push(("unfinished", format!("{name}-cut"), [&[seed, 20, 0][..], &edit].concat()));
+        corpus.push(("prefix", name.clone(), vec![seed, 0xFF, 0xFF]));
+        corpus.push(("prefix", format!("{name}-cut"), [&[seed, 20, 0][..], &edit].concat()));
         for how in 0..5 {
             let damage = [how, 40 + how, 0, 3, 100, 0, 20, 0];
-            corpus.push(("salvage", format!("{name}-{how}"), [&[seed, 0, 1][..], &damage].concat()));
+            corpus.push(("recovery", format!("{name}-{how}"), [&[seed, 0, 1][..], &damage].concat()));
         }
-        corpus.push(("salvage", format!("{name}-forged"), [&[seed, 1, 0][..], &edit].concat()));
+        corpus.push(("recovery", format!("{name}-forged"), [&[seed, 1, 0][..], &edit].concat()));
     }
     for basis in 0..5 {
         let settings = [4, 3, 2, 11, basis + 3, basis, basis % 4, basis, 3, 0, basis % 4, 0, 0, 2, basis % 3, 1];

@@ -1,22 +1,22 @@
-//! Codes to streams.
+//! Packs codes into streams.
 
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, cells, volume};
 use crate::bits::{BitWriter, put_varint};
 use crate::segments::{estimate_segments, pack_segments};
 
-/// Appends the packed codes of several boxes, which are in `codes` one after another, x fastest, then y, z, t.
+/// Packs the codes of several boxes. `codes` holds the boxes one after another, x fastest, then y, z, t.
 ///
 /// `boxes[i]` are the extents of a box along x, y, z, t. `FORMAT.md` specifies the bytes.
 pub fn pack_cells(codes: &[i32], boxes: &[[usize; 4]], out: &mut Vec<u8>) {
     let mut bits = Vec::new();
-    Streams::of(codes, boxes, &mut bits).finish(out);
+    Streams::collect(codes, boxes, &mut bits).finish(out);
     out.append(&mut bits);
 }
 
-/// About how many bytes [`pack_cells`] appends.
+/// Estimates how many bytes [`pack_cells`] appends.
 pub fn estimate_cells(codes: &[i32], boxes: &[[usize; 4]]) -> usize {
     let mut bits = Vec::new();
-    let packed = Streams::of(codes, boxes, &mut bits).estimate();
+    let packed = Streams::collect(codes, boxes, &mut bits).estimate();
     packed + bits.len()
 }
 
@@ -33,7 +33,7 @@ impl<'a> Streams<'a> {
         Self { significance, values: [const { Vec::new() }; SCALES], bits: BitWriter::new(bits) }
     }
 
-    fn of(mut codes: &[i32], boxes: &[[usize; 4]], bits: &'a mut Vec<u8>) -> Self {
+    fn collect(mut codes: &[i32], boxes: &[[usize; 4]], bits: &'a mut Vec<u8>) -> Self {
         let mut streams = Self::new(bits, boxes);
         for &extents in boxes {
             let (here, after) = codes.split_at(volume(&extents));
@@ -43,7 +43,7 @@ impl<'a> Streams<'a> {
         streams
     }
 
-    /// All streams one after another, and the length of each; ends the bits.
+    /// All streams one after another, and the length of each. Completes the bits.
     fn joined(self) -> (Vec<u8>, Vec<usize>) {
         let streams: Vec<Vec<u8>> = self.significance.into_iter().chain(self.values).collect();
         self.bits.finish();
@@ -56,13 +56,13 @@ impl<'a> Streams<'a> {
         pack_segments(&symbols, &lengths, out);
     }
 
-    /// About how many bytes they take.
+    /// Estimates how many bytes the streams take when packed.
     fn estimate(self) -> usize {
         let (symbols, lengths) = self.joined();
         lengths.len() + estimate_segments(&symbols, &lengths)
     }
 
-    /// A box.
+    /// Adds the codes of a box.
     fn add(&mut self, codes: &[i32], extents: [usize; 4]) {
         let mut grid = Grid::new(extents);
         let outside = vec![0; extents[0]];
@@ -82,7 +82,7 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// A row of cells; 8 that are zero amid zeros at once.
+    /// Adds a row of cells. Takes 8 cells at once if they and their neighbours are zero.
     fn add_row(&mut self, lines: [&[i32]; 4], significant: &[u8], activity: &[u8]) {
         for (i, (bytes, around)) in significant.chunks(8).zip(activity.chunks(8)).enumerate() {
             if bytes.iter().chain(around).all(|&byte| byte == 0) {
@@ -98,7 +98,7 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// The values of a cell.
+    /// Adds the values of a cell.
     fn add_cell(&mut self, lines: [&[i32]; 4], cell: usize, significant: u8, activity: u8) {
         let busy = usize::from(2 * ONES[usize::from(significant)] + activity / 2);
         let values = &mut self.values[usize::from(SCALE_OF[busy % ACTIVITIES])];
@@ -112,7 +112,7 @@ impl<'a> Streams<'a> {
     }
 }
 
-/// The symbol of a code that is not zero, its remaining bits written.
+/// The symbol of a nonzero code. Writes the value's low bits, if any.
 fn symbol(code: i32, bits: &mut BitWriter) -> u8 {
     let value = (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1);
     if value < LONG {
@@ -123,14 +123,14 @@ fn symbol(code: i32, bits: &mut BitWriter) -> u8 {
     (LONG + 4 * (low - 5) + (value >> low & 3)) as u8
 }
 
-/// The four lines of codes that a row of cells is made of, in the order of the significance bits.
+/// The four lines of codes that make up a row of cells, in the order of the significance bits.
 fn lines<'a>(codes: &'a [i32], extents: &[usize; 4], row: Row, outside: &'a [i32]) -> [&'a [i32]; 4] {
     let ([sx, sy, ..], [y, z]) = (*extents, row.whole);
     let line = |there: bool, skip: usize| if there { &codes[row.code + skip..][..sx] } else { outside };
     [line(true, 0), line(y, sx), line(z, sx * sy), line(y && z, sx * sy + sx)]
 }
 
-/// The significance bytes of a row, 8 at a time where all is zero.
+/// Computes the significance bytes of a row, in groups of 8.
 fn mark(lines: [&[i32]; 4], significant: &mut [u8]) {
     for (i, bytes) in significant.chunks_mut(8).enumerate() {
         let last = lines[0].len().min(16 * i + 16);

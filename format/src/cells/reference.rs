@@ -1,6 +1,6 @@
-//! The lattice codes of `FORMAT.md`, read as it is written there: slow, obvious, and with nothing from the other code.
+//! A reader of lattice codes that follows `FORMAT.md` literally. It is slow and obvious, and shares no code with the fast one.
 
-/// Bytes that are taken from the front.
+/// Reads bytes in order.
 struct Input<'a>(&'a [u8]);
 
 impl Input<'_> {
@@ -27,7 +27,7 @@ impl Input<'_> {
     }
 }
 
-/// A string of bits, taken from the front.
+/// Reads bits in order.
 struct Bits<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -44,7 +44,7 @@ impl<'a> Bits<'a> {
         Some(value)
     }
 
-    /// What follows the padding, if that is zero.
+    /// The bytes after the padding; fails unless the padding is zero.
     fn rest(mut self) -> Option<&'a [u8]> {
         while !self.at.is_multiple_of(8) {
             (self.take(1)? == 0).then_some(())?;

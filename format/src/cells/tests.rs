@@ -1,4 +1,4 @@
-//! Lattice codes: their bytes, their round trip, another reader of them, and bytes that lie.
+//! Tests of lattice codes: documented bytes, round trips, the reference reader and hostile bytes.
 
 use super::reference;
 use super::*;
@@ -40,8 +40,8 @@ fn hostile_codes_are_refused() {
     };
     assert!(change(0, 2).contains("2 significance bytes for 1 cells"));
     assert!(change(6, 9).contains("9 values for 8 codes"));
-    assert!(change(9, 0x10).contains("a segment of 4 where 3"));
-    assert!(change(9, 0x01).contains("a segment of 0"));
+    assert!(change(9, 0x10).contains("a segment of 4 symbols where 3"));
+    assert!(change(9, 0x01).contains("a segment of 0 symbols"));
     assert!(change(9, 0x0D).contains("too many"));
     assert!(change(10, 0x40).contains("lengths"));
     assert!(change(12, 228).contains("range"));
@@ -113,7 +113,7 @@ proptest! {
     }
 }
 
-/// Some boxes and their codes: all zero, sparse or dense, small or of any size.
+/// Random boxes and codes: all zero, sparse or dense, small or of any magnitude.
 fn boxes() -> impl Strategy<Value = (Vec<[usize; 4]>, Vec<i32>)> {
     let axis = || prop_oneof![1 => 0usize..2, 8 => 1usize..8, 1 => 15usize..36];
     let extents = (axis(), axis(), axis(), 0usize..5).prop_map(|(x, y, z, t)| [x, y, z, t]);

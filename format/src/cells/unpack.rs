@@ -1,16 +1,19 @@
-//! Streams to codes.
+//! Unpacks streams into codes.
 
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, SYMBOLS, cells, volume};
 use crate::bits::{BitReader, take_varint};
-use crate::bytes::{Check, ensure};
+use crate::bytes::{ParseResult, ensure};
 use crate::segments::unpack_segments;
 
-/// Fills `codes` with those of all boxes; returns how many are not zero.
+/// Fills `codes` with the codes of all boxes; returns how many are not zero.
 ///
 /// `boxes[i]` are the extents of a box along x, y, z, t.
+///
+/// # Errors
+/// The reason if `raw` does not follow the format, or `codes` does not have the length that `boxes` require.
 pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Result<usize, String> {
     let total = boxes.iter().map(volume).fold(0, usize::saturating_add);
-    ensure(total == codes.len(), || format!("boxes of {total} codes for {}", codes.len()))?;
+    ensure(total == codes.len(), || format!("boxes of {total} codes instead of {}", codes.len()))?;
     let mut streams = Streams::parse(raw, boxes.iter().map(cells).sum(), total)?;
     let mut rest = codes;
     for &extents in boxes {
@@ -21,10 +24,10 @@ pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Resu
     streams.finish()
 }
 
-/// Bytes behind the symbols, so that 8 can be looked at from each.
+/// Padding bytes after the symbols, so that 8 bytes can be read at every symbol.
 const BEHIND: usize = 8;
 
-/// Classes by the activity without x-1 (up to 24), 4 bits for each count of x-1 from 0 to 8.
+/// Classes for each activity without the neighbour at x-1 (up to 24): 4 bits for each count at x-1 from 0 to 8.
 static CLASSES_OF: [u64; 32] = {
     let mut table = [0; 32];
     let mut i = 0;
@@ -35,7 +38,8 @@ static CLASSES_OF: [u64; 32] = {
     table
 };
 
-/// The ones of each byte from the lowest, then the highest again and again: what goes there is put there last.
+/// Positions of the ones in each byte, lowest first. The highest is repeated to fill up; values are written from the last to
+/// the first, so the right one is written last.
 static PLACES: [[u8; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut byte = 1;
@@ -53,18 +57,18 @@ static PLACES: [[u8; 8]; 256] = {
 
 struct Streams<'a> {
     symbols: Vec<u8>,
-    /// The next symbol of each stream; lengths are powers of two, that lookups need no check.
+    /// Index of the next symbol of each stream. The lengths are powers of two, so that lookups need no bounds check.
     classes: [usize; 8],
     scales: [usize; SCALES],
     /// Where each stream ends.
     ends: [usize; CLASSES + SCALES],
     bits: BitReader<'a>,
-    /// Whether some symbol means nothing.
-    wrong: bool,
+    /// Whether an invalid symbol was found.
+    invalid: bool,
 }
 
 impl<'a> Streams<'a> {
-    fn parse(raw: &'a [u8], cells: usize, codes: usize) -> Check<Self> {
+    fn parse(raw: &'a [u8], cells: usize, codes: usize) -> ParseResult<Self> {
         let mut rest = raw;
         let (mut ends, mut sum) = ([0; CLASSES + SCALES], 0usize);
         for end in &mut ends {
@@ -79,21 +83,21 @@ impl<'a> Streams<'a> {
         let begin = |i: usize| if i == 0 { 0 } else { ends[i - 1] };
         let classes = std::array::from_fn(|class| begin(class.min(CLASSES)));
         let scales = std::array::from_fn(|scale| begin(CLASSES + scale));
-        Ok(Self { symbols, classes, scales, ends, bits: BitReader::new(rest), wrong: false })
+        Ok(Self { symbols, classes, scales, ends, bits: BitReader::new(rest), invalid: false })
     }
 
-    /// Every stream and the bits must have come to their end.
-    fn finish(self) -> Check<usize> {
+    /// Checks that every stream and the bits were used up; returns the number of nonzero codes.
+    fn finish(self) -> ParseResult<usize> {
         let next = self.classes[..CLASSES].iter().chain(&self.scales);
-        ensure(next.eq(&self.ends), || "streams do not have the lengths that their cells call for".into())?;
-        ensure(!self.wrong, || "a code out of range".into())?;
+        ensure(next.eq(&self.ends), || "the lengths of the streams do not match their cells".into())?;
+        ensure(!self.invalid, || "a code out of range".into())?;
         let left = self.bits.end()?.len();
         ensure(left == 0, || format!("{left} bytes too many"))?;
         Ok(self.ends[CLASSES + SCALES - 1] - self.ends[CLASSES - 1])
     }
 
-    /// A box.
-    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> Check {
+    /// Fills the codes of a box.
+    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> ParseResult {
         let (mut grid, plane) = (Grid::new(extents), extents[0] * extents[1]);
         let mut significant = vec![0; grid.cells[0]];
         let ahead = |bit: usize| bit % 2 + extents[0] * (bit / 2 % 2 + extents[1] * (bit / 4));
@@ -101,7 +105,7 @@ impl<'a> Streams<'a> {
         for row in grid.rows() {
             if row.y == 0 {
                 let planes = plane * (1 + usize::from(row.whole[1]));
-                codes[row.code..][..planes].fill(0); // while they are at hand
+                codes[row.code..][..planes].fill(0); // here, so that they are in the cache
             }
             let (around, counts) = grid.around(row);
             self.mark(around, counts, &mut significant);
@@ -111,9 +115,9 @@ impl<'a> Streams<'a> {
         Ok(())
     }
 
-    /// The significance bytes of a row, and how many ones each has.
+    /// Reads the significance bytes of a row, and counts the ones of each.
     ///
-    /// Every cell waits for the one before it, so runs of zeros amid zeros are taken at once.
+    /// Every cell depends on the one before it, so runs of zeros with zero neighbours are read together.
     fn mark(&mut self, around: &[u8], counts: &mut [u8], significant: &mut [u8]) {
         counts.fill(0);
         significant.fill(0);
@@ -139,7 +143,7 @@ impl<'a> Streams<'a> {
         self.classes = next;
     }
 
-    /// The values of a row of cells.
+    /// Reads the values of a row of cells.
     fn scatter(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: &[u8], around: &[u8], counts: &[u8]) {
         let mut before = 0;
         for (x, ((&byte, &around), &count)) in significant.iter().zip(around).zip(counts).enumerate() {
@@ -152,7 +156,7 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// The values of a cell: without a loop where none is long, for its end could not be foreseen.
+    /// Reads the values of a cell. Without long values it uses no loop, because a processor could not predict its end.
     #[inline(always)]
     fn scatter_cell(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: u8, scale: usize) {
         let next = self.scales[scale];
@@ -179,21 +183,21 @@ impl<'a> Streams<'a> {
         }
     }
 
-    /// The value of a symbol that has further bits.
+    /// Reads the value of a symbol that has low bits.
     fn long(&mut self, symbol: u8) -> u32 {
         let symbol = u32::from(symbol);
         if symbol >= SYMBOLS {
-            self.wrong = true;
+            self.invalid = true;
             return 0;
         }
         let low = (symbol - LONG) / 4 + 5;
         let value = (4 + symbol % 4) << low | self.bits.take(low);
-        self.wrong |= value == u32::MAX;
+        self.invalid |= value == u32::MAX;
         value
     }
 }
 
-/// How many of the next 8 cells, none of whose neighbours before has a code, are zero.
+/// How many of the next 8 cells are zero and have neighbours that are zero, counted up to the first that is not.
 #[inline(always)]
 fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
     let ahead = symbols.get(next..).and_then(|next| next.first_chunk::<8>()).unwrap_or(&[1; 8]);
@@ -202,7 +206,7 @@ fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
     any.trailing_zeros() as usize / 8
 }
 
-/// 1, 2, 3, ... as -1, 1, -2, ...
+/// Maps 1, 2, 3, ... to -1, 1, -2, ...
 fn unzigzag(value: u32) -> i32 {
     (value >> 1) as i32 ^ ((value & 1) as i32).wrapping_neg()
 }

@@ -1,7 +1,7 @@
-//! The way out of bincode: wincode, whose defaults are the same layout, reads and writes the same record.
+//! Replacing bincode is possible: wincode reads and writes the same record, because its defaults have the same layout.
 //!
-//! Its derive is a package of its own; records have no framing of fields, so nested tuples of the fields in their
-//! order, with variants as `u32`, are the same bytes.
+//! wincode's derive macro is a separate package, which is not used here. Records do not frame their fields, so nested
+//! tuples of the fields in order, with variants as `u32`, have the same bytes.
 
 use crate::testing::metadata;
 use crate::*;
@@ -14,7 +14,7 @@ type Coded = (u32, u32, Vec<u32>, Vec<i16>, Refined, f64, (f64, f64), u64);
 type Reached = (f64, f64, f64, f64, f64, f64, u64, u64, u64);
 type Record<B> = (Grid, Times, Tolerance<B>, Vec<(u64, u32, Coded, Reached)>, Vec<(String, String)>, String);
 
-/// A variant is its number and its fields.
+/// A variant as its number and its fields.
 fn record<B>(m: &Metadata, bound: B) -> Record<B> {
     let grid = (m.dims, m.spacing, m.origin, m.sample as u32, m.block_edge, m.channels);
     let times = (m.frames, m.times.clone(), m.variable.clone());
@@ -32,7 +32,7 @@ fn refined(p: &Pyramid) -> (Vec<u32>, u32, f64, f64, bool) {
     (p.order.iter().map(|axis| *axis as u32).collect(), p.stencil as u32, p.growth, p.most, p.single)
 }
 
-/// The first window without a pyramid, the second learned and refined.
+/// Metadata that uses every field: the first window has no pyramid, the second has a pyramid and a learned basis.
 fn every_field() -> Metadata {
     let mut metadata = Metadata { times: (0..7).map(f64::from).collect(), ..metadata() };
     let order = vec![Axis::Z, Axis::X];

@@ -1,4 +1,4 @@
-//! What is written is what is read.
+//! Files read back as they were written.
 
 use crate::testing::*;
 use crate::*;
@@ -27,7 +27,7 @@ fn files_round_trip() {
 #[test]
 fn windows_of_several_leaves_round_trip() {
     let mut metadata = Metadata { dims: [40, 30, 1], block_edge: 1, ..metadata() };
-    metadata.windows[1].missing = 1_000; // more than parts say is allowed: exact blocks hold missing samples too
+    metadata.windows[1].missing = 1_000; // may exceed the parts' counts: exact blocks hold missing samples too
     let blocks = blocks(&mut metadata, 3);
     let file = file(&metadata, &blocks);
     let reader = Reader::open(&file).expect("whole");

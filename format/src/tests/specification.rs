@@ -1,9 +1,9 @@
-//! `FORMAT.md` says what the code does: its tables of fields, its limits, its dump of a file.
+//! Checks `FORMAT.md` against the code: its tables of fields, its limits and its dump of a file.
 
 use crate::footer::{FOOTER, Footer};
 use crate::header::{HEADER, Header};
 use crate::leaf::LEAF_ENTRY;
-use crate::section::{Extent, FRAME, Owner, frame};
+use crate::section::{FRAME, SectionExtent, SectionId, frame};
 use crate::testing::*;
 use crate::*;
 use std::fmt::Write;
@@ -11,14 +11,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const TEXT: &str = include_str!("../../FORMAT.md");
 
-/// The rows of the first table after a heading, without its two first lines.
+/// The rows of the first table after a heading, without the table's head.
 fn table(heading: &str) -> Vec<Vec<&'static str>> {
     let after = TEXT.split_once(&format!("# {heading}\n")).expect("the heading").1;
     let lines = after.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
     lines.skip(2).map(|line| line.trim_matches('|').split('|').map(str::trim).collect()).collect()
 }
 
-/// Whether the table gives the record's layout: fields touch, fill it, and hold what they are said to.
+/// Checks that the table describes the record: fields are contiguous, fill the record and hold the expected values.
 fn check(heading: &str, record: &[u8], values: &[(&str, &[u8])]) {
     let mut at = 0;
     let mut values = values.iter();
@@ -54,7 +54,8 @@ fn the_header_is_as_specified() {
 
 #[test]
 fn the_footer_is_as_specified() {
-    let extent = |n: u32| Extent { offset: n.into(), stored_len: n + 1, raw_len: n + 2, checksum: u64::from(n) + 3 };
+    let extent =
+        |n: u32| SectionExtent { offset: n.into(), stored_len: n + 1, raw_len: n + 2, checksum: u64::from(n) + 3 };
     let footer = Footer { id: ID, total: 7, metadata: extent(10), root: extent(20), blocks: 8, leaves: 9 };
     let record = footer.encode();
     assert_eq!(record.len(), FOOTER);
@@ -72,7 +73,7 @@ fn the_footer_is_as_specified() {
 #[test]
 fn frames_and_entries_are_as_specified() {
     let (n8, n4, f8) = (|n: u64| n.to_le_bytes(), |n: u32| n.to_le_bytes(), |n: f64| n.to_le_bytes());
-    let record = frame(Owner::Metadata, &Extent { offset: 9, stored_len: 1, raw_len: 2, checksum: 3 });
+    let record = frame(SectionId::Metadata, &SectionExtent { offset: 9, stored_len: 1, raw_len: 2, checksum: 3 });
     assert_eq!(record.len(), FRAME);
     #[rustfmt::skip]
     check("Section frame", &record, &[("tag", b"META"), ("stored", &n4(1)), ("raw", &n4(2)), ("checksum", &n8(3))]);
@@ -127,11 +128,11 @@ fn limits_are_as_specified() {
         ("MAX_DIM", MAX_DIM), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
         ("MAX_ROOT_RAW", MAX_ROOT_RAW),
     ];
-    let said: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
-    assert_eq!(said, limits);
+    let stated: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
+    assert_eq!(stated, limits);
 }
 
-/// 16 bytes a line, without the lines that are all zero.
+/// A hex dump with 16 bytes per line, without lines of zeros.
 fn dump(file: &[u8]) -> String {
     let mut text = String::new();
     for (line, bytes) in file.chunks(16).enumerate().filter(|(_, bytes)| bytes.iter().any(|&byte| byte != 0)) {
@@ -153,6 +154,6 @@ fn the_dump_is_a_file() {
     (metadata.windows[0].coded, metadata.windows[0].outliers) = (3, 1);
     let file = file(&metadata, &[(block, content.clone())]);
     assert_eq!(verify(&file).expect("whole"), [(id, content)]);
-    let said = TEXT.split_once("```dump\n").and_then(|(_, rest)| rest.split_once("```")).expect("a dump").0;
-    assert_eq!(dump(&file), said);
+    let stated = TEXT.split_once("```dump\n").and_then(|(_, rest)| rest.split_once("```")).expect("a dump").0;
+    assert_eq!(dump(&file), stated);
 }

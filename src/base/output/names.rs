@@ -19,17 +19,17 @@ impl Numbered {
         let name = path.to_string_lossy().into_owned();
         let Some((before, digits, after)) = place_of_number(&name, 'd') else {
             if name.contains('%') {
-                return Err(misplaced(&name));
+                return Err(misplaced(path));
             }
             if frames != 1 {
                 let ending = path.extension().unwrap_or_default().to_string_lossy();
-                let what = format!("{name}: {frames} frames need a numbered name, as frame_%04d.{ending}");
-                return Err(Error::usage(what));
+                let what = format!("{frames} frames need a numbered name, as frame_%04d.{ending}");
+                return Err(Error::path(path, what));
             }
             return Ok(Self { before: name, after: String::new(), digits: None });
         };
         if before.contains('%') || after.contains('%') {
-            return Err(misplaced(&name));
+            return Err(misplaced(path));
         }
         Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
     }
@@ -48,8 +48,8 @@ impl Numbered {
     }
 }
 
-fn misplaced(name: &str) -> Error {
-    Error::usage(format!("{name}: the number's place is %d or, with zeros, %04d; that of a view's %v or %03v"))
+fn misplaced(path: &Path) -> Error {
+    Error::path(path, "the number's place is %d or, with zeros, %04d; that of a view's %v or %03v")
 }
 
 /// What is before and behind the first `%d` or `%0Nd` of a name, for another letter `%v` or `%0Nv`, and its N.
@@ -66,15 +66,16 @@ fn place_of_number(name: &str, letter: char) -> Option<(&str, usize, &str)> {
 pub fn names_of_views(path: &Path, views: usize, joined: bool) -> Result<Vec<PathBuf>> {
     let name = path.to_string_lossy();
     match place_of_number(&name, 'v') {
-        Some((_, _, after)) if place_of_number(after, 'v').is_some() => Err(misplaced(&name)),
+        Some((_, _, after)) if place_of_number(after, 'v').is_some() => Err(misplaced(path)),
         Some((before, digits, after)) => {
             Ok((0..views).map(|view| format!("{before}{view:0digits$}{after}").into()).collect())
         }
         None if views == 1 || joined => Ok(vec![path.into()]),
-        None if path == Path::new(STANDARD) => {
-            Err(Error::usage(format!("-: standard output takes one view, not {views}; files have their number as %v")))
-        }
-        None => Err(Error::usage(format!("{name}: {views} views need a name with their number, as view%v_%04d.png"))),
+        None if path == Path::new(STANDARD) => Err(Error::path(
+            path,
+            format!("standard output takes one view, not {views}; files have their number as %v"),
+        )),
+        None => Err(Error::path(path, format!("{views} views need a name with their number, as view%v_%04d.png"))),
     }
 }
 

@@ -190,7 +190,7 @@ pub(crate) fn finish(
     let report = resume(source, config, begun, name, &mut out, &common.progress("convert", "blocks"));
     let report = report.inspect_err(|error| {
         if let Some(part) =
-            out.part().filter(|_| out.is_kept() && !matches!(error, Error::Usage(_) | Error::Changed { .. }))
+            out.part().filter(|_| out.is_kept() && !error.is_usage() && !matches!(error, Error::Changed { .. }))
         {
             common.note(format_args!("{}: what is finished is kept; --resume goes on with it", part.display()));
         }

@@ -1,6 +1,6 @@
-//! What is drawn into pictures: a colour bar with its values, and the time of the frame.
+//! Annotations drawn into pictures: a colour bar with its values, and the time of the frame.
 //!
-//! Where there is no room for a part, it is left out.
+//! A part that does not fit is left out.
 
 mod text;
 mod ticks;
@@ -8,28 +8,28 @@ mod ticks;
 use crate::colour::{Rgb, Scale};
 use text::Letters;
 
-/// What is drawn into the pictures of a run.
+/// The annotations of a run's pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Annotation {
-    /// The time of each frame; where they have none, their numbers are shown.
+    /// The time of each frame. Frames without a time show their number.
     pub times: Vec<f64>,
-    /// What times are measured in.
+    /// Unit of the times.
     pub unit: Option<String>,
 }
 
 impl Annotation {
-    /// What is said of a frame, at length and in short.
+    /// The long and the short label of a frame.
     fn stamps(&self, frame: usize) -> [String; 2] {
         let Some(time) = self.times.get(frame) else { return [format!("frame {frame}"), format!("{frame}")] };
         let short = format!("t = {}", ticks::short(*time));
-        // Times since a day differ late in their digits.
+        // Times since a reference date differ only in their last digits.
         let unit = self.unit.as_deref().unwrap_or_default();
         let long = if unit.contains(" since ") { format!("t = {time} {unit}") } else { format!("{short} {unit}") };
         [long.trim_end().into(), short]
     }
 
-    /// Draws the time of `frame` at the top left and, if there is a `scale` to show, a colour bar at the right edge. A row
-    /// has `width` pixels.
+    /// Draws the time of `frame` at the top left and, if a `scale` is given, a colour bar at the right edge. A row has
+    /// `width` pixels.
     pub fn draw(&self, pixels: &mut [Rgb], width: usize, frame: usize, background: Rgb, scale: Option<&Scale>) {
         let mut sheet = Sheet::new(pixels, width, background);
         let below = sheet.stamp(&self.stamps(frame));
@@ -39,11 +39,11 @@ impl Annotation {
     }
 }
 
-/// Columns at the right edge that a colour bar and its values take of a picture of such a size; none if it has no room.
+/// Width in pixels of the colour bar and its values, at the right edge of a picture of this size; 0 if they do not fit.
 pub fn room([width, height]: [usize; 2]) -> usize {
     const LETTERS: usize = 12;
-    let room = LETTERS * Letters::for_side(width.min(height)).width;
-    if 2 * room <= width { room } else { 0 }
+    let bar = LETTERS * Letters::for_side(width.min(height)).width;
+    if 2 * bar <= width { bar } else { 0 }
 }
 
 /// A picture to draw on.
@@ -52,11 +52,11 @@ struct Sheet<'a> {
     width: usize,
     height: usize,
     letters: Letters,
-    /// From the edges of the picture, and from one thing to the next.
+    /// Distance of the parts from the picture's edges and from each other.
     margin: usize,
-    /// Stands out from the background.
+    /// Colour of text, in contrast to the background.
     ink: Rgb,
-    /// Stands out from the ink, around which it is.
+    /// Colour around the ink, in contrast to the ink.
     rim: Rgb,
 }
 
@@ -80,7 +80,7 @@ impl<'a> Sheet<'a> {
         (y..y + height).for_each(|y| (x..x + width).for_each(|x| self.set(x, y, colour)));
     }
 
-    /// Writes with a rim around each letter, so that it can be read over anything.
+    /// Writes text with a rim around each letter, so that it is legible over any picture.
     fn write(&mut self, text: &str, x: usize, y: usize) {
         let inked = self.letters.pixels(text);
         for [u, v] in &inked {
@@ -91,7 +91,7 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Writes the first of some texts for which there is room at the top left; says where the picture is free below.
+    /// Writes the first of `texts` that fits at the top left. Returns the first free row below.
     fn stamp(&mut self, texts: &[String]) -> usize {
         let Self { margin, letters, .. } = *self;
         let fits = |text: &&String| margin + letters.width * text.len() <= self.width;
@@ -102,7 +102,7 @@ impl<'a> Sheet<'a> {
         margin + letters.height
     }
 
-    /// Draws the colours at the right edge, below a row, with their values to the left.
+    /// Draws the colour bar at the right edge, below row `below`, with its values to the left.
     fn bar(&mut self, scale: &Scale, below: usize) {
         let Self { margin, letters, width, height, .. } = *self;
         let (thick, length) = (2 * letters.width, (height * 3 / 5).min(height.saturating_sub(below + 2 * margin)));
@@ -119,7 +119,7 @@ impl<'a> Sheet<'a> {
         self.labels(scale, left, top, length);
     }
 
-    /// Writes values beside the bar, if there is room for the longest.
+    /// Writes values beside the bar, if the longest fits.
     fn labels(&mut self, scale: &Scale, left: usize, top: usize, length: usize) {
         let Self { margin, letters, .. } = *self;
         let ticks = ticks::ticks(scale, (length / (2 * letters.height)).clamp(2, 8));
@@ -176,13 +176,13 @@ mod tests {
     }
 
     #[test]
-    fn times_are_said_where_there_are_some() {
-        let said = |unit: Option<&str>| {
+    fn frames_show_their_time_or_their_number() {
+        let stamps = |unit: Option<&str>| {
             let timed = Annotation { times: vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0], unit: unit.map(String::from) };
             (0..5).map(|frame| timed.stamps(frame)[0].clone()).collect::<Vec<_>>()
         };
-        assert_eq!(said(None), ["t = 0", "t = 0.0125", "t = 0.3", "t = 1.051956e6", "frame 4"]);
-        assert_eq!(said(Some("s"))[1], "t = 0.0125 s");
-        assert_eq!(said(Some("hours since 1900-01-01"))[3], "t = 1051956 hours since 1900-01-01");
+        assert_eq!(stamps(None), ["t = 0", "t = 0.0125", "t = 0.3", "t = 1.051956e6", "frame 4"]);
+        assert_eq!(stamps(Some("s"))[1], "t = 0.0125 s");
+        assert_eq!(stamps(Some("hours since 1900-01-01"))[3], "t = 1051956 hours since 1900-01-01");
     }
 }

@@ -1,8 +1,8 @@
-//! Values to write beside a colour bar.
+//! The values beside a colour bar.
 
 use crate::colour::{Norm, Scale};
 
-/// Round values of a scale's range: about as many as `wanted`, evenly or, for a logarithm, powers of ten.
+/// About `wanted` round values within a scale's range: evenly spaced, or powers of ten for a logarithmic scale.
 pub(super) fn ticks(scale: &Scale, wanted: usize) -> Vec<f64> {
     let (lo, hi) = scale.range();
     if !(hi - lo > 1e-11 * lo.abs().max(hi.abs()) && (hi - lo).is_finite()) {
@@ -23,7 +23,7 @@ fn even(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
     (0..=count.min(2 * wanted)).map(|i| ((first + i as f64) * step).clamp(lo, hi)).collect()
 }
 
-/// Powers of ten, or of every other ten and so on; if these are few, 2 and 5 times them as well.
+/// Powers of ten, thinned out to about `wanted`. If there are only one or two, also 2 and 5 times these.
 fn decades(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
     let (first, last) = (exponent(lo), exponent(hi));
     let within = |v: &f64| (lo..=hi).contains(v);
@@ -40,12 +40,12 @@ fn exponent(v: f64) -> i32 {
     text.split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
 }
 
-/// To the last bit, which a power is not.
+/// A power of ten, correctly rounded (`powi` is not).
 fn ten_to(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(f64::INFINITY)
 }
 
-/// A number without what only rounding adds.
+/// A number as text, without digits that come from rounding.
 pub(super) fn short(v: f64) -> String {
     let rounded: f64 = format!("{v:.11e}").parse().unwrap_or(v);
     match rounded.abs() {

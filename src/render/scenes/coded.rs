@@ -1,6 +1,6 @@
-//! A block of a file that has been read, as what it adds to the planes of its batch.
+//! A block of a file that has been read, as what it adds to the planes of its plan.
 
-use super::coefficients::{CoefficientBatch, SplatSource};
+use super::batch_plan::{BatchPlan, SplatSource};
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
@@ -9,8 +9,8 @@ use crate::codec::field::Field;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 
 /// A block of a file that has been read.
-pub(super) struct CodedBlock<'b, 'a> {
-    batch: &'b CoefficientBatch<'a>,
+pub(super) struct CodedBlock<'a> {
+    plan: &'a BatchPlan,
     block: Block,
     /// What its samples may be off by, for each error plane.
     errors: Vec<f64>,
@@ -23,41 +23,41 @@ pub(super) struct CodedBlock<'b, 'a> {
 enum Dense {
     /// Samples to frames; here those of the whole window.
     Samples(Buffer<u8>),
-    /// What coefficients give to frames: `frame of the batch * voxels + voxel`; empty if all are zero.
+    /// What coefficients give to frames: `frame of the plan * voxels + voxel`; empty if all are zero.
     Values(Vec<f64>),
     /// Coefficients, here what all codes give if that was needed at once.
     Coefficients(Option<Field<'static>>),
 }
 
-impl<'b, 'a> CodedBlock<'b, 'a> {
-    /// Of a block of a batch whose samples may be off by so much.
-    pub(super) fn new(batch: &'b CoefficientBatch<'a>, block: Block, errors: Vec<f64>) -> Self {
-        let codec = &batch.codec;
-        if block.exact.is_some() || batch.what == SplatSource::Samples {
+impl<'a> CodedBlock<'a> {
+    /// Of a block of a plan whose samples may be off by so much.
+    pub(super) fn new(plan: &'a BatchPlan, block: Block, errors: Vec<f64>) -> Self {
+        let codec = &plan.codec;
+        if block.exact.is_some() || plan.what == SplatSource::Samples {
             let dense = Dense::Samples(block.samples(codec));
-            return Self { batch, block, errors, dense, few: Vec::new() };
+            return Self { plan, block, errors, dense, few: Vec::new() };
         }
         let field = block.field_at_once(codec);
-        let mut few = overrides(batch, &block, field.as_ref());
-        let dense = match batch.by_values {
-            true => Dense::Values(values(batch, &block, field.as_ref(), &mut few)),
+        let mut few = overrides(plan, &block, field.as_ref());
+        let dense = match plan.by_values {
+            true => Dense::Values(values(plan, &block, field.as_ref(), &mut few)),
             false => Dense::Coefficients(field),
         };
-        Self { batch, block, errors, dense, few }
+        Self { plan, block, errors, dense, few }
     }
 
     fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, room: &'r mut Scratch) -> PlaneValues<'r> {
-        let Self { batch, block, .. } = self;
-        let Some((frame, absent)) = batch.layout.samples(plane) else { return PlaneValues::Nothing };
-        let bytes = samples.len() / batch.codec.frames();
+        let Self { plan, block, .. } = self;
+        let Some((frame, absent)) = plan.layout.samples(plane) else { return PlaneValues::Nothing };
+        let bytes = samples.len() / plan.codec.frames();
         room.bytes.clear();
-        room.bytes.extend_from_slice(&samples[batch.frames[frame] * bytes..][..bytes]);
-        let first = batch.frames[frame] * block.voxels;
+        room.bytes.extend_from_slice(&samples[plan.frames[frame] * bytes..][..bytes]);
+        let first = plan.frames[frame] * block.voxels;
         // An exact block may do without a mask.
-        let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || batch.codec.is_missing(v);
-        match batch.layout.absent {
-            true => room.masked(batch.codec.sample, absent, is_missing),
-            false => room.samples(batch.codec.sample),
+        let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || plan.codec.is_missing(v);
+        match plan.layout.absent {
+            true => room.masked(plan.codec.sample, absent, is_missing),
+            false => room.samples(plan.codec.sample),
         }
     }
 
@@ -67,22 +67,22 @@ impl<'b, 'a> CodedBlock<'b, 'a> {
             return PlaneValues::Nothing;
         }
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let error = |voxel| if coded && misses_all(self.batch, &self.block, voxel) { 0.0 } else { error };
+        let error = |voxel| if coded && misses_all(self.plan, &self.block, voxel) { 0.0 } else { error };
         room.double.clear();
         room.double.extend((0..self.block.voxels).map(error));
         PlaneValues::Double(&room.double)
     }
 }
 
-impl BlockPlanes for CodedBlock<'_, '_> {
+impl BlockPlanes for CodedBlock<'_> {
     fn voxels(&self) -> usize {
         self.block.voxels
     }
 
     fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        let Self { batch, block, errors, dense, few } = self;
+        let Self { plan, block, errors, dense, few } = self;
         let voxels = block.voxels;
-        if let Some(error) = plane.checked_sub(batch.layout.first_error()) {
+        if let Some(error) = plane.checked_sub(plan.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], room));
         }
         let few =
@@ -90,8 +90,8 @@ impl BlockPlanes for CodedBlock<'_, '_> {
         Ok(match dense {
             Dense::Samples(samples) => self.plane_of_samples(samples, plane, room),
             Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
-            Dense::Coefficients(field) if plane < batch.layout.coefficients => {
-                coefficients(batch, block, field.as_ref(), batch.kept[plane], room)
+            Dense::Coefficients(field) if plane < plan.layout.coefficients => {
+                coefficients(plan, block, field.as_ref(), plan.kept[plane], room)
             }
             Dense::Coefficients(_) => few,
         })
@@ -106,7 +106,7 @@ impl BlockPlanes for CodedBlock<'_, '_> {
 
 /// The coefficients of one k of a block.
 fn coefficients<'a>(
-    batch: &CoefficientBatch<'_>,
+    plan: &BatchPlan,
     block: &'a Block,
     field: Option<&'a Field<'_>>,
     k: usize,
@@ -114,26 +114,21 @@ fn coefficients<'a>(
 ) -> PlaneValues<'a> {
     match field {
         Some(field) => field.plane(k, block.voxels, &mut room.double).into(),
-        None => block.plane(&batch.codec, k, (&mut room.single, &mut room.double)).into(),
+        None => block.plane(&plan.codec, k, (&mut room.single, &mut room.double)).into(),
     }
 }
 
-/// What coefficients give in each frame of a batch, and what overrides that, which is taken out of `few`.
-fn values(
-    batch: &CoefficientBatch<'_>,
-    block: &Block,
-    field: Option<&Field<'_>>,
-    few: &mut [Vec<(u32, f64)>],
-) -> Vec<f64> {
+/// What coefficients give in each frame of a plan, and what overrides that, which is taken out of `few`.
+fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut [Vec<(u32, f64)>]) -> Vec<f64> {
     if block.codes.is_empty() && few.is_empty() {
         return Vec::new();
     }
-    let mut values = vec![0.0; batch.frames.len() * block.voxels];
+    let mut values = vec![0.0; plan.frames.len() * block.voxels];
     let room = &mut Scratch::default();
-    for k in &batch.kept {
-        let amounts = coefficients(batch, block, field, *k, room);
-        for (frame, values) in batch.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
-            amounts.add_to(batch.codec.synthesis[*k][*frame], values);
+    for k in &plan.kept {
+        let amounts = coefficients(plan, block, field, *k, room);
+        for (frame, values) in plan.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
+            amounts.add_to(plan.codec.synthesis[*k][*frame], values);
         }
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
@@ -142,37 +137,37 @@ fn values(
     values
 }
 
-/// What overrides the coefficients of a block, for each plane of a batch; empty if nothing does.
-fn overrides(batch: &CoefficientBatch<'_>, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
-    let (layout, codec) = (&batch.layout, &batch.codec);
+/// What overrides the coefficients of a block, for each plane of a plan; empty if nothing does.
+fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
+    let (layout, codec) = (&plan.layout, &plan.codec);
     if !block.overrides() {
         return Vec::new();
     }
     let mut few = vec![Vec::new(); layout.planes()];
     let whole = field.is_none().then(|| block.field(codec));
-    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &batch.frames));
+    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.frames));
     for (voxel, frame, amount) in samples.into_iter().flatten() {
         few[layout.value(frame)].push((voxel as u32, amount));
     }
     for voxel in (0..block.voxels).filter(|_| layout.absent) {
         let mut add = |plane: usize| few[plane].push((voxel as u32, 1.0));
-        if misses_all(batch, block, voxel) {
+        if misses_all(plan, block, voxel) {
             add(layout.absent_in_all());
         } else {
-            let missing = |f: &usize| block.is_missing(batch.frames[*f] * block.voxels + voxel);
+            let missing = |f: &usize| block.is_missing(plan.frames[*f] * block.voxels + voxel);
             (0..layout.frames).filter(missing).for_each(|f| add(layout.absent(f)));
         }
     }
     few
 }
 
-/// Whether a voxel has no sample, judged by the window and not by the batch, whose frames depend on the memory there is.
-fn misses_all(batch: &CoefficientBatch<'_>, block: &Block, voxel: usize) -> bool {
-    (0..batch.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
+/// Whether a voxel has no sample, judged by the window and not by the plan, whose frames depend on the memory there is.
+fn misses_all(plan: &BatchPlan, block: &Block, voxel: usize) -> bool {
+    (0..plan.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
 }
 
 /// What must be added to single frames because coefficients don't give it: an outlier's sample less what they give,
-/// and for a missing sample minus what they give. (voxel, frame of the batch, amount), ascending.
+/// and for a missing sample minus what they give. (voxel, frame of the plan, amount), ascending.
 fn overridden_samples(
     block: &Block,
     codec: &WindowCodec,
@@ -194,7 +189,7 @@ fn overridden_samples(
     subtract_series(block, codec, field, &targets)
 }
 
-/// Turns (voxel, frame of the batch, frame of the window, sample) into (voxel, frame, sample - what the codes give).
+/// Turns (voxel, frame of the plan, frame of the window, sample) into (voxel, frame, sample - what the codes give).
 fn subtract_series(
     block: &Block,
     codec: &WindowCodec,

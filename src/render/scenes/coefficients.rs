@@ -1,32 +1,25 @@
-//! The paper's method: the coefficients of a file, splatted once for all frames of a window (eq 8 and 9).
+//! Rendering from coefficients, the method of [Dobashi](crate::bibliography): the coefficients of a file are splatted
+//! once for all frames of a window (eq 9), and each pixel is inverted (eq 8). Decoded samples can be splatted instead
+//! (eq 4).
 
+use super::batch_plan::{BatchPlan, SplatSource, error_planes};
 use super::coded::CodedBlock;
 use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{magnitude, rounding};
-use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
-use crate::render::layout::{Layout, Order};
+use crate::render::layout::Layout;
 use crate::render::plane_values::BlockPlanes;
 use crate::render::scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
 };
-use crate::wavelet::{Lane, needed};
+use crate::wavelet::Lane;
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind, Window};
-
-/// What of a file is splatted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SplatSource {
-    /// Coefficients.
-    Coefficients,
-    /// The decoded samples of every frame: the conventional method.
-    Samples,
-}
+use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
 
 /// A coefficient file as a scene.
 pub struct CoefficientScene {
@@ -93,73 +86,12 @@ impl Scene for CoefficientScene {
     }
 }
 
-/// What holds in every frame, and what each level part that is left out counts in a frame.
-fn error_planes(config: &RenderConfig, levels: usize) -> usize {
-    match (config.certify, config.allowed) {
-        (false, _) => 0,
-        (true, None) => 1,
-        (true, Some(_)) => 1 + levels,
-    }
-}
-
-/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a pixel are added faster.
-fn is_dense(window: &Window, series: usize) -> bool {
-    window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
-}
-
-/// The planes of a batch of `frames` frames that needs `kept` coefficients.
-fn layout(
-    file: &CoefficientFile,
-    codec: &WindowCodec,
-    (window, channel): (u32, usize),
-    (what, by_values): (SplatSource, bool),
-    (kept, frames): (usize, usize),
-    config: &RenderConfig,
-) -> Layout {
-    let leaves = file.leaves_of(window, channel);
-    let coded = leaves.iter().any(|leaf| leaf.coded > 0);
-    let exact = leaves.iter().any(|leaf| leaf.exact > 0);
-    let record = &file.metadata().windows[window as usize];
-    let (values, missing) = (what == SplatSource::Samples || by_values, file.has_missing(window));
-    let is_dense = is_dense(record, file.channels() * file.grid.whole().voxels());
-    Layout {
-        coefficients: if values || !coded { 0 } else { kept },
-        frames,
-        values: values || exact || record.outliers > 0 || missing,
-        absent: missing,
-        error_planes: error_planes(config, codec.parts()),
-        lengths: false,
-        order: if values || is_dense { Order::Pixels } else { Order::Planes },
-    }
-}
-
-/// Whether so few frames of a window are asked for that their values are less work than the coefficients that they need. Judged by
-/// all that are asked for, not by a batch, whose frames depend on the memory that there is.
-fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
-    let range = file.window_range(window);
-    let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();
-    let needed = needed(&codec.synthesis, &asked).into_iter().filter(|needed| *needed).count();
-    COEFFICIENTS_FOR_A_VALUE * asked.len() <= needed
-}
-
-/// Measured: with half as many frames as coefficients both take as long, with a quarter values a fifth less.
-const COEFFICIENTS_FOR_A_VALUE: usize = 4;
-
 /// Some frames of one window of a file.
 pub(super) struct CoefficientBatch<'a> {
     file: &'a CoefficientFile,
-    pub(super) what: SplatSource,
     window: u32,
     channel: usize,
-    pub(super) codec: WindowCodec,
-    /// Counted from the first frame of the window.
-    pub(super) frames: Vec<usize>,
-    /// Which coefficients the frames need, and those in order.
-    wanted: Vec<bool>,
-    pub(super) kept: Vec<usize>,
-    /// Whether planes hold the values of each frame instead of coefficients.
-    pub(super) by_values: bool,
-    pub(super) layout: Layout,
+    plan: BatchPlan,
     views: &'a [Expectation<'a>],
     selector: BlockSelector,
     selection: Selection,
@@ -172,33 +104,21 @@ pub(super) struct CoefficientBatch<'a> {
 
 impl<'a> CoefficientBatch<'a> {
     fn open(file: &'a CoefficientFile, what: SplatSource, request: &BatchRequest<'a>) -> Result<Self> {
-        let BatchRequest { channel, config, views, .. } = *request;
         let window = file.window_of(request.frames[0]);
-        let first = file.window_range(window).start;
-        let frames: Vec<usize> = request.frames.iter().map(|f| f - first).collect();
-        let codec = file.codec(window)?;
-        let wanted = needed(&codec.synthesis, &frames);
-        let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let by_values = what != SplatSource::Samples && !config.certify && few_asked(file, &codec, window, config);
+        let plan = BatchPlan::new(file, what, window, request)?;
         let mut batch = Self {
             file,
-            what,
             window,
-            channel,
-            layout: layout(file, &codec, (window, channel), (what, by_values), (kept.len(), frames.len()), config),
-            selector: BlockSelector::new(&codec, config, &file.grid),
-            codec,
-            frames,
-            wanted,
-            kept,
-            by_values,
-            views,
+            channel: request.channel,
+            selector: BlockSelector::new(&plan.codec, request.config, &file.grid),
+            plan,
+            views: request.views,
             selection: Selection::default(),
             errors: SampleErrors::default(),
             leaf: Mutex::default(),
             fetched: Mutex::default(),
         };
-        batch.select(config)?;
+        batch.select(request.config)?;
         Ok(batch)
     }
 
@@ -206,7 +126,7 @@ impl<'a> CoefficientBatch<'a> {
     fn select(&mut self, config: &RenderConfig) -> Result<()> {
         let region = config.region.unwrap_or(self.file.grid.whole());
         // Decoded samples are rounded to their type, so an error of parts that are left out would not be all of it.
-        if let Some(allowed) = config.allowed.filter(|_| self.what != SplatSource::Samples) {
+        if let Some(allowed) = config.allowed.filter(|_| self.plan.what != SplatSource::Samples) {
             let rule = self.rule(allowed, config.limited, &region)?;
             self.selector.rule = rule;
         }
@@ -258,7 +178,7 @@ impl<'a> CoefficientBatch<'a> {
         let BlockStats { min, max, reached, .. } = entry.stats;
         // With less than all parts, samples are as near to the source's as those of all, and that near again.
         let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
-        let off = off + rounding(self.codec.sample, magnitude((min, max)));
+        let off = off + rounding(self.plan.codec.sample, magnitude((min, max)));
         (min - off, max + off)
     }
 
@@ -271,8 +191,8 @@ impl<'a> CoefficientBatch<'a> {
         }
     }
 
-    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms that
-    /// sum to more than `absolute_sum`.
+    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms
+    /// that sum to more than `absolute_sum`.
     fn sample_errors(&self, certified: f64, absolute_sum: f64) -> SampleErrors {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
@@ -282,11 +202,11 @@ impl<'a> CoefficientBatch<'a> {
             // An outlier adds its sample less what the coefficients give.
             absolute_sum: 2.0 * absolute_sum + magnitude(range),
         };
-        let of_part = |gains: &Vec<f64>| self.frames.iter().map(|f| gains[*f]).collect();
-        let factors = std::iter::once(vec![1.0; self.frames.len()]).chain(self.selector.gains.iter().map(of_part));
+        let of_part = |gains: &Vec<f64>| self.plan.frames.iter().map(|f| gains[*f]).collect();
+        let factors = std::iter::once(vec![1.0; self.plan.frames.len()]).chain(self.selector.gains.iter().map(of_part));
         SampleErrors {
-            factors: factors.take(self.layout.error_planes).collect(),
-            frames: vec![frame; self.frames.len()],
+            factors: factors.take(self.plan.layout.error_planes).collect(),
+            frames: vec![frame; self.plan.frames.len()],
         }
     }
 
@@ -305,7 +225,7 @@ impl<'a> CoefficientBatch<'a> {
     /// The parts that say nothing of the group's frames.
     fn of_other_frames(&self, entry: &BlockEntry) -> LeftOut {
         let needs = |part: &PartEntry| match part.kind {
-            PartKind::Level(level) => self.codec.needs_part(level.into(), &self.wanted),
+            PartKind::Level(level) => self.plan.codec.needs_part(level.into(), &self.plan.wanted),
             _ => true,
         };
         let parts = entry.parts.iter().filter(|part| needs(part)).copied().collect();
@@ -316,7 +236,7 @@ impl<'a> CoefficientBatch<'a> {
     fn adds_nothing(&self, kept: &KeptParts) -> bool {
         kept.entry.parts.is_empty()
             && !kept.entry.lost
-            && (self.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
+            && (self.plan.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
     }
 
     /// The entries of the directory's leaf that lists a block.
@@ -330,7 +250,7 @@ impl<'a> CoefficientBatch<'a> {
         Ok(last.clone())
     }
 
-    /// What is read of a block, by its number.
+    /// The parts of a block that are read.
     fn kept(&self, block: usize) -> Result<KeptParts> {
         let leaf = self.leaf_of(block as u32)?;
         Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
@@ -340,9 +260,10 @@ impl<'a> CoefficientBatch<'a> {
     fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
         let KeptParts { entry, errors, .. } = self.kept(block)?;
         let fetched = self.fetched.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let BatchPlan { codec, wanted, .. } = &self.plan;
         let block = match fetched {
-            Some(fetched) => fetched.block(&self.codec, &entry, &self.wanted)?,
-            None => self.file.block(&self.codec, &entry, &self.wanted)?,
+            Some(fetched) => fetched.block(codec, &entry, wanted)?,
+            None => self.file.block(codec, &entry, wanted)?,
         };
         Ok((block, errors))
     }
@@ -350,7 +271,7 @@ impl<'a> CoefficientBatch<'a> {
 
 impl FrameBatch for CoefficientBatch<'_> {
     fn layout(&self) -> Layout {
-        self.layout
+        self.plan.layout
     }
 
     fn selection(&self) -> &Selection {
@@ -361,7 +282,7 @@ impl FrameBatch for CoefficientBatch<'_> {
         if self.file.prefers_batches() {
             let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
             let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
-            let batch = Arc::new(self.file.batch(&self.codec, &entries, &self.wanted)?);
+            let batch = Arc::new(self.file.batch(&self.plan.codec, &entries, &self.plan.wanted)?);
             *self.fetched.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
         }
         Ok(())
@@ -369,7 +290,7 @@ impl FrameBatch for CoefficientBatch<'_> {
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         let (block, errors) = self.read(block)?;
-        Ok(Box::new(CodedBlock::new(self, block, errors)))
+        Ok(Box::new(CodedBlock::new(&self.plan, block, errors)))
     }
 
     fn errors(&self) -> &SampleErrors {
@@ -377,26 +298,26 @@ impl FrameBatch for CoefficientBatch<'_> {
     }
 
     fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>> {
-        let mut marked = vec![false; self.codec.basis.coefficients()];
-        used.iter().filter(|p| **p < self.layout.coefficients).for_each(|p| marked[self.kept[*p]] = true);
-        let only = self.codec.basis.only(&marked);
+        let mut marked = vec![false; self.plan.codec.basis.coefficients()];
+        used.iter().filter(|p| **p < self.plan.layout.coefficients).for_each(|p| marked[self.plan.kept[*p]] = true);
+        let only = self.plan.codec.basis.only(&marked);
         let places: Vec<usize> = match &only {
-            Some(_) => (0..self.layout.coefficients).filter(|p| marked[self.kept[*p]]).collect(),
-            None => (0..self.layout.coefficients).collect(),
+            Some(_) => (0..self.plan.layout.coefficients).filter(|p| marked[self.plan.kept[*p]]).collect(),
+            None => (0..self.plan.layout.coefficients).collect(),
         };
-        let to: Vec<usize> = if only.is_some() { (0..places.len()).collect() } else { self.kept.clone() };
+        let to: Vec<usize> = if only.is_some() { (0..places.len()).collect() } else { self.plan.kept.clone() };
         let mut coefficients = vec![Lane::default(); only.as_ref().map_or(marked.len(), |b| b.coefficients())];
-        let mut series = vec![Lane::default(); self.codec.frames()];
+        let mut series = vec![Lane::default(); self.plan.codec.frames()];
         Box::new(move |planes, frames| {
             if !places.is_empty() {
                 coefficients.fill(Lane::default());
                 places.iter().zip(&to).for_each(|(plane, k)| coefficients[*k] = planes[*plane]);
-                only.as_deref().unwrap_or(self.codec.basis.as_ref()).inverse(&mut coefficients, &mut series);
+                only.as_deref().unwrap_or(self.plan.codec.basis.as_ref()).inverse(&mut coefficients, &mut series);
             }
             for (f, out) in frames.iter_mut().enumerate() {
-                *out = series[self.frames[f]];
-                if self.layout.values {
-                    let value = planes[self.layout.value(f)];
+                *out = series[self.plan.frames[f]];
+                if self.plan.layout.values {
+                    let value = planes[self.plan.layout.value(f)];
                     out.iter_mut().zip(value).for_each(|(o, v)| *o += v);
                 }
             }

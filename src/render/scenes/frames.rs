@@ -1,4 +1,4 @@
-//! The conventional method: the frames of an archive, each splatted as it is.
+//! The conventional method: every frame of an archive is splatted by itself (eq 4).
 
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
@@ -102,7 +102,7 @@ impl Scene for FrameScene {
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
         let (blocks, seen) = (self.blocks(), &self.missing_seen);
-        let selection = Selection::of_any_values(blocks, request);
+        let selection = Selection::of_all(blocks, request);
         let unexpected = (can_miss && looked_at.is_empty()).then_some(seen);
         Ok(Box::new(SampleBatch {
             archive,

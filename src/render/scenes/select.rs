@@ -1,4 +1,9 @@
-//! What is read of a block under a looser tolerance, and how far its samples may then be from the source's.
+//! Which level parts of a block are read under a looser tolerance, and how far its samples may then be off.
+//!
+//! A certified limit leaves out the finest parts of a block for as long as none of its samples is further off. A limit
+//! on the expected error (eq 27) leaves out parts by their expected error per byte, up to the same price for all
+//! blocks: no other choice of these steps reads fewer bytes for the same expected error
+//! ([Shoham](crate::bibliography)).
 
 use crate::base::grid::Grid;
 use crate::base::sample::magnitude;
@@ -52,8 +57,8 @@ pub(super) enum Rule {
     Cheap(Cost),
 }
 
-/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the same
-/// for all blocks, no other choice of steps reads fewer bytes for the same expected error.
+/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the
+/// same for all blocks, no other choice of steps reads fewer bytes for the same expected error.
 type Cost = i32;
 
 /// Some level parts, from the finest on, of which none is left out without all before it.
@@ -110,8 +115,8 @@ impl<'a> RateAllocator<'a> {
         }
     }
 
-    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to come
-    /// to at most `allowed` in the mean square over pixels.
+    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to
+    /// come to at most `allowed` in the mean square over pixels.
     pub(super) fn within(&self, allowed: f64) -> Rule {
         let mut sum = self.own;
         let affordable = self.changes.iter().take_while(|(_, change)| {
@@ -133,8 +138,8 @@ impl BlockSelector {
         Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
     }
 
-    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that the
-    /// rule leaves out.
+    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that
+    /// the rule leaves out.
     pub(super) fn keep(&self, block: &BlockView<'_>) -> KeptParts {
         let (entry, stats) = (block.entry, block.entry.stats);
         let mut kept = KeptParts {

@@ -26,8 +26,8 @@ mod with_crate {
     use ::exr::prelude::*;
     use std::io::{self, Cursor, Write};
 
-    /// Writes one picture: float32 channels, compressed without loss. What made it is in the standard attributes `software` and
-    /// `comments`, a line for each name: attributes of other names have no order of their own.
+    /// Writes one picture: float32 channels, compressed without loss. What made it is in the standard attributes
+    /// `software` and `comments`, a line for each name: attributes of other names have no order of their own.
     pub(in super::super) fn write(
         config: &SinkConfig,
         texts: &[(String, String)],

@@ -1,5 +1,5 @@
-//! Finished pictures out: numbered files, one file for all, or a stream for another program. What made a picture goes with it
-//! where the format has a place for words.
+//! Finished pictures out: numbered files, one file for all, or a stream for another program. What made a picture goes
+//! with it where the format has a place for words.
 
 mod exr;
 mod provenance;
@@ -26,11 +26,11 @@ use std::sync::Arc;
 pub enum PictureFormat {
     /// One PNG for each; in a stream one after the other.
     Png,
-    /// One OpenEXR file for each, of float32 numbers as in an array: Y, or R, G and B, and of light A. Only where the program was
-    /// built with it.
+    /// One OpenEXR file for each, of float32 numbers as in an array: Y, or R, G and B, and of light A. Only where the
+    /// program was built with it.
     Exr,
-    /// One NumPy array for all: float32 (frames, H, W) or, of colours and of light, (frames, H, W, 3) and (frames, H, W, 4);
-    /// uint8 (frames, H, W, 3) if colours were asked for.
+    /// One NumPy array for all: float32 (frames, H, W) or, of colours and of light, (frames, H, W, 3) and (frames, H,
+    /// W, 4); uint8 (frames, H, W, 3) if colours were asked for.
     Npy,
     /// YUV4MPEG2, 4:4:4, full range: for video encoders and players.
     Y4m,

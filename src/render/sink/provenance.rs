@@ -6,8 +6,8 @@ use serde::Serialize;
 use serde_json::Value;
 use std::fmt::Display;
 
-/// What the pictures of a run were made with: no path, no date, nothing that threads or memory change. Keys are named as the
-/// options are where there is one, and text is as these take it.
+/// What the pictures of a run were made with: no path, no date, nothing that threads or memory change. Keys are named
+/// as the options are where there is one, and text is as these take it.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Provenance {
     /// Name and version of the program.

@@ -1,4 +1,5 @@
-//! What becomes of the slabs along a ray, front to back.
+//! How the slabs along a ray are combined, front to back: composited (eq 31; the operator "over" of
+//! [PorterDuff](crate::bibliography)), or the largest of them.
 
 use super::medium::Medium;
 
@@ -26,7 +27,7 @@ pub(in crate::render) trait Blend: Sync {
     fn finish(pixels: Vec<Self::Pixel>) -> Vec<f32>;
 }
 
-/// Emission and absorption: light of each slab through those before it.
+/// Emission and absorption: light of each slab through those before it (eq 30 and 31).
 pub(in crate::render) struct Composite {
     pub(in crate::render) medium: Medium,
     /// World units of a path that has such opacities.

@@ -1,4 +1,4 @@
-//! How a view is cut into slabs, and what that takes.
+//! How a view is cut into slabs (eq 29), and how much memory they take.
 
 use super::visible::Visible;
 use crate::base::error::{Error, Result};

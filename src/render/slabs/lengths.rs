@@ -1,4 +1,4 @@
-//! What a batch of frames adds to slabs: its own planes, and the lengths of rays.
+//! What a batch of frames adds to slabs: its own planes, and the lengths l of rays (eq 30).
 
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;

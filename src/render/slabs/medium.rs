@@ -1,4 +1,4 @@
-//! A transfer function as what light meets: tables of colours and extinctions.
+//! A transfer function ([Levoy](crate::bibliography)) as a medium: tables of colours and extinctions kappa (eq 30).
 
 use crate::colour::TransferFunction;
 
@@ -27,7 +27,7 @@ impl Medium {
         self.colours.at(value)
     }
 
-    /// -ln(1 - opacity) of a value.
+    /// -ln(1 - opacity) of a value: the extinction of eq 30 times the unit.
     pub(in crate::render) fn extinction(&self, value: f64) -> f32 {
         self.extinctions.at(value)[0]
     }

@@ -1,17 +1,26 @@
-//! The volume in slabs across the view: how it is cut, what a slab holds, and how slabs blend along a ray.
+//! Colour and opacity along the rays, slab by slab: how the volume is cut, what a slab holds, and how slabs blend.
 //!
-//! A slab takes of each voxel what of its kernel lies in the slab: the kernel is a product of one along the ray and one
-//! across it, so a weight is that of the projection times a share of a Gaussian's integral ([`Slab`]). With w those weights and
-//! v the samples, a pixel of a slab has the length l = sum w and the mean g = sum w v / l, and
+//! The volume is cut into slabs across the view direction, as in image-aligned splatting
+//! ([Mueller](crate::bibliography)). Pure functions of numbers; [`super::composite`] drives them.
+//!
+//! A slab takes of each voxel the part of its kernel that lies in the slab. The kernel is a product of a Gaussian along
+//! the ray and one across it, so the weight is that of the projection times a share of the Gaussian's integral (Phi is
+//! the normal distribution):
 //!
 //! ```text
-//! T = exp(-kappa(g) l)       kappa(v) = -ln(1 - opacity(v)) / unit
+//! w_{i,slab} = w_i (Phi((far - z_i) / sigma) - Phi((near - z_i) / sigma))                                 (eq 29)
 //! ```
 //!
-//! is what it lets through. As slabs become thinner that tends to the integral along the ray through the field that the kernels
-//! make of the samples. Every mean is off by no more than the file's bound.
+//! With these weights, a pixel of a slab has the length l = sum of w and the mean g = sum of w v / l. Its light is that
+//! of the emission-absorption model of [Max](crate::bibliography):
 //!
-//! Pure functions of numbers; [`super::composite`] drives them.
+//! ```text
+//! through = exp(-kappa(g) l)        kappa(v) = -ln(1 - opacity(v)) / unit                                 (eq 30)
+//! light = sum over slabs of (product of through before) (1 - through) colour(g)                           (eq 31)
+//! ```
+//!
+//! As slabs become thinner, that tends to the integral along the ray through the field that the kernels make of the
+//! samples. Every mean is off by no more than the file's bound (eq 24).
 
 pub(super) mod medium;
 pub(super) mod blend;

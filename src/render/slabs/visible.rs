@@ -1,4 +1,5 @@
-//! Which tiles of which slabs can show anything, and the blocks that these need.
+//! Which tiles of which slabs can show anything, from the ranges of blocks and their opacity (eq 30), and the blocks
+//! that these need.
 
 use super::blend::Blend;
 use crate::base::grid::Region;

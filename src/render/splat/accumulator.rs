@@ -49,8 +49,8 @@ impl<'a> BandAccumulator<'a> {
         Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
     }
 
-    /// The same for the same rows of several pictures that look alike, layers one behind the other: of every tile first those
-    /// that are `wanted` of the first few layers together, then of the next.
+    /// The same for the same rows of several pictures that look alike, layers one behind the other: of every tile first
+    /// those that are `wanted` of the first few layers together, then of the next.
     pub(in crate::render) fn finish_layers<T: Send>(
         layers: &[Self],
         together: usize,
@@ -118,7 +118,7 @@ impl<'a> ResolvedTile<'a> {
         let sums = match cells.first() {
             Some((lattice, _)) => {
                 let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
-                TileSums::Gather(lattice.gather((&cells, planes), rect))
+                TileSums::Gather(Gather::new(lattice, (&cells, planes), rect))
             }
             None => TileSums::Tiles(tiles),
         };
@@ -176,8 +176,8 @@ impl<T: Copy> Pixels<'_, T> {
     }
 }
 
-/// Splats blocks in order, `batch` at a time, each into all bands that see it. A block is decoded once for all bands that
-/// take footprints, and once for all that have a lattice.
+/// Splats blocks in order, `batch` at a time, each into all bands that see it. A block is decoded once for all bands
+/// that take footprints, and once for all that have a lattice.
 pub(in crate::render) fn splat(
     accumulators: &mut [BandAccumulator<'_>],
     blocks: (&[usize], usize),

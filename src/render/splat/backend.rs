@@ -1,7 +1,7 @@
 //! The seam behind which a view is splatted: which backend a view takes, and what that backend needs.
 //!
-//! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels reached,
-//! tile sizes, memory) and hands it blocks through [`super::accumulator`].
+//! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
+//! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
 
 use super::lattice::Lattice;
 use super::tile_rect::{TILE, pixels_reached};

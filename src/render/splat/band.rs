@@ -1,4 +1,5 @@
-//! Bands of pictures take in blocks: read in batches, in file order, so that sums depend neither on threads nor on memory.
+//! Bands of pictures take in blocks: read in batches, in file order, so that sums depend neither on threads nor on
+//! memory.
 
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;

@@ -1,4 +1,5 @@
-//! The footprint backend: terms of voxels times footprints into the planes of tiles (eq 4 and 9).
+//! The splat: the terms of voxels times footprints, added to the planes of one tile of the picture (eq 9; eq 4 where
+//! the terms are samples). This is the splatting of [Westover](crate::bibliography).
 //!
 //! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
 //! is tiled or on the number of threads. Sums are in f64.
@@ -92,7 +93,7 @@ impl Tile {
         }
     }
 
-    /// Adds a block's voxels, of which these are the terms.
+    /// Adds the terms of a block's voxels times their footprints (eq 9).
     pub(in crate::render) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
         if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
             return;

@@ -1,4 +1,7 @@
-//! The sum of all weights at one place of the picture, by uncut footprints: what background is judged by, whatever splats.
+//! The sum of all weights at one place of the picture, by uncut footprints: the background is judged by it (eq 16).
+//!
+//! It also bounds what voxels beyond a depth add, since weights fall as exp(-tau z) (eq 3): the deepest can be left
+//! out.
 
 use super::lattice::Shear;
 use super::view_setup::ViewSetup;
@@ -55,9 +58,9 @@ impl<'a> ReferenceWeights<'a> {
 
     /// No place of the plane has a larger sum.
     ///
-    /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one another,
-    /// footprints included, each a step deeper than the last; it may meet the first one before the volume begins, and voxels
-    /// of a slice may be nearer than the place where it meets that.
+    /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one
+    /// another, footprints included, each a step deeper than the last; it may meet the first one before the volume
+    /// begins, and voxels of a slice may be nearer than the place where it meets that.
     pub(in crate::render) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.setup.tau, self.setup.clip.dims());
@@ -68,9 +71,9 @@ impl<'a> ReferenceWeights<'a> {
         along * self.slice() * self.footprint.at_depth(self.nearest())
     }
 
-    /// A depth behind which voxels add at most such a share of the nearest voxel's own weight, and so of the largest sum
-    /// anywhere. With S the sum of a slice without end, r_n = r_0 + n d where a ray meets slice n, and voxels that a place sees
-    /// at most e nearer or further away than that, all voxels deeper than z add up to
+    /// A depth behind which voxels add at most such a share of the nearest voxel's own weight, and so of the largest
+    /// sum anywhere. With S the sum of a slice without end, r_n = r_0 + n d where a ray meets slice n, and voxels that
+    /// a place sees at most e nearer or further away than that, all voxels deeper than z add up to
     ///
     /// ```text
     /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))

@@ -1,4 +1,4 @@
-//! A slab across the view direction: how much of each voxel's kernel lies in it.
+//! A slab across the view direction: how much of each voxel's kernel lies in it (eq 29).
 
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
@@ -31,7 +31,7 @@ impl Slab {
         [self.near - self.reach(), self.far + self.reach()]
     }
 
-    /// The share of a kernel's integral along the ray that lies in the slab, of a voxel at depth `z`:
+    /// The share of a kernel's integral along the ray that lies in the slab, for a voxel at depth `z` (eq 29):
     /// Phi((far - z) / sigma) - Phi((near - z) / sigma).
     pub(in crate::render) fn share(&self, z: f64) -> f64 {
         let [from, to] = self.reached_from();

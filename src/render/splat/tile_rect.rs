@@ -18,7 +18,8 @@ pub(in crate::render) struct TileRect {
 }
 
 impl TileRect {
-    /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels wide.
+    /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels
+    /// wide.
     pub(in crate::render) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
         pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
@@ -35,7 +36,8 @@ impl TileRect {
     }
 }
 
-/// The columns and rows of the picture that any voxel of a block can reach; where it reaches none of these, none of those.
+/// The columns and rows of the picture that any voxel of a block can reach; where it reaches none of these, none of
+/// those.
 pub(in crate::render) fn pixels_reached(
     region: &Region,
     grid: &Grid,
@@ -47,8 +49,8 @@ pub(in crate::render) fn pixels_reached(
     pixels_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
 }
 
-/// The columns and rows of a picture of such a size that are within `reach` pixels of the box around some places; none of
-/// either if there are none of one.
+/// The columns and rows of a picture of such a size that are within `reach` pixels of the box around some places; none
+/// of either if there are none of one.
 pub(in crate::render) fn pixels_around(
     places: impl Iterator<Item = [f64; 2]>,
     reach: f64,

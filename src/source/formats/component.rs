@@ -1,6 +1,7 @@
-//! One component of a vector, as `--variable` names it.
+//! One component of a vector, as the option `variable` names it.
 
-use crate::source::Parsed;
+use crate::base::error::{Note, Remedy};
+use crate::source::Advised;
 
 /// A variable's name, and the component that is meant, if any is: `velocity[1]` and `velocity[y]` are the second one.
 pub(in crate::source) fn named(variable: &str) -> (&str, Option<usize>) {
@@ -15,26 +16,26 @@ pub(in crate::source) fn named(variable: &str) -> (&str, Option<usize>) {
 }
 
 /// Which of some components is meant; an error that says how to say it.
-pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usize>) -> Parsed<usize> {
+pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usize>) -> Advised<usize> {
     match index {
-        _ if components == 0 => Err(format!("{name} has no component")),
+        _ if components == 0 => Err(format!("{name} has no component").into()),
         Some(index) if index < components => Ok(index),
-        Some(index) => Err(format!("{name} has {components} component(s), none with number {index}")),
+        Some(index) => Err(format!("{name} has {components} component(s), none with number {index}").into()),
         None if components == 1 => Ok(0),
         None => {
-            let last = components - 1;
-            Err(format!("{name} has {components} components: --variable '{name}[0]' takes the first, up to [{last}]"))
+            let remedy = Remedy::ChooseComponent { name: name.into(), components };
+            Err(Note::with(format!("{name} has {components} components"), remedy))
         }
     }
 }
 
-/// Which component of a file's only array `--variable` means, and what that is called. An array without a name is called
+/// Which component of a file's only array the option `variable` means, and what that is called. An array without a name is called
 /// `samples` where it needs one.
 pub(in crate::source) fn of_only(
     own: Option<&str>,
     components: usize,
     variable: Option<&str>,
-) -> Parsed<(usize, Option<String>)> {
+) -> Advised<(usize, Option<String>)> {
     let name = own.unwrap_or("samples");
     let (asked, index) = match variable {
         None => (name, None),
@@ -42,7 +43,7 @@ pub(in crate::source) fn of_only(
         Some(text) => named(text),
     };
     if asked != name && !asked.is_empty() {
-        return Err(format!("has no array {asked}; its only one is called {name}"));
+        return Err(format!("has no array {asked}; its only one is called {name}").into());
     }
     let index = chosen(name, components, index)?;
     let called = if components > 1 { Some(label(name, components, index)) } else { own.map(String::from) };
@@ -58,12 +59,12 @@ pub(in crate::source) struct Chosen {
     pub(in crate::source) component: usize,
 }
 
-/// The array that `--variable` names, else the active one, else the only one. Arrays have a name and some components.
+/// The array that the option `variable` names, else the active one, else the only one. Arrays have a name and some components.
 pub(in crate::source) fn choose(
     arrays: &[(&str, usize)],
     active: Option<usize>,
     variable: Option<&str>,
-) -> Parsed<Chosen> {
+) -> Advised<Chosen> {
     let names = || arrays.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let find = |wanted: &str| arrays.iter().position(|(name, _)| *name == wanted);
     let (array, index) = match (variable, active, arrays) {
@@ -77,7 +78,8 @@ pub(in crate::source) fn choose(
         (None, Some(array), _) => (array, None),
         (None, None, [_]) => (0, None),
         (None, None, _) => {
-            return Err(format!("has several arrays and none is active: --variable chooses one of {}", names()));
+            let what = format!("has several arrays and none is active: {}", names());
+            return Err(Note::with(what, Remedy::ChooseVariable));
         }
     };
     let (name, components) = arrays[array];

@@ -1,5 +1,6 @@
 //! How the axes of an array go in the world: along the world's in any order and direction, or aslant.
 
+use crate::base::error::Note;
 use crate::source::Parsed;
 use crate::source::layout::{Axis, Counts};
 
@@ -25,7 +26,7 @@ pub(in crate::source) struct Placed {
     /// World position of its first voxel.
     pub(in crate::source) origin: [f64; 3],
     /// What a user should know.
-    pub(in crate::source) note: Option<String>,
+    pub(in crate::source) note: Option<Note>,
 }
 
 impl Directions {
@@ -49,7 +50,7 @@ impl Directions {
     pub(in crate::source) fn placed(&self, lengths: [usize; 3], what: &str) -> Placed {
         let norms = self.steps.map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
         let Some(along) = self.straight(&norms) else {
-            let note = Some(format!("the {what} are not kept: axes are taken as those of the world"));
+            let note = Some(format!("the {what} are not kept: axes are taken as those of the world").into());
             return Placed { axes: [0, 1, 2].map(|a| (a, false)), spacing: norms, origin: self.first, note };
         };
         let (mut spacing, mut origin) = (norms, self.first);
@@ -59,7 +60,7 @@ impl Directions {
             origin[along[a]] -= if backwards { norms[a] * lengths[a].saturating_sub(1) as f64 } else { 0.0 };
             (along[a], backwards)
         });
-        Placed { axes, spacing, origin, note: turned(&axes) }
+        Placed { axes, spacing, origin, note: turned(&axes).map(Note::from) }
     }
 
     /// The axis of the world that each axis of the array goes along.
@@ -111,7 +112,7 @@ mod tests {
         let turned = placed([[0.0, 0.0, -0.5], [4.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
         assert_eq!((turned.spacing, turned.origin), ([4.0, 2.0, 0.5], [1.0, 2.0, 0.0]));
         assert_eq!(turned.axes, [(2, true), (0, false), (1, false)]);
-        assert!(turned.note.expect("a note").contains("along -z +x +y of the world"));
+        assert!(turned.note.expect("a note").text.contains("along -z +x +y of the world"));
     }
 
     #[test]
@@ -127,7 +128,7 @@ mod tests {
         for steps in [[x, [0.0, 3.0, 4.0], z], [x, x, z], [x, [0.0; 3], z], [x, y, [f64::NAN; 3]]] {
             let found = placed(steps);
             assert_eq!(found.axes, [(0, false), (1, false), (2, false)]);
-            assert!(found.note.expect("a note").contains("directions are not kept"));
+            assert!(found.note.expect("a note").text.contains("directions are not kept"));
         }
         assert_eq!(placed([x, [0.0, 3.0, 4.0], z]).spacing, [1.0, 5.0, 1.0]);
     }

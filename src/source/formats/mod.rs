@@ -1,5 +1,6 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
 
+#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 mod arrays;
 mod association;
 mod base64;
@@ -24,8 +25,9 @@ mod xml;
 pub use npy::{ArrayHeader, array_header};
 
 use super::OpenOptions;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
+use crate::base::npy::MAGIC;
 use crate::source::file_header::{FileHeader, head};
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -137,7 +139,7 @@ impl Format {
         let head = head(&FileBytes::open(path, Access::Read)?, FIRST_READ)?;
         let is_nifti = nifti::is_nifti(&head) || nifti::header_of(path).is_some();
         let formats = [
-            (head.starts_with(npy::MAGIC), Self::Npy),
+            (head.starts_with(MAGIC), Self::Npy),
             (head.starts_with(nrrd::MAGIC), Self::Nrrd),
             (head.starts_with(vtk::MAGIC), Self::Vtk),
             (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
@@ -183,56 +185,59 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
+        #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
+        #[cfg(feature = "netcdf")]
         Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
         #[cfg(feature = "zarr")]
         Some(Format::Zarr) => arrays::describe_zarr(path, options),
+        #[cfg(not(feature = "hdf5"))]
+        Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5)),
+        #[cfg(not(feature = "netcdf"))]
+        Some(Format::NetCdf) => Err(not_built_in(path, Format::NetCdf)),
         #[cfg(not(feature = "zarr"))]
-        Some(Format::Zarr) => {
-            let what = "Zarr is not built in; cargo build --release --features zarr does that";
-            Err(Error::input(path, what))
-        }
-        Some(Format::Pvd | Format::FileSeries) => {
-            Err(Error::usage(format!("{}: a list of files must be the only input", path.display())))
-        }
-        Some(Format::Coefficients) => {
-            Err(Error::usage(format!("{}: is a coefficient file already, not frames to convert", path.display())))
-        }
+        Some(Format::Zarr) => Err(not_built_in(path, Format::Zarr)),
+        Some(Format::Pvd | Format::FileSeries) => Err(Error::path(path, "a list of files must be the only input")),
+        Some(Format::Coefficients) => Err(Error::path(path, "is a coefficient file already, not frames to convert")),
         None if options.dims.is_none() => Err(unknown(path)),
         None => raw::describe(path, options),
     }
 }
 
+/// The error of a format whose crates this build does not have.
+#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "zarr")))]
+fn not_built_in(path: &Path, format: Format) -> Error {
+    let feature = match format {
+        Format::Hdf5 => "hdf5",
+        Format::NetCdf => "netcdf",
+        _ => "zarr",
+    };
+    Error::input(path, Note::with(format!("{} is not built in", format.name()), Remedy::BuildWith(feature)))
+}
+
 fn unknown(path: &Path) -> Error {
-    let what = "is of no known format. Headerless data needs --dims NXxNYxNZ and --dtype";
-    Error::usage(format!("{}: {what}. Supported are {SUPPORTED}", path.display()))
+    let what = format!("is of no known format. Supported are {SUPPORTED}");
+    Error::path(path, Note::with(what, Remedy::DescribeSamples))
 }
 
 /// Options that would be ignored are refused, so that nobody thinks they had an effect.
 pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
     let given = [
-        (options.dims.is_some(), "--dims"),
-        (options.sample.is_some(), "--dtype"),
-        (options.big_endian, "--endian"),
-        (options.offset > 0, "--offset"),
-        (options.variable.is_some() && format == Format::Npy, "--variable"),
-        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "--axes"),
+        (options.dims.is_some(), "dims"),
+        (options.sample.is_some(), "sample"),
+        (options.big_endian, "big_endian"),
+        (options.offset > 0, "offset"),
+        (options.variable.is_some() && format == Format::Npy, "variable"),
+        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "axes"),
     ];
-    match given.into_iter().find(|(given, _)| *given) {
-        Some((_, "--variable")) => Err(Error::usage(format!(
-            "{}: --variable is for files that have names; this has one array",
-            path.display()
-        ))),
-        Some((_, "--axes")) => {
-            let what = "--axes is for HDF5, NetCDF and Zarr; this file says it itself";
-            Err(Error::usage(format!("{}: {what}", path.display())))
-        }
-        Some((_, name)) if format.holds_frames() => {
-            let what = format!("says itself what it holds; {name} is for headerless data, leave it out");
-            Err(Error::usage(format!("{}: {what}", path.display())))
-        }
-        _ => Ok(()),
-    }
+    let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
+    let what = match setting {
+        "variable" => "has one array; this is for files that have names",
+        "axes" => "says itself what its axes count; this is for HDF5, NetCDF and Zarr",
+        _ if format.holds_frames() => "says itself what it holds; this is for headerless data, leave it out",
+        _ => return Ok(()),
+    };
+    Err(Error::setting(setting, format!("{} {what}", path.display())))
 }
 
 #[cfg(test)]

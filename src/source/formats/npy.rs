@@ -2,21 +2,17 @@
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
+use crate::base::npy::{Header, MAGIC};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, check_size};
 use crate::source::layout::Layout;
 use crate::source::layout::Shape;
-use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-/// How every `.npy` starts.
-pub(in crate::source) const MAGIC: &[u8] = b"\x93NUMPY";
-
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
-const MAX_NESTING: usize = 8; // brackets within brackets: the parser takes twice as long with each dictionary more
 
 /// What the header of an array says.
 #[derive(Debug)]
@@ -58,11 +54,11 @@ pub(in crate::source) fn describe(path: &Path) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let refused = |e| Error::input(path, e);
-    let (header, order) = any_header(&mut BufReader::with_capacity(256, file), path)?;
+    let (header, is_fortran) = any_header(&mut BufReader::with_capacity(256, file), path)?;
     let Array { shape, frames, big_endian, start } = header.of_volumes().map_err(refused)?;
     check_size(state.len, start, &shape, frames).map_err(refused)?;
     let mut layout = Layout::plain(shape.dims(), frames);
-    if order == Order::Fortran {
+    if is_fortran {
         layout.0.reverse();
     }
     let stored = Stored::new(&layout, shape.sample(), big_endian).map_err(refused)?;
@@ -78,42 +74,47 @@ pub(in crate::source) fn read_header(reader: &mut impl Read, path: &Path) -> Res
 /// The header of an array in C order.
 fn c_header(reader: &mut impl Read, path: &Path) -> Result<ArrayHeader> {
     match any_header(reader, path)? {
-        (header, Order::C) => Ok(header),
-        (_, Order::Fortran) => {
+        (header, false) => Ok(header),
+        (_, true) => {
             let what = "its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))";
             Err(Error::input(path, what))
         }
     }
 }
 
-fn any_header(reader: &mut impl Read, path: &Path) -> Result<(ArrayHeader, Order)> {
-    let bytes = header_bytes(reader).map_err(|e| match e.kind() {
+/// The header, and whether the array is in Fortran order.
+fn any_header(reader: &mut impl Read, path: &Path) -> Result<(ArrayHeader, bool)> {
+    let (text, start) = header_text(reader).map_err(|e| match e.kind() {
         io::ErrorKind::UnexpectedEof => Error::input(path, "ends inside its npy header"),
         io::ErrorKind::InvalidData => Error::input(path, e.to_string()),
         _ => Error::io(path, "reading the npy header", e),
     })?;
-    parse(&bytes).map_err(|e| Error::input(path, e))
+    parse(&text, start).map_err(|e| Error::input(path, e))
 }
 
-fn header_bytes(reader: &mut impl Read) -> io::Result<Vec<u8>> {
-    let mut bytes = vec![0; 8];
-    reader.read_exact(&mut bytes)?;
-    if !bytes.starts_with(MAGIC) {
-        return Err(io::Error::new(io::ErrorKind::InvalidData, "does not start as an npy file does"));
-    }
+/// The text of a header, and the number of bytes up to its end.
+fn header_text(reader: &mut impl Read) -> io::Result<(Vec<u8>, u64)> {
+    let mut head = [0; MAGIC.len() + 2];
+    reader.read_exact(&mut head)?;
+    let width = match head.strip_prefix(MAGIC) {
+        Some([1, 0]) => 2,
+        Some([2 | 3, 0]) => 4,
+        Some(version) => return Err(invalid(format!("its npy header has an unsupported version: {version:?}"))),
+        None => return Err(invalid("does not start as an npy file does".into())),
+    };
     let mut len = [0; 4];
-    let width = if bytes[6] == 1 { 2 } else { 4 };
     reader.read_exact(&mut len[..width])?;
-    let text = u32::from_le_bytes(len) as usize;
-    if text > MAX_HEADER {
-        let what = format!("its npy header claims {text} bytes; at most {MAX_HEADER} are accepted");
-        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    let len = u32::from_le_bytes(len) as usize;
+    if len > MAX_HEADER {
+        return Err(invalid(format!("its npy header claims {len} bytes; at most {MAX_HEADER} are accepted")));
     }
-    bytes.extend(&len[..width]);
-    let before = bytes.len();
-    bytes.resize(before + text, 0);
-    reader.read_exact(&mut bytes[before..])?;
-    Ok(bytes)
+    let mut text = vec![0; len];
+    reader.read_exact(&mut text)?;
+    Ok((text, (head.len() + width + len) as u64))
+}
+
+fn invalid(what: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what)
 }
 
 impl ArrayHeader {
@@ -127,31 +128,13 @@ impl ArrayHeader {
     }
 }
 
-fn parse(bytes: &[u8]) -> Parsed<(ArrayHeader, Order)> {
-    check_harmless(&bytes[8..])?;
-    let header = NpyHeader::from_reader(bytes).map_err(|e| format!("its npy header is damaged: {e}"))?;
-    let (sample, big_endian) = sample_type(&header.dtype())?;
-    let (lengths, start) = (header.shape().to_vec(), bytes.len() as u64);
-    Ok((ArrayHeader { lengths, sample, big_endian, start }, header.order()))
-}
-
-/// Stops text on which the parser would run out of stack or multiply beyond 64 bits.
-fn check_harmless(text: &[u8]) -> Parsed<()> {
-    let mut depth = 0_usize;
-    for byte in text {
-        match byte {
-            b'(' | b'[' | b'{' => depth += 1,
-            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        if depth > MAX_NESTING {
-            return Err("its npy header is nested too deeply".into());
-        }
-    }
-    let numbers = text.split(|b| !b.is_ascii_digit()).filter(|n| !n.is_empty());
-    let number = |n: &[u8]| std::str::from_utf8(n).ok()?.parse::<u64>().ok();
-    let product = numbers.map(number).try_fold(1_u64, |all, n| all.checked_mul(n?.max(1)));
-    product.map(|_| ()).ok_or_else(|| "the numbers in its npy header are too large".into())
+fn parse(text: &[u8], start: u64) -> Parsed<(ArrayHeader, bool)> {
+    let Header { samples, is_fortran, shape } = Header::parse(text).map_err(|e| format!("its npy header {e}"))?;
+    let (sample, big_endian) = samples.map_err(|descr| {
+        let hint = "supported are u1 i1 u2 i2 u4 i4 f2 f4 f8 (bytes, not bits); convert with .astype(np.int32), say";
+        format!("its samples are {descr}; {hint}")
+    })?;
+    Ok((ArrayHeader { lengths: shape, sample, big_endian, start }, is_fortran))
 }
 
 fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
@@ -161,31 +144,6 @@ fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
         [t, z, y, x] => Ok(([number(x)?, number(y)?, number(z)?], number(t)?)),
         _ => Err(format!("its array has {} dimension(s); supported are (z, y, x) and (t, z, y, x)", shape.len())),
     }
-}
-
-fn sample_type(dtype: &DType) -> Parsed<(SampleType, bool)> {
-    let refused = || {
-        let hint = "supported are u1 i1 u2 i2 u4 i4 f2 f4 f8 (bytes, not bits); convert with .astype(np.int32), say";
-        format!("its samples are {}; {hint}", dtype.descr())
-    };
-    let DType::Plain(ty) = dtype else { return Err(refused()) };
-    let sample = plain_type(ty).ok_or_else(refused)?;
-    Ok((sample, ty.endianness() == Endianness::Big))
-}
-
-fn plain_type(ty: &TypeStr) -> Option<SampleType> {
-    Some(match (ty.type_char(), ty.size_field()) {
-        (TypeChar::Uint, 1) => SampleType::U8,
-        (TypeChar::Int, 1) => SampleType::I8,
-        (TypeChar::Uint, 2) => SampleType::U16,
-        (TypeChar::Int, 2) => SampleType::I16,
-        (TypeChar::Uint, 4) => SampleType::U32,
-        (TypeChar::Int, 4) => SampleType::I32,
-        (TypeChar::Float, 2) => SampleType::F16,
-        (TypeChar::Float, 4) => SampleType::F32,
-        (TypeChar::Float, 8) => SampleType::F64,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

@@ -84,7 +84,7 @@ mod tests {
         assert!(source.archive().notes.is_empty());
         let source = open(&[folder.path("")], &OpenOptions::default()).expect("opening the folder");
         assert_eq!(source.archive().frames, Some(2));
-        assert!(source.archive().notes[0].contains("list.pvd"));
+        assert!(source.archive().notes[0].text.contains("list.pvd"));
     }
 
     #[test]
@@ -117,7 +117,7 @@ mod tests {
         let sets = r#"<DataSet timestep="2" file="a.npy"/><DataSet timestep="1" file="b.npy"/>"#;
         let list = folder.write("x.pvd", pvd(sets));
         let source = open(&[list], &OpenOptions::default()).expect("opening");
-        assert!(source.archive().notes[0].contains("do not ascend"));
+        assert!(source.archive().notes[0].text.contains("do not ascend"));
         folder.write("y.pvd", pvd(sets));
         refused(&[folder.path("")], &OpenOptions::default(), "several lists of files, x.pvd and y.pvd");
     }

@@ -1,33 +1,35 @@
 //! Headerless samples: the user says what they are.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::OpenOptions;
 use crate::source::file_header::{FileHeader, Part, check_size};
 use crate::source::layout::Shape;
 use std::path::Path;
 
-/// The frames that `--dims` and `--dtype` describe, and how many of them if `--dims` says so.
+/// The frames that the options `dims` and `sample` describe, and how many of them if `dims` says so.
 ///
 /// # Errors
-/// Usage, if one of them is missing or makes no sense.
+/// [`Error::Setting`], if one of them is missing or makes no sense.
 pub(in crate::source) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
     let dims = options.dims.as_deref().unwrap_or_default();
     let (dims, frames) = match *dims {
         [x, y, z] => ([x, y, z], None),
         [x, y, z, t] => ([x, y, z], Some(t)),
-        _ => return Err(Error::usage(format!("--dims needs NXxNYxNZ or NXxNYxNZxNT, not {} number(s)", dims.len()))),
+        _ => {
+            return Err(Error::setting("dims", format!("needs NXxNYxNZ or NXxNYxNZxNT, not {} number(s)", dims.len())));
+        }
     };
     let Some(sample) = options.sample else {
-        return Err(Error::usage("headerless data needs --dtype, for example --dtype f32"));
+        return Err(Error::setting("sample", "headerless data needs a type of samples, for example f32"));
     };
     if frames == Some(0) {
-        return Err(Error::usage("--dims with 0 frames describes nothing"));
+        return Err(Error::setting("dims", "0 frames are nothing"));
     }
     if options.variable.is_some() {
-        return Err(Error::usage("--variable is for files that have names; headerless data has one array"));
+        return Err(Error::setting("variable", "is for files that have names; headerless data has one array"));
     }
-    let shape = Shape::new(dims, sample).map_err(|e| Error::usage(format!("--dims: {e}")))?;
+    let shape = Shape::new(dims, sample).map_err(|e| Error::setting("dims", e))?;
     Ok((shape, frames))
 }
 
@@ -37,20 +39,18 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
     let state = FileBytes::open(path, Access::Read)?.state();
     let count = frames.unwrap_or(1);
     check_size(state.len, options.offset, &shape, count)
-        .map_err(|what| Error::input(path, format!("{what}{}", advice(state.len, &shape, options))))?;
+        .map_err(|what| Error::input(path, Note::with(what, remedy(state.len, &shape, options))))?;
     let part = Part::plain((path, state), (&shape, count), options.big_endian, options.offset)
-        .map_err(|e| Error::usage(format!("--dims: {e}")))?;
+        .map_err(|e| Error::setting("dims", e))?;
     Ok(FileHeader::plain(shape, vec![part]))
 }
 
 /// What to try when the size is wrong.
-fn advice(len: u64, shape: &Shape, options: &OpenOptions) -> String {
-    let [x, y, z] = shape.dims();
+fn remedy(len: u64, shape: &Shape, options: &OpenOptions) -> Remedy {
     let payload = len.saturating_sub(options.offset);
     match (payload / shape.frame_bytes() as u64, payload % shape.frame_bytes() as u64) {
-        (1, 0) => format!(": say --dims {x}x{y}x{z}"),
-        (k, 0) if k > 1 => format!(": say --dims {x}x{y}x{z}x{k}"),
-        _ => "; check --dims, --dtype and --offset".into(),
+        (frames, 0) if frames > 0 => Remedy::SetDims { dims: shape.dims(), frames },
+        _ => Remedy::CorrectSamples,
     }
 }
 
@@ -90,11 +90,11 @@ mod tests {
     fn wrong_sizes_are_explained() {
         let folder = Folder::new();
         let file = [folder.write("all.raw", payload(SampleType::F32, 0..4, false))];
-        refused(&file, &options(None, SampleType::F32), "say --dims 7x5x3x4");
+        refused(&file, &options(None, SampleType::F32), "SetDims { dims: [7, 5, 3], frames: 4 }");
         refused(&file, &options(Some(5), SampleType::F32), "expected 2100 bytes");
-        refused(&file, &options(Some(4), SampleType::U8), "--dims 7x5x3x16");
+        refused(&file, &options(Some(4), SampleType::U8), "SetDims { dims: [7, 5, 3], frames: 16 }");
         refused(&file, &options(Some(4), SampleType::F64), "right for samples of 4 byte(s)");
-        refused(&file, &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) }, "check --dims");
+        refused(&file, &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) }, "CorrectSamples");
         let empty = [folder.write("empty.raw", "")];
         refused(&empty, &options(None, SampleType::F32), "found 0");
     }
@@ -109,8 +109,12 @@ mod tests {
         refused(&file, &of(&[2, 2, 2, 0]), "0 frames");
         refused(&file, &of(&[usize::MAX, 2, 2]), "too large");
         refused(&file, &of(&[2, 2, 2, usize::MAX]), "too large");
-        refused(&file, &OpenOptions { sample: None, ..of(&[2, 2, 2]) }, "--dtype");
-        refused(&file, &OpenOptions { variable: Some("a".into()), ..of(&[2, 2, 2]) }, "--variable");
+        refused(&file, &OpenOptions { sample: None, ..of(&[2, 2, 2]) }, "sample: headerless data needs");
+        refused(
+            &file,
+            &OpenOptions { variable: Some("a".into()), ..of(&[2, 2, 2]) },
+            "variable: is for files that have names",
+        );
         refused(&file, &OpenOptions::default(), "Supported are .npy");
     }
 }

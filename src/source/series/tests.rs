@@ -112,7 +112,7 @@ fn what_a_file_says_otherwise_than_the_first_is_refused_or_noted() {
     let source = open(&files, &OpenOptions::default()).expect("opening");
     assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 1.0]);
     let [note] = &source.archive().notes[..] else { panic!("{:?}", source.archive().notes) };
-    assert!(note.contains("those of the first file") && note.ends_with("f2.nrrd has others"), "{note}");
+    assert!(note.text.contains("those of the first file") && note.text.ends_with("f2.nrrd has others"), "{note}");
     assert!(open(&files[..2], &OpenOptions::default()).expect("opening").archive().notes.is_empty());
     let given = OpenOptions { spacing: Some([1.0; 3]), ..OpenOptions::default() };
     assert!(open(&files, &given).expect("opening").archive().notes.is_empty(), "the user's holds for all");
@@ -136,8 +136,8 @@ fn files_follow_one_another_in_the_same_units() {
     assert_eq!(tomorrow.follows(&first, "a"), Ok(Mismatch { grid: false, times: true }));
     let untimed = FileHeader { times: Vec::new(), ..tomorrow };
     assert_eq!(untimed.follows(&first, "a"), Ok(Mismatch { grid: false, times: false }));
-    assert_eq!(refusal(&later(units("C", ""))), "has samples in the unit C, but a has K");
-    assert_eq!(refusal(&FileHeader { missing: None, ..untimed }), "has the missing value none, but a has -1");
+    assert_eq!(refusal(&later(units("C", ""))), "has samples in the unit C, but a has K".into());
+    assert_eq!(refusal(&FileHeader { missing: None, ..untimed }), "has the missing value none, but a has -1".into());
 }
 
 #[test]
@@ -156,11 +156,11 @@ fn times_that_are_no_numbers_are_left_out_and_those_that_go_back_are_noted() {
     for bad in ["nan", "inf", "1e999"] {
         let Archive { times, notes, .. } = archive(["0", bad, "2"]);
         assert!(times.is_empty(), "{bad}");
-        assert_eq!(notes, ["times are not all finite: frames are numbered"]);
+        assert_eq!(notes, ["times are not all finite: frames are numbered".into()]);
     }
     let Archive { times, notes, .. } = archive(["0", "2", "1"]);
     assert_eq!(times, [0.0, 2.0, 1.0]);
-    assert!(notes.len() == 1 && notes[0].contains("do not ascend"), "{notes:?}");
+    assert!(notes.len() == 1 && notes[0].text.contains("do not ascend"), "{notes:?}");
 }
 
 #[test]

@@ -29,7 +29,7 @@ fn stream(bytes: Vec<u8>, options: &OpenOptions) -> Result<Box<dyn FrameSource>>
 fn npy(frames: usize, payload: &[u8]) -> Vec<u8> {
     let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, 3, 5, 7)}}\n");
     let len = (dict.len() as u16).to_le_bytes();
-    [npy::MAGIC, &[1, 0], &len, dict.as_bytes(), payload].concat()
+    [MAGIC, &[1, 0], &len, dict.as_bytes(), payload].concat()
 }
 
 #[test]
@@ -68,12 +68,14 @@ fn frames_may_be_skipped_but_not_taken_again() {
 fn a_stream_that_ends_early_or_late_is_an_error() {
     let bytes = payload(TY, 0..4, false);
     let all = |bytes: &[u8], frames| message(stream(bytes.to_vec(), &options(frames)).and_then(|mut s| s.window(0, 9)));
-    assert!(all(&bytes[..bytes.len() - 1], None).contains("inside frame 3: expected 420 bytes, got 419"));
+    assert!(
+        all(&bytes[..bytes.len() - 1], None).contains("inside frame 3: expected 420 bytes, got 419; CorrectSamples")
+    );
     assert!(all(&bytes, Some(5)).contains("ends after 4 of 5 frames"));
     assert!(all(&bytes, Some(3)).contains("goes on after its 3 frame(s)"));
     assert!(all(&[], None).contains("is empty"));
     let skipping = OpenOptions { offset: 9999, ..options(None) };
-    assert!(message(stream(bytes, &skipping)).contains("inside the --offset"));
+    assert!(message(stream(bytes, &skipping)).contains("inside the offset of 9999"));
 }
 
 #[test]
@@ -84,7 +86,7 @@ fn npy_is_known_by_its_magic() {
     check_source(&mut *source, TY, 4);
     assert!(message(stream(bytes.clone(), &options(None))).contains("leave them out"));
     let typed = OpenOptions { sample: Some(TY), ..OpenOptions::default() };
-    assert!(message(stream(bytes, &typed)).contains("--dtype"));
-    assert!(message(stream(b"data".to_vec(), &OpenOptions::default())).contains("needs --dims"));
+    assert!(message(stream(bytes, &typed)).contains("sample: - says itself"));
+    assert!(message(stream(b"data".to_vec(), &OpenOptions::default())).contains("is no npy stream; DescribeSamples"));
     assert!(message(stream(npy(4, &[])[..20].to_vec(), &OpenOptions::default())).contains("npy header"));
 }

@@ -79,17 +79,21 @@ pub fn decode(data: &[u8]) {
 }
 
 /// A file that was cut, or whose end is something else: what is whole of it is gone on with to a sound file.
-pub fn unfinished(data: &[u8]) {
+pub fn prefix(data: &[u8]) {
     let mut input = Input::new(data);
     let (_, seed) = seed(input.byte());
     let cut = input.short();
     let mut file = seed.forge(&edits(&mut input));
     file.truncate(cut * 64); // all that matters begins there
-    let Ok(found) = Unfinished::read(&file) else { return };
+    let Ok(found) = CompletePrefix::read(&file) else { return };
     let (end, frames) = (found.bytes() as usize, found.metadata().frames);
     assert!(end <= file.len());
     file.truncate(end);
-    assert_eq!(Unfinished::read(&file).map(|again| again.bytes()).ok(), Some(end as u64), "the same without the rest");
+    assert_eq!(
+        CompletePrefix::read(&file).map(|again| again.bytes()).ok(),
+        Some(end as u64),
+        "the same without the rest"
+    );
     let metadata = found.metadata().clone();
     let written = Writer::resume(file, found).finish();
     assert_eq!(written.is_ok(), frames > 0);
@@ -101,7 +105,7 @@ pub fn unfinished(data: &[u8]) {
 }
 
 /// A damaged file: what is saved is a file, and of a sound one that was damaged it is what it was.
-pub fn salvage(data: &[u8]) {
+pub fn recovery(data: &[u8]) {
     let mut input = Input::new(data);
     let (sound, seed) = seed(input.byte());
     let forge = input.below(2) == 1;
@@ -115,12 +119,12 @@ pub fn salvage(data: &[u8]) {
     }
     damages.drain(..).for_each(|how| hurt(&mut file, how));
     let mut searched = 0;
-    let Ok(salvage) = Salvage::search(&file, &mut |bytes| searched += bytes) else { return };
+    let Ok(recovery) = Recovery::search(&file, &mut |bytes| searched += bytes) else { return };
     assert_eq!(searched, file.len() as u64);
-    if salvage.metadata().blocks() > MOST_BLOCKS {
+    if recovery.metadata().blocks() > MOST_BLOCKS {
         return; // all of them would be written as lost
     }
-    let saved = salvage.write(&file, Vec::new(), &mut || ());
+    let saved = recovery.write(&file, Vec::new(), &mut || ());
     if forge {
         saved.map(|(file, _)| Reader::open(&file).map(drop).expect("what was saved is a file")).unwrap_or_default();
         return;
@@ -147,7 +151,7 @@ fn hurt(file: &mut Vec<u8>, [how, at, len, more]: [usize; 4]) {
 }
 
 /// Whether every block that was saved is as it was.
-fn is_part_of(file: &[u8], sound: &[u8], saved: &Salvaged) {
+fn is_part_of(file: &[u8], sound: &[u8], saved: &Recovered) {
     read_all(file).expect("what was saved is sound");
     let (new, old) = (Reader::open(file).expect("sound"), Reader::open(sound).expect("sound"));
     assert!(new.metadata().dims == old.metadata().dims && new.metadata().frames <= old.metadata().frames);

@@ -1,4 +1,5 @@
-//! The demo: the paper's experiment in small (sections 4.1 and 4.2), from a solver's frames to figure 5 and table 1.
+//! The demo: the experiment of [Dobashi](wavesplat::bibliography), sections 4.1 and 4.2, in small, from a solver's frames to
+//! figure 5 and table 1.
 //!
 //! As in the paper, every sample is turned into red, green and blue before anything else, and all methods splat three
 //! channels. What the same methods take for one channel, which is coloured after it was projected, is printed below.
@@ -9,13 +10,12 @@ mod table;
 use crate::diff::measure::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
 use crate::output::{Format, Shape, Target};
-use crate::scenes::{MEMORY, converted, pictures, projection, quietly};
+use crate::scenes::{MEMORY, converted, pictures, projection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::cli::transfer_function;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
@@ -145,10 +145,17 @@ impl Demo {
         let [x, y, z] = self.plate.dims;
         say(&format!("solving for eddy currents in a plate under a passing magnet ({x}x{y}x{z}, {FRAMES} frames)"));
         write_frames(&self.frames(), self.plate, FRAMES)?;
-        let colours = transfer_function(COLOURS, None, (&[], self.source()?.as_mut()), None, &quietly())?;
+        let colours = self.colours()?;
         let coloured = self.all_methods(Some(&colours), say)?;
         figure::draw(self, &coloured, &colours)?;
         Ok([coloured, self.all_methods(None, say)?])
+    }
+
+    /// The paper's colours over the range of all samples.
+    fn colours(&self) -> Result<TransferFunction> {
+        let range = source::value_range(self.source()?.as_mut(), None, &Silent)?;
+        let colours = TransferFunction::open(COLOURS)?;
+        colours.over(colours.suitable(range.unwrap_or((0.0, 1.0))))
     }
 
     /// In colours three channels, else one.

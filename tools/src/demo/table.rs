@@ -1,4 +1,4 @@
-//! Table 1 beside the paper's, with what the paper could not say: sizes and errors.
+//! Table 1 beside that of [Dobashi](wavesplat::bibliography), with what the paper could not say: sizes and errors.
 
 use super::{Demo, FRAMES, Run, TOLERANCE};
 use std::fmt::Write as _;

@@ -128,7 +128,7 @@ impl Stack {
     fn read_png(&self, path: &Path) -> Result<Vec<u8>> {
         let (mut reader, bytes) = open_png(path)?;
         if png_shape(&reader) != (Shape { frames: 1, ..self.shape }) {
-            return Err(Error::Changed { path: path.into(), what: "changed while it was being read".into() });
+            return Err(Error::changed(path, "changed while it was being read"));
         }
         let mut pixels = vec![0; bytes];
         reader.next_frame(&mut pixels).and_then(|_| reader.finish()).map_err(|e| damaged(path, e))?;

@@ -1,4 +1,4 @@
-//! The structural similarity of two pictures (Wang, Bovik, Sheikh and Simoncelli 2004).
+//! The structural similarity of two pictures ([Wang](wavesplat::bibliography)).
 
 use libm::exp;
 use rayon::prelude::*;
@@ -96,7 +96,7 @@ fn of_row(columns: &[Moments], scope: Scope, weights: &[f64; WINDOW]) -> (f64, u
     windows.filter(|s| s.is_finite()).fold((0.0, 0), |(sum, count), s| (sum + s, count + 1))
 }
 
-/// Equation 13 of the paper. Variances are of the values less the middle, so that little is lost to rounding.
+/// Equation 13 of [Wang](wavesplat::bibliography). Variances are of the values less the middle, so that little is lost to rounding.
 fn similarity(&[a, b, aa, bb, ab]: &Moments, Scope { peak, middle }: Scope) -> f64 {
     let (c1, c2) = ((K1 * peak).powi(2), (K2 * peak).powi(2));
     let (var_a, var_b, covariance) = (aa - a * a, bb - b * b, ab - a * b);

@@ -5,7 +5,7 @@ mod tiles;
 use crate::demo;
 use crate::eddy::Plate;
 use crate::output::{Format, Shape, Target};
-use crate::scenes::{MEMORY, converted, pictures, projection, quietly};
+use crate::scenes::{MEMORY, converted, pictures, projection};
 use crate::sheet::{GAP, Image, LETTER, Rgb, contact_sheet, stacked, titled};
 use crate::synth::{Kind, Synth};
 use clap::ValueEnum;
@@ -137,7 +137,7 @@ impl Gallery {
         name: &str,
         colours: Option<&TransferFunction>,
     ) -> Result<Arc<CoefficientFile>> {
-        let mut source: Box<dyn FrameSource> = input.open(std::slice::from_ref(path), &quietly())?;
+        let mut source: Box<dyn FrameSource> = input.open_quietly(std::slice::from_ref(path), MEMORY / 4)?;
         let (missing, colours) = (MissingPolicy::Mask, colours.cloned());
         let config =
             ConvertConfig { missing, colours, window: WINDOW, memory: MEMORY, ..ConvertConfig::new(TOLERANCE) };

@@ -1,4 +1,4 @@
-//! What only a few bits tell: signs of zeros, numbers that nobody reads, payloads that no checksum vouches for.
+//! Errors in a few bits: signs of zeros, fields that readers do not use, payloads with forged checksums.
 
 use super::fat::*;
 use super::forge::*;
@@ -68,7 +68,7 @@ fn windows_that_begin_with_minus_zero_are_not_resumed() {
             put(bytes, reached, -0.0);
         }
     });
-    assert_eq!(Unfinished::read(&file).expect("begun").metadata().windows.len(), 1);
+    assert_eq!(CompletePrefix::read(&file).expect("begun").metadata().windows.len(), 1);
 }
 
 #[test]
@@ -92,18 +92,18 @@ fn files_of_sections_that_overlap_are_searched_in_linear_time() {
         let began = Instant::now();
         let claim = [&tag[..], &(1u32 << 19).to_le_bytes(), &(1u32 << 19).to_le_bytes(), &[0; 12]].concat();
         let bomb = [&file[..], &claim.repeat((4 << 20) / claim.len())].concat();
-        let found = Salvage::search(&bomb, &mut |_| {});
+        let found = Recovery::search(&bomb, &mut |_| {});
         assert!(matches!(found, Err(Error::Invalid(what)) if what.contains("overlap")), "{tag:?}");
         assert!(began.elapsed().as_secs() < 5, "{tag:?}: {:?}", began.elapsed());
     }
 }
 
-/// Checksums fit, so nothing else tells.
+/// The checksums are valid, so only unpacking finds the damage.
 #[test]
 fn blocks_whose_payloads_cannot_be_unpacked_are_lost() {
     let original = fat();
     let pieces = Pieces::new(&original.file);
-    let (whole, mut tries) = (salvage(&original.file).expect("whole").1.lost.len(), 0);
+    let (whole, mut tries) = (recover(&original.file).expect("whole").1.lost.len(), 0);
     for (_, number, _) in pieces.sizes().into_iter().filter(|(piece, ..)| *piece == Piece::Raw) {
         let file = pieces.forge(&mut |piece, n, bytes| {
             if (piece, n) == (Piece::Raw, number) {
@@ -113,7 +113,7 @@ fn blocks_whose_payloads_cannot_be_unpacked_are_lost() {
         let reader = Reader::open(&file).expect("parts alone are wrong");
         let checked = original.blocks.keys().map(|id| reader.entry(*id).and_then(|entry| reader.check_parts(&entry)));
         let wrong = checked.filter(|checked| matches!(checked, Err(Error::Corrupt { .. }))).count();
-        let lost = salvage(&file).expect("most is whole").1.lost.len() - whole;
+        let lost = recover(&file).expect("most is whole").1.lost.len() - whole;
         assert_eq!(lost, wrong, "part {number}");
         tries += lost;
     }

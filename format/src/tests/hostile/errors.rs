@@ -1,4 +1,4 @@
-//! Every kind of error, provoked.
+//! Provokes every kind of error.
 
 use super::fat::*;
 use super::forge::*;
@@ -7,7 +7,7 @@ use crate::testing::*;
 use crate::*;
 use std::io;
 
-/// Storage that fails from some byte on.
+/// Storage that fails beyond an offset.
 #[derive(Debug)]
 struct Failing(Vec<u8>, u64);
 
@@ -23,28 +23,28 @@ impl Storage for Failing {
 }
 
 #[test]
-fn storage_that_fails_is_no_damage() {
+fn failing_storage_is_not_reported_as_damage() {
     let file = lean().file;
     for from in (0..file.len() as u64).step_by(61) {
         let failing = Failing(file.clone(), from);
         let io = |error: Error| matches!(&error, Error::Io(e) if e.to_string() == "a bad sector");
         assert!(io(Reader::open(&failing).expect_err("fails")), "{from}");
-        let resumed = Unfinished::read(&failing);
+        let resumed = CompletePrefix::read(&failing);
         assert!(resumed.map_or_else(io, |found| found.bytes() <= from), "{from}");
-        assert!(Salvage::search(&failing, &mut |_| {}).is_err_and(io), "{from}");
+        assert!(Recovery::search(&failing, &mut |_| {}).is_err_and(io), "{from}");
     }
 }
 
 #[test]
-fn other_files_are_foreign() {
+fn files_of_other_formats_are_foreign() {
     for bytes in [&b""[..], b"\x89PNG\r\n\x1a\n", &[0; 4096], b"\x1f\x8b"] {
         assert!(matches!(Reader::open(bytes), Err(Error::Foreign(_))), "{bytes:?}");
-        assert!(matches!(Unfinished::read(&bytes), Err(Error::Foreign(_))));
+        assert!(matches!(CompletePrefix::read(&bytes), Err(Error::Foreign(_))));
     }
 }
 
 #[test]
-fn damage_is_corrupt_and_has_a_place() {
+fn damage_is_corrupt_and_names_the_place() {
     let mut file = lean().file;
     file[700] ^= 1;
     let reader = Reader::open(&file).expect("a block alone is damaged");
@@ -57,7 +57,7 @@ fn damage_is_corrupt_and_has_a_place() {
 }
 
 #[test]
-fn newer_files_are_unsupported_to_all() {
+fn newer_files_are_unsupported() {
     let pieces = Pieces::new(&lean().file);
     for (at, value) in [(8, 2), (8, 0), (16, 1), (23, 0x80)] {
         let file = pieces.forge(&mut |piece, _, bytes| {
@@ -66,8 +66,8 @@ fn newer_files_are_unsupported_to_all() {
             }
         });
         assert!(matches!(Reader::open(&file), Err(Error::Unsupported(_))), "{at}");
-        assert!(matches!(Unfinished::read(&file), Err(Error::Unsupported(_))), "{at}");
-        assert!(matches!(Salvage::search(&file, &mut |_| {}), Err(Error::Unsupported(_))), "{at}");
+        assert!(matches!(CompletePrefix::read(&file), Err(Error::Unsupported(_))), "{at}");
+        assert!(matches!(Recovery::search(&file, &mut |_| {}), Err(Error::Unsupported(_))), "{at}");
     }
 }
 
@@ -82,7 +82,7 @@ fn sizes_beyond_the_limits_are_too_large() {
 }
 
 #[test]
-fn lost_blocks_and_blocks_that_never_were_are_told_apart() {
+fn lost_blocks_and_nonexistent_blocks_are_different_errors() {
     let original = fat();
     let reader = Reader::open(&original.file).expect("whole");
     let lost = &original.blocks.values().find(|(entry, _)| entry.lost).expect("one").0;

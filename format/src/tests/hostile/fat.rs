@@ -1,4 +1,4 @@
-//! A file of a few KiB that has every feature, and what must be right about whatever is read of changed ones.
+//! A file of a few KiB that uses every feature, and the checks for whatever is read from changed copies of it.
 
 use crate::testing::*;
 use crate::*;
@@ -7,22 +7,22 @@ use std::collections::{BTreeMap, HashSet};
 use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// A whole file and what is in it.
+/// A complete file and its content.
 pub(super) struct Original {
     pub(super) file: Vec<u8>,
     pub(super) metadata: Metadata,
     pub(super) blocks: BTreeMap<BlockId, (BlockEntry, Option<Content>)>,
-    /// Digests of salvaged files that were checked: many are the same.
+    /// Digests of recovered files that were checked; many are equal.
     checked: RefCell<HashSet<u128>>,
 }
 
-/// Windows of all bases, with and without a pyramid; two channels, times, outliers, missing and exact samples, a lost
+/// Has windows of all bases, with and without a pyramid, two channels, times, outliers, missing and exact samples, and a lost
 /// block.
 pub(super) fn fat() -> Original {
     original([5, 3, 2], 2, 7)
 }
 
-/// The same of fewer voxels and one channel.
+/// Like [`fat`], with fewer voxels and one channel.
 pub(super) fn lean() -> Original {
     original([2, 1, 1], 1, 3)
 }
@@ -63,8 +63,8 @@ fn windows() -> Vec<Window> {
 }
 
 impl Original {
-    /// Whether a salvaged file is sound, and every block in it what it was.
-    fn check_salvaged(&self, file: &[u8], salvaged: &Salvaged) {
+    /// Checks that a recovered file is valid and that every block in it equals the original.
+    fn check_recovered(&self, file: &[u8], recovered: &Recovered) {
         let (reader, mut lost) = (Reader::open(file).expect("whole"), Vec::new());
         assert_eq!(reader.metadata().start(), self.metadata.start());
         for (entry, content) in read_all(file).expect("whole") {
@@ -76,12 +76,12 @@ impl Original {
             assert_eq!((Some(&content), entry.stats), (expected.as_ref(), original.stats), "{}", entry.id);
             assert!(same_coding(reader.metadata(), &self.metadata, entry.id.window));
         }
-        assert_eq!(lost, salvaged.lost);
+        assert_eq!(lost, recovered.lost);
     }
 
-    /// Whether what is whole of a changed file is what it was.
-    pub(super) fn check_unfinished(&self, file: &[u8]) {
-        let Ok(found) = Unfinished::read(&file) else { return };
+    /// Checks that the complete windows of a changed file equal the original.
+    pub(super) fn check_prefix(&self, file: &[u8]) {
+        let Ok(found) = CompletePrefix::read(&file) else { return };
         let kept = found.bytes() as usize;
         assert!(file[..kept] == self.file[..kept], "{kept} bytes kept");
         let windows = found.metadata().windows.len();
@@ -89,22 +89,22 @@ impl Original {
         assert_eq!(found.metadata().times[..], self.metadata.times[..found.metadata().frames as usize]);
     }
 
-    /// Salvages a changed file and checks it; whether anything could be saved.
-    pub(super) fn check_salvage(&self, file: &[u8]) -> bool {
-        let Ok((out, salvaged)) = salvage(file) else { return false };
+    /// Recovers a changed file and checks the result. Returns whether anything could be recovered.
+    pub(super) fn check_recovery(&self, file: &[u8]) -> bool {
+        let Ok((out, recovered)) = recover(file) else { return false };
         if self.checked.borrow_mut().insert(xxh3_128(&out)) {
-            self.check_salvaged(&out, &salvaged);
+            self.check_recovered(&out, &recovered);
         }
         true
     }
 }
 
-/// The salvaged file of a damaged one.
-pub(super) fn salvage(file: &[u8]) -> Result<(Vec<u8>, Salvaged)> {
-    Salvage::search(&file, &mut |_| {})?.write(&file, Vec::new(), &mut || {})
+/// Recovers a damaged file.
+pub(super) fn recover(file: &[u8]) -> Result<(Vec<u8>, Recovered)> {
+    Recovery::search(&file, &mut |_| {})?.write(&file, Vec::new(), &mut || {})
 }
 
-/// Whether samples of a window are decoded alike by both.
+/// Whether both metadata decode a window in the same way.
 fn same_coding(a: &Metadata, b: &Metadata, window: u32) -> bool {
     let coding = |m: &Metadata| {
         let Window { first_frame, frames, basis, coefficients, levels, functions, pyramid, .. } =
@@ -115,13 +115,13 @@ fn same_coding(a: &Metadata, b: &Metadata, window: u32) -> bool {
     coding(a) == coding(b)
 }
 
-/// Everything that a program does with a file, whatever comes of it.
+/// Does everything that a program does with a file and ignores the results.
 pub(super) fn use_all(file: &[u8]) {
     let _ = read_through(file);
-    let _ = Unfinished::read(&file);
+    let _ = CompletePrefix::read(&file);
 }
 
-/// As [`read_all`], but unpacks every part only once.
+/// Like [`read_all`], but unpacks every part only once.
 fn read_through(file: &[u8]) -> Result<()> {
     let reader = Reader::open(file)?;
     reader.check_structure(&mut drop)?;
@@ -133,7 +133,7 @@ fn read_through(file: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Says what a test tried, and sees to it that this was enough.
+/// Prints how many cases a test tried, and fails if there were too few.
 #[allow(clippy::print_stderr, reason = "a table of what was tried is made of these")]
 pub(super) fn tell(suite: &str, tries: u64, intended: u64, began: Instant) {
     eprintln!("{suite} | {tries} | {:.1}", began.elapsed().as_secs_f64());
@@ -159,5 +159,5 @@ fn fat_files_have_every_feature() {
     }
     assert!(blocks.values().any(|(entry, _)| entry.part(PartKind::Level(3)).is_some()));
     assert_eq!(blocks.values().filter(|(entry, _)| entry.lost).count(), 1);
-    assert_eq!(salvage(&file).expect("whole").0, file);
+    assert_eq!(recover(&file).expect("whole").0, file);
 }

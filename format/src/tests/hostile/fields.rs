@@ -1,4 +1,4 @@
-//! Fields of extreme values; checksums fit.
+//! FieldReader of extreme values; checksums fit.
 
 use super::fat::*;
 use super::forge::*;
@@ -6,7 +6,7 @@ use crate::testing::*;
 use crate::*;
 use std::time::Instant;
 
-/// Offsets and sizes of the fields of a piece, by `FORMAT.md`; of records, where each byte may begin one.
+/// Offsets and sizes of the fields of a piece, by `FORMAT.md`. In records, a field may begin at every byte.
 fn fields(piece: Piece, len: usize) -> Vec<(usize, usize)> {
     let at = |sizes: &[usize]| {
         let starts = sizes.iter().scan(0, |next, size| {
@@ -32,7 +32,7 @@ fn fields(piece: Piece, len: usize) -> Vec<(usize, usize)> {
     }
 }
 
-/// What a field of a size is set to, `was` being its value.
+/// The values to try for a field of a size; `was` is its value.
 fn values(file: &[u8], size: usize, was: u64) -> Vec<u64> {
     let (len, most) = (file.len() as u64, u64::MAX >> (64 - 8 * size));
     let mut all = vec![0, 1, most, most - 1, 1 << 31, (1 << 32) - 1, 1 << 60, 1 << 63, len - 1, len, len + 1];
@@ -44,7 +44,7 @@ fn values(file: &[u8], size: usize, was: u64) -> Vec<u64> {
     all
 }
 
-/// Every piece and its content.
+/// Every piece with its content.
 fn contents(pieces: &Pieces) -> Vec<(Piece, usize, Vec<u8>)> {
     let mut found = Vec::new();
     pieces.forge(&mut |piece, number, bytes| found.push((piece, number, bytes.clone())));
@@ -71,9 +71,9 @@ fn extreme_fields_are_refused_or_change_nothing() {
                 if let (Ok(read), Piece::Header | Piece::Footer | Piece::Frame | Piece::Root) = (read, piece) {
                     assert_eq!(format!("{read:?}"), before, "{piece:?} {number} {at}");
                 }
-                let _ = Unfinished::read(&file);
+                let _ = CompletePrefix::read(&file);
                 if tries % 8 == 0 {
-                    let _ = salvage(&file);
+                    let _ = recover(&file);
                 }
                 slowest = slowest.max(start.elapsed().as_secs_f64());
                 tries += 1;

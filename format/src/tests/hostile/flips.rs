@@ -1,11 +1,11 @@
-//! Files with wrong bits, their checksums as they were or forged to fit.
+//! Files with flipped bits, with original or forged checksums.
 
 use super::fat::*;
 use super::forge::*;
 use crate::*;
 use std::time::Instant;
 
-/// Opens a file and checks every byte, but decompresses no part: their checksums must do.
+/// Opens a file and checks every byte without decompressing parts: the checksums must suffice.
 fn check_bytes(file: &[u8]) -> Result<()> {
     let reader = Reader::open(file)?;
     let mut wrong = None;
@@ -39,17 +39,17 @@ fn every_flipped_bit_of_a_fat_file_is_found_by_checksums() {
 }
 
 #[test]
-fn every_flipped_bit_costs_no_more_than_its_block_and_resumes_before_it() {
+fn a_flipped_bit_loses_only_its_block_and_files_resume_before_it() {
     let (original, began) = (fat(), Instant::now());
     let (mut file, mut tries) = (original.file.clone(), 0);
     for bit in (0..8 * file.len()).step_by(37) {
         flip(&mut file, bit);
-        assert!(original.check_salvage(&file), "bit {bit}");
-        original.check_unfinished(&file);
+        assert!(original.check_recovery(&file), "bit {bit}");
+        original.check_prefix(&file);
         flip(&mut file, bit);
         tries += 1;
     }
-    tell("bits flipped, salvaged and resumed", tries, 8 * file.len() as u64 / 37, began);
+    tell("bits flipped, recovered and resumed", tries, 8 * file.len() as u64 / 37, began);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn flipped_bits_with_forged_checksums_are_safe() {
                 let file = pieces.forge(change);
                 use_all(&file);
                 if bit % 16 == 0 {
-                    let _ = salvage(&file);
+                    let _ = recover(&file);
                 }
                 slowest = slowest.max(start.elapsed().as_secs_f64());
                 tries += 1;

@@ -1,11 +1,12 @@
-//! A file taken to pieces and put together again with checksums, lengths and places that fit, by `FORMAT.md` alone.
+//! Takes a file apart, changes a piece and reassembles the file with valid checksums, lengths and offsets. Follows
+//! `FORMAT.md` alone.
 //!
-//! Whatever is changed on the way is taken in: an attacker can do no less.
+//! Everything that depends on the changed piece is updated, as an attacker would do.
 
 use std::cell::RefCell;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
-/// What of a file can be changed before what covers it is made.
+/// The pieces of a file that can be changed before the structures that cover them are rebuilt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Piece {
     Header,
@@ -26,10 +27,10 @@ pub(crate) enum Piece {
     Footer,
 }
 
-/// Changes a piece of a kind and number, counted from 0 in the file.
+/// Changes a piece, given its kind and its number, counted from 0 in the file.
 pub(crate) type Change<'a> = &'a mut dyn FnMut(Piece, usize, &mut Vec<u8>);
 
-/// Bytes and what they are compressed.
+/// Bytes and their compressed form.
 #[derive(Clone)]
 struct Packed {
     raw: Vec<u8>,
@@ -53,7 +54,7 @@ enum Section {
     Root(Packed),
 }
 
-/// All of a file.
+/// A file taken apart.
 pub(crate) struct Pieces {
     header: Vec<u8>,
     sections: Vec<Section>,
@@ -84,7 +85,7 @@ fn packed(stored: &[u8], raw_len: u32) -> Packed {
     Packed { raw, stored: stored.to_vec() }
 }
 
-/// The checksum of what belongs to the block of an entry: its first ten bytes.
+/// The checksum of stored bytes of a block. `block` is the first ten bytes of its entry.
 pub(crate) fn checksum(file: &[u8], block: &[u8], kind: [u8; 2], stored: &[u8]) -> u64 {
     let seed = [file, &block[..10], &kind].concat();
     xxh3_64_with_seed(stored, xxh3_64(&seed))
@@ -104,14 +105,14 @@ impl Pieces {
         Self { header: body[..128].to_vec(), sections, footer: footer.to_vec(), compressor }
     }
 
-    /// Kind, number and length of every piece.
+    /// The kind, number and length of every piece.
     pub(crate) fn sizes(&self) -> Vec<(Piece, usize, usize)> {
         let mut sizes = Vec::new();
         self.forge(&mut |piece, number, bytes| sizes.push((piece, number, bytes.len())));
         sizes
     }
 
-    /// The file with changes.
+    /// The file with the changes.
     pub(crate) fn forge(&self, change: Change<'_>) -> Vec<u8> {
         let mut forger = Forger { pieces: self, change, counts: [0; 12], out: Vec::new(), leaves: Vec::new() };
         let mut header = self.header.clone();
@@ -128,7 +129,7 @@ impl Pieces {
     }
 }
 
-/// Takes a section out; its length.
+/// Takes a section apart; returns its length.
 fn section(bytes: &[u8], sections: &mut Vec<Section>) -> usize {
     let (stored_len, raw_len) = (u32_at(bytes, 4) as usize, u32_at(bytes, 8));
     let stored = &bytes[24..24 + stored_len];
@@ -152,7 +153,7 @@ fn section(bytes: &[u8], sections: &mut Vec<Section>) -> usize {
     len
 }
 
-/// The file as far as it is made.
+/// The file as far as it is reassembled.
 struct Forger<'a, 'b> {
     pieces: &'a Pieces,
     change: Change<'b>,
@@ -162,7 +163,7 @@ struct Forger<'a, 'b> {
     leaves: Vec<u8>,
 }
 
-/// The entries of a leaf as they were and as they are, and where its first block is.
+/// The entries of a leaf before and after the change, and the offset of its first block.
 type Blocks = Vec<(Vec<u8>, Vec<u8>, usize)>;
 
 impl Forger<'_, '_> {
@@ -184,7 +185,8 @@ impl Forger<'_, '_> {
         }
     }
 
-    /// A record's section, of the window that it says if it is one's; its place, lengths and checksum as in the footer.
+    /// Writes the section of a record; a window's record states its own window. Returns offset, lengths and checksum as in
+    /// the footer.
     fn record(&mut self, piece: Piece, record: &[u8], kind: u8) -> [u8; 24] {
         let mut record = record.to_vec();
         self.change(piece, &mut record);
@@ -215,7 +217,7 @@ impl Forger<'_, '_> {
         self.out.resize(self.out.len().next_multiple_of(64), 0);
     }
 
-    /// What a piece is after its change, compressed.
+    /// Changes a piece; returns it uncompressed and compressed.
     fn compress(&mut self, piece: Piece, packed: &Packed, mut raw: Vec<u8>) -> (Vec<u8>, Vec<u8>) {
         self.change(piece, &mut raw);
         if raw == packed.raw {
@@ -281,7 +283,7 @@ impl Forger<'_, '_> {
     }
 }
 
-/// Puts the sums over a leaf's blocks in its entry, as far as they can be read.
+/// Updates the sums in a leaf's entry, as far as its blocks' entries can be parsed.
 fn sum_up(raw: &[u8], blocks: usize, leaf: &mut [u8]) {
     let (mut range, mut reached, mut floats) = ((f64::INFINITY, f64::NEG_INFINITY), 0.0f64, [0.0; 3]);
     let (mut exact, mut counts, mut rest) = (0u32, [0u64; 4], raw);

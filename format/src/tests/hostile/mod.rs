@@ -1,4 +1,4 @@
-//! Whatever the bytes, there is an error or the right answer: no panic, and no read beyond the file.
+//! Any bytes give an error or the right content, without panics and without reads beyond the file.
 
 mod bits;
 mod cuts;
@@ -13,7 +13,7 @@ mod splices;
 
 use crate::footer::{FOOTER, Footer};
 use crate::header::HEADER;
-use crate::section::{Extent, FRAME, Owner, compress_directory, decompress, frame};
+use crate::section::{FRAME, SectionExtent, SectionId, compress_directory, decompress, frame};
 use crate::testing::*;
 use crate::*;
 
@@ -37,7 +37,7 @@ fn every_truncation_is_found() {
 fn wrong_lengths_are_named() {
     let (_, file) = small();
     let message = |bytes: &[u8]| Reader::open(bytes).expect_err("wrong length").to_string();
-    assert!(message(&file[..60]).contains("68 bytes of it are missing"));
+    assert!(message(&file[..60]).contains("68 bytes of it and everything after it are missing"));
     assert!(message(&[&file[..], &[7; 100]].concat()).contains("100 bytes too long"));
     assert!(message(&[&file[..HEADER], &file[HEADER + 64..]].concat()).contains("64 bytes too short"));
     assert!(message(&file[..file.len() - 200]).contains("end magic"));
@@ -70,11 +70,11 @@ fn swapped_and_foreign_parts_are_found() {
     let (block, part, other) = pair.expect("two parts of one size");
     let forged = PartEntry { offset: other.offset, checksum: other.checksum, ..*part };
     assert!(matches!(reader.part(block, &forged), Err(Error::Corrupt { what, .. }) if what.contains("checksum")));
-    assert_ne!(Owner::Root.checksum(ID, b"x"), Owner::Root.checksum(FileId([1; 16]), b"x"));
-    assert_ne!(Owner::Root.checksum(ID, b"x"), Owner::Metadata.checksum(ID, b"x"));
+    assert_ne!(SectionId::Root.checksum(ID, b"x"), SectionId::Root.checksum(FileId([1; 16]), b"x"));
+    assert_ne!(SectionId::Root.checksum(ID, b"x"), SectionId::Metadata.checksum(ID, b"x"));
 }
 
-/// The file's pieces, to be changed and put together again with checksums that fit.
+/// The pieces of a file, to be changed and reassembled with valid checksums.
 struct Pieces {
     file: Vec<u8>,
     footer: Footer,
@@ -86,7 +86,7 @@ impl Pieces {
         Self { file: file.to_vec(), footer }
     }
 
-    fn stored(&self, extent: Extent) -> &[u8] {
+    fn stored(&self, extent: SectionExtent) -> &[u8] {
         &self.file[extent.offset as usize + FRAME..extent.end() as usize]
     }
 
@@ -94,27 +94,27 @@ impl Pieces {
         decompress(self.stored(self.footer.root), self.footer.root.raw_len).expect("whole")
     }
 
-    /// The file with other metadata and root, all checksums right.
+    /// The file with changed metadata and root and valid checksums.
     fn forge(&self, record: &[u8], root: &[u8]) -> Vec<u8> {
         let mut out = self.file[..self.footer.metadata.offset as usize].to_vec();
-        let mut section = |owner: Owner, stored: &[u8], raw_len: usize| {
+        let mut section = |owner: SectionId, stored: &[u8], raw_len: usize| {
             let (stored_len, raw_len) = (stored.len() as u32, raw_len as u32);
             let checksum = owner.checksum(ID, stored);
-            let extent = Extent { offset: out.len() as u64, stored_len, raw_len, checksum };
+            let extent = SectionExtent { offset: out.len() as u64, stored_len, raw_len, checksum };
             out.extend(frame(owner, &extent));
             out.extend(stored);
             out.resize(out.len().next_multiple_of(64), 0);
             extent
         };
-        let metadata = section(Owner::Metadata, record, record.len());
-        let root = section(Owner::Root, &compress_directory(root).expect("memory"), root.len());
+        let metadata = section(SectionId::Metadata, record, record.len());
+        let root = section(SectionId::Root, &compress_directory(root).expect("memory"), root.len());
         let total = (out.len() + FOOTER) as u64;
         out.extend(Footer { total, metadata, root, ..self.footer }.encode());
         out
     }
 }
 
-/// Replaces 1, 2, 4 or 8 bytes at every place by extremes.
+/// Replaces 1, 2, 4 or 8 bytes at every offset with extreme values.
 fn extremes(record: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     let values: [&[u8]; 7] = [&[0], &[0xFF], &[0xFF; 2], &[0xFF; 4], &[0, 0, 0, 0x80], &[0xFF; 8], &[0; 8]];
     (0..record.len()).flat_map(move |at| {
@@ -149,9 +149,9 @@ fn forged_leaves_are_refused() {
     let raw = decompress(pieces.stored(leaf.extent()), leaf.raw_len).expect("whole");
     for changed in extremes(&raw).filter(|changed| *changed != raw) {
         let stored = compress_directory(&changed).expect("memory");
-        let owner = Owner::Leaf(leaf.first());
+        let owner = SectionId::Leaf(leaf.first());
         let (stored_len, checksum) = (stored.len() as u32, owner.checksum(ID, &stored));
-        let extent = Extent { offset: leaf.offset, stored_len, raw_len: changed.len() as u32, checksum };
+        let extent = SectionExtent { offset: leaf.offset, stored_len, raw_len: changed.len() as u32, checksum };
         let mut forged = file[..leaf.offset as usize].to_vec();
         forged.extend(frame(owner, &extent));
         forged.extend(stored);
@@ -160,7 +160,7 @@ fn forged_leaves_are_refused() {
         entry.set_extent(&extent);
         entry.encode(&mut encoded);
         let offset = forged.len() as u64;
-        let footer = Footer { metadata: Extent { offset, ..pieces.footer.metadata }, ..pieces.footer };
+        let footer = Footer { metadata: SectionExtent { offset, ..pieces.footer.metadata }, ..pieces.footer };
         let changed = Pieces { file: forged, footer };
         assert!(verify(&changed.forge(&record, &[&encoded[..], &root[encoded.len()..]].concat())).is_err());
     }
@@ -185,7 +185,7 @@ fn forged_headers_and_footers_are_safe() {
 }
 
 #[test]
-fn windows_that_are_said_to_have_been_lost_take_no_memory() {
+fn windows_claimed_to_be_lost_take_no_memory() {
     let fat::Original { file, .. } = fat::lean();
     let bomb = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
         (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
@@ -195,7 +195,7 @@ fn windows_that_are_said_to_have_been_lost_take_no_memory() {
         }
         _ => {}
     });
-    let _ = Salvage::search(&bomb, &mut |_| {});
+    let _ = Recovery::search(&bomb, &mut |_| {});
     let many = forge::Pieces::new(&file).forge(&mut |piece, number, bytes| match (piece, number) {
         (forge::Piece::Metadata, _) => bytes[0] = 0xFF,
         (forge::Piece::Window, 3) => {
@@ -205,11 +205,11 @@ fn windows_that_are_said_to_have_been_lost_take_no_memory() {
         (forge::Piece::End, 3) => bytes[..4].copy_from_slice(&2000u32.to_le_bytes()),
         _ => {}
     });
-    assert!(matches!(Salvage::search(&many, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
+    assert!(matches!(Recovery::search(&many, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
     let large = forge::Pieces::new(&file).forge(&mut |piece, _, bytes| {
         if matches!(piece, forge::Piece::Metadata | forge::Piece::Start) {
             bytes[..24].copy_from_slice(&[1u64 << 31, 1, 1].map(u64::to_le_bytes).concat());
         }
     });
-    assert!(matches!(Salvage::search(&large, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
+    assert!(matches!(Recovery::search(&large, &mut |_| {}), Err(Error::Invalid(what)) if what.contains("too short")));
 }

@@ -1,4 +1,4 @@
-//! A deterministic search for files that panic, hang or read as something else: `WAVESPLAT_CASES=10` tries ten times as
+//! A deterministic search for files that panic, hang or read as different content. `WAVESPLAT_CASES=10` tries ten times as
 //! many.
 
 use super::fat::*;
@@ -6,10 +6,10 @@ use super::forge::*;
 use crate::testing::*;
 use std::time::Instant;
 
-/// Cases without `WAVESPLAT_CASES`.
+/// Number of cases without `WAVESPLAT_CASES`.
 const CASES: u64 = 100_000;
 
-/// Says which case it was when a test fails.
+/// Prints the number of the case if a test fails.
 struct Case(u64);
 
 impl Drop for Case {
@@ -22,7 +22,7 @@ impl Drop for Case {
 }
 
 impl Case {
-    /// Neighbouring numbers are far apart.
+    /// Makes the seeds of neighbouring cases very different.
     fn random(&self) -> Random {
         let mut random = Random((self.0 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         for _ in 0..3 {
@@ -46,7 +46,7 @@ impl Seed {
         Self { original, pieces, contents }
     }
 
-    /// Some piece, mutated one to three times; all that covers it fits.
+    /// Mutates a random piece one to three times; everything that covers it is updated.
     fn forged(&self, random: &mut Random) -> Vec<u8> {
         let any = |random: &mut Random| &self.contents[random.below(self.contents.len() as u64) as usize];
         let (piece, number, content) = any(random);
@@ -59,7 +59,7 @@ impl Seed {
         })
     }
 
-    /// The file mutated, checksums as they were.
+    /// Mutates the file and keeps its checksums.
     fn damaged(&self, random: &mut Random) -> Vec<u8> {
         let mut file = self.original.file.clone();
         let from = random.below(file.len() as u64) as usize;
@@ -69,7 +69,7 @@ impl Seed {
     }
 }
 
-/// Changes some bytes; `other` are some to copy from.
+/// Changes some bytes; may copy bytes from `other`.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     let below = |random: &mut Random, limit: usize| random.below(limit.max(1) as u64) as usize;
     let len = bytes.len();
@@ -102,17 +102,17 @@ fn mutated_files_are_safe_and_damage_is_found() {
         let (case, start) = (Case(number), Instant::now());
         let mut random = case.random();
         let seed = &seeds[usize::from(random.below(16) == 0)];
-        let (forged, salvaged) = (random.below(2) == 0, random.below(50) == 0);
+        let (forged, recovered) = (random.below(2) == 0, random.below(50) == 0);
         let file = if forged { seed.forged(&mut random) } else { seed.damaged(&mut random) };
         if forged {
             use_all(&file);
         } else {
             assert!(file == seed.original.file || read_all(&file).is_err(), "read as if it were whole");
-            seed.original.check_unfinished(&file);
+            seed.original.check_prefix(&file);
         }
-        match (salvaged, forged) {
-            (true, true) => drop(salvage(&file)),
-            (true, false) => drop(seed.original.check_salvage(&file)),
+        match (recovered, forged) {
+            (true, true) => drop(recover(&file)),
+            (true, false) => drop(seed.original.check_recovery(&file)),
             _ => {}
         }
         slowest = slowest.max(start.elapsed().as_secs_f64());

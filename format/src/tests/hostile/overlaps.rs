@@ -1,4 +1,4 @@
-//! Parts, blocks, leaves and sections whose places overlap, or are something else's; checksums fit what is there.
+//! Parts, blocks, leaves and sections whose extents overlap or point to other content. All checksums are valid.
 
 use super::fat::*;
 use super::forge::*;
@@ -6,7 +6,7 @@ use crate::testing::*;
 use crate::*;
 use std::time::Instant;
 
-/// Where any section or part begins, and a byte beside; the ends of the file, and beyond.
+/// Offsets of every section and part, and the bytes next to them; the end of the file, and offsets beyond it.
 fn places(original: &Original) -> Vec<u64> {
     let len = original.file.len() as u64;
     let parts = original.blocks.values().flat_map(|(entry, _)| &entry.parts).map(|part| part.offset);
@@ -17,13 +17,13 @@ fn places(original: &Original) -> Vec<u64> {
     all.chain([0, 1, 32, 128, len - 128, len - 1, len, len + 1, 1 << 32, 1 << 63, u64::MAX - 63, u64::MAX]).collect()
 }
 
-/// What is at a place, as far as the file reaches.
+/// The bytes at a place, as far as the file holds them.
 fn at(file: &[u8], place: u64, len: u32) -> &[u8] {
     let from = usize::try_from(place).map_or(file.len(), |place| place.min(file.len()));
     &file[from..(from + len as usize).min(file.len())]
 }
 
-/// The file with one field of 8 bytes of a piece and, where told, the checksum after it.
+/// The file with one field of 8 bytes of a piece replaced and, if given, the checksum after it.
 fn moved(pieces: &Pieces, which: (Piece, usize), field: usize, place: u64, sum: Option<(usize, u64)>) -> Vec<u8> {
     pieces.forge(&mut |piece, number, bytes| {
         if (piece, number) == which {
@@ -46,7 +46,7 @@ fn parts_that_overlap_or_are_elsewhere_are_refused() {
                 let sum = checksum(&ID.0, &block, part.kind.code(), at(&original.file, *place, part.stored_len));
                 let file = moved(&pieces, (Piece::Entry, number), field + 16, *place, Some((field + 24, sum)));
                 assert!(read_all(&file).is_err(), "{} {} at {place}", entry.id, part.kind);
-                let _ = (Unfinished::read(&file), salvage(&file));
+                let _ = (CompletePrefix::read(&file), recover(&file));
                 tries += 1;
             }
         }
@@ -68,7 +68,7 @@ fn leaves_and_sections_that_overlap_or_are_elsewhere_are_refused() {
     tell("leaves, metadata and root elsewhere", tries, 500, began);
 }
 
-/// Leaves of one size that claim each other's blocks, sections and sums, but their own name.
+/// Leaves of one size that claim each other's blocks, sections and sums under their own number.
 #[test]
 fn leaves_that_share_their_blocks_are_refused() {
     let original = fat();
@@ -86,7 +86,7 @@ fn leaves_that_share_their_blocks_are_refused() {
     assert_eq!(tries, 56);
 }
 
-/// A file within a file: everything in it is whole, but not where its places say.
+/// A file within a file: everything in it is intact but not at the offsets that it states.
 #[test]
 fn files_before_or_after_a_file_are_refused() {
     let Original { file, .. } = lean();
@@ -99,5 +99,5 @@ fn files_before_or_after_a_file_are_refused() {
     let sum = xxhash_rust::xxh3::xxh3_64(&told[footer..footer + 112]);
     put(&mut told, footer + 112, &sum.to_le_bytes());
     assert!(Reader::open(&told).is_err());
-    assert_eq!(salvage(&both).expect("whole").0, file);
+    assert_eq!(recover(&both).expect("whole").0, file);
 }

@@ -1,4 +1,4 @@
-//! Structures that are swapped, doubled, moved or another file's; checksums fit.
+//! Structures that are swapped, duplicated, moved or taken from another file. All checksums are valid.
 
 use super::fat::*;
 use super::forge::*;
@@ -6,7 +6,7 @@ use crate::testing::*;
 use crate::*;
 use std::time::Instant;
 
-/// Where the sections with a tag begin and end, padding included; blocks end with their parts.
+/// The byte ranges of the sections with a tag, with padding. The range of a block includes its parts.
 fn sections(file: &[u8], tag: &[u8; 4]) -> Vec<std::ops::Range<usize>> {
     let mut starts: Vec<usize> = (128..file.len() - 128).step_by(64).filter(|&at| is_section(&file[at..])).collect();
     starts.push(file.len() - 128);
@@ -18,7 +18,7 @@ fn is_section(bytes: &[u8]) -> bool {
     [b"STRT", b"BLCK", b"LEAF", b"WNDW", b"WEND", b"META", b"ROOT"].iter().any(|tag| bytes.starts_with(&tag[..]))
 }
 
-/// The file with its length in the footer as it is.
+/// The file with its actual length in the footer.
 fn resized(mut file: Vec<u8>) -> Vec<u8> {
     let (len, footer) = (file.len(), file.len() - 128);
     file[footer + 16..footer + 24].copy_from_slice(&(len as u64).to_le_bytes());
@@ -28,15 +28,15 @@ fn resized(mut file: Vec<u8>) -> Vec<u8> {
 }
 
 #[test]
-fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
+fn swapped_duplicated_dropped_and_foreign_sections_are_refused_and_recovered() {
     let (original, other, began) = (fat(), strange(FileId([3; 16])), Instant::now());
     let mut tries = 0;
     let mut check = |file: Vec<u8>| {
         if file != original.file {
             let file = resized(file);
             assert!(read_all(&file).is_err());
-            original.check_unfinished(&file);
-            assert!(original.check_salvage(&file));
+            original.check_prefix(&file);
+            assert!(original.check_recovery(&file));
             tries += 1;
         }
     };
@@ -61,7 +61,7 @@ fn sections_swapped_doubled_dropped_or_spliced_are_refused_and_salvaged() {
     tell("sections swapped, doubled, dropped, moved, spliced", tries, 800, began);
 }
 
-/// Nothing but what points to them tells such sections from the file's own: whoever resumes or salvages cannot know.
+/// Only the references to them distinguish such sections from the file's own, so resuming and recovery cannot notice.
 #[test]
 fn sections_of_another_file_that_claims_the_same_identity_are_refused() {
     let (Original { file, .. }, other, began) = (fat(), strange(ID), Instant::now());
@@ -85,9 +85,9 @@ fn strange(id: FileId) -> Vec<u8> {
     write_but(&metadata, blocks.iter().map(|(block, _)| block), id, None).expect("complete").0
 }
 
-/// Entries of a leaf, or of the root, in other places; the leaf's blocks themselves are where they were.
+/// Reorders the entries of a leaf or of the root. The leaf's blocks stay in place.
 #[test]
-fn entries_swapped_or_doubled_are_refused() {
+fn swapped_and_duplicated_entries_are_refused() {
     let (original, began) = (fat(), Instant::now());
     let (pieces, mut tries) = (Pieces::new(&original.file), 0);
     for (piece, number, len) in pieces.sizes() {
@@ -118,7 +118,7 @@ fn entries_swapped_or_doubled_are_refused() {
     tell("directory entries swapped and doubled", tries, 200, began);
 }
 
-/// Parts of one kind and size of two files, with the identity that they were made for or the other.
+/// Exchanges parts of one kind and size between two files, whose ids are different or equal.
 #[test]
 fn parts_of_another_file_are_refused_unless_it_has_the_same_identity_and_block() {
     let (original, began) = (fat(), Instant::now());

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
-use wavesplat::cli::print;
+use wavesplat::cli::{note_text, print};
 use wavesplat::convert::estimate::{Estimate, estimate};
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::source::Archive;
@@ -30,7 +30,7 @@ struct Info<'a> {
     /// What stands for missing samples: a number, or "NaN".
     missing_value: Option<String>,
     raw_bytes: Option<u64>,
-    notes: &'a [String],
+    notes: Vec<String>,
     estimate: Option<Estimate>,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if args.estimate.is_some() && args.inputs == [Path::new(STANDARD)] {
         return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
     }
-    let source = args.input.open_quietly(&args.inputs, &args.common)?;
+    let source = args.input.open_quietly(&args.inputs, args.common.stream_memory())?;
     let mut source = args.select.narrow(source)?;
     let archive = source.archive().clone();
     let progress = args.common.progress("estimate", "windows");
@@ -77,7 +77,7 @@ impl<'a> Info<'a> {
             space_units: archive.units.space.as_deref(),
             missing_value: archive.missing.map(|value| format!("{value:?}")),
             raw_bytes: archive.frames.and_then(|frames| frame.checked_mul(frames as u64)),
-            notes: &archive.notes,
+            notes: archive.notes.iter().map(note_text).collect(),
             estimate,
         }
     }

@@ -1,11 +1,11 @@
-//! Planes of sums over the cells of a band of a picture.
+//! Planes of sums over the cells (eq 35) of a band of a picture.
 
 use std::ops::Range;
 
 /// A rectangle of cells with some planes, one after another.
 ///
-/// A row of cells is stored as one run for each of the q phases, cells u = q j + phase of one phase side by side: what a row
-/// of voxels adds to them then is side by side, too.
+/// A row of cells is stored as one run for each of the q phases, cells u = q j + phase of one phase side by side: what
+/// a row of voxels adds to them then is side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
     rectangle: Rectangle,
@@ -87,8 +87,8 @@ impl Rectangle {
         self.size[0] * self.size[1]
     }
 
-    /// Of so many voxels a whole number of cells apart along an axis, each of which reaches the cell where it is, the first
-    /// at `cell`, and `degree` more: those that reach any that is here.
+    /// Of so many voxels a whole number of cells apart along an axis, each of which reaches the cell where it is, the
+    /// first at `cell`, and `degree` more: those that reach any that is here.
     pub(super) fn seen_from(&self, axis: usize, cell: isize, degree: usize, count: usize) -> Range<usize> {
         let (before, phases) = (self.first[axis] - cell, self.phases as isize);
         let within = |n: isize| n.clamp(0, count as isize) as usize;
@@ -115,8 +115,8 @@ impl Rectangle {
         (0..self.run as isize).contains(&j).then(|| u.rem_euclid(self.phases as isize) as usize * self.run + j as usize)
     }
 
-    /// Of cells u, u + q, ... of a row, less than `count` cells from u on, those that are here: how far from u they begin, and
-    /// where they are in the row.
+    /// Of cells u, u + q, ... of a row, less than `count` cells from u on, those that are here: how far from u they
+    /// begin, and where they are in the row.
     pub(super) fn first_in_row(&self, u: isize, count: usize) -> (usize, Range<usize>) {
         let phases = self.phases;
         let skipped = ((self.first[0] - u).max(0) as usize).div_ceil(phases);
@@ -190,6 +190,14 @@ pub(in crate::render) struct CellPlane<'a> {
     pub(super) rectangle: Rectangle,
     sums: &'a mut Option<Aligned>,
 }
+
+/// How many of so many planes a bundle has.
+pub(super) fn side_by_side(planes: usize) -> usize {
+    planes.next_power_of_two().min(TOGETHER)
+}
+
+/// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
+pub(super) const TOGETHER: usize = 16;
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
-//! The pixels of a tile from its cells.
+//! The pixels of a tile from its cells: sums of cells times the kernel of eq 36.
 
-use super::cells::Cells;
+use super::cells::{Cells, TOGETHER, side_by_side};
 use super::kernel::Weights;
 use super::picture::Lattice;
 use crate::render::splat::tile_rect::TileRect;
@@ -23,17 +23,13 @@ pub(in crate::render) struct Gather<'a> {
     weights: Vec<Weights>,
 }
 
-/// How many of so many planes a bundle has.
-pub(super) fn side_by_side(planes: usize) -> usize {
-    planes.next_power_of_two().min(TOGETHER)
-}
-
-/// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
-const TOGETHER: usize = 16;
-
 impl<'a> Gather<'a> {
     /// Of layers with the same rectangle of cells and so many planes each; these are counted through all layers.
-    pub(super) fn new(lattice: &'a Lattice, (layers, count): (&[&Cells], usize), place: &'a TileRect) -> Self {
+    pub(in crate::render) fn new(
+        lattice: &'a Lattice,
+        (layers, count): (&[&Cells], usize),
+        place: &'a TileRect,
+    ) -> Self {
         let (first, size) = lattice.seen_by(&place.x, &place.y);
         let seen = Seen::of(layers[0], first, size);
         let numbered = |n: usize| move |(plane, sums)| (n * count + plane, sums);

@@ -1,13 +1,27 @@
-//! From cells to pixels: the kernel g that gives the Gaussian footprint once amounts are spread by B-splines.
+//! From cells to pixels: the kernel G that gives the Gaussian footprint once amounts are spread by B-splines.
 //!
-//! On the lattice the footprint is a Gaussian F of covariance S, in cells, and a B-spline of degree n has the spectrum
-//! B(w) = prod over both axes of exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)). So F / B is
+//! On the lattice the footprint is a Gaussian F of covariance S, in cells. A B-spline of degree n has the spectrum B(w)
+//! = exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)) along each axis. So the kernel of spectrum F / B is, to
+//! first order in the terms of fourth and sixth degree,
 //!
 //! ```text
-//! g = (1 + (n + 1) (d^4 / 2880 - d^6 / 181440)) Gaussian of covariance S - (n + 1) / 12        d along u, and along v
+//! G = (1 + (n+1) (D^4/2880 - D^6/181440)) Gaussian of covariance S - (n+1)/12                             (eq 36)
 //! ```
 //!
-//! What is left is how B repeats itself beyond half a cell's frequency, where F is small; [`Kernel::error`] measures it.
+//! with D a derivative along u, and the same along v. The spectrum of a spline repeats beyond half a cell's frequency,
+//! where F is small. That, and the terms left out, is the error of the lattice. `Kernel::error` states it so that for
+//! any voxels and any pixel
+//!
+//! ```text
+//! sum of |w~_i - w_i| <= stated error * largest sum of w_i                                                (eq 37)
+//! ```
+//!
+//! with w~ the weights reached. If |w~ - w| at a distance d is at most the sum over j of c_j w(d - t_j), for some
+//! shifts t_j, then all voxels together are off by the c_j times what they weigh at places moved by t_j: at most the
+//! sum of the c_j times the largest sum.
+//!
+//! The weights of a pixel's cells take three exponentials, since the Gaussian factors over whole cells: the fast
+//! Gaussian gridding of [Greengard](crate::bibliography).
 
 use super::shear::Shear;
 use super::spline::spread;
@@ -32,13 +46,14 @@ pub(super) struct Kernel {
     spans: Vec<Range<usize>>,
 }
 
-/// Numbers of neighbouring cells. Singles are near enough, and as near for values as for weights, of which means are quotients.
+/// Numbers of neighbouring cells. Singles are near enough, and as near for values as for weights, of which means are
+/// quotients.
 type Run = [f32; RUN];
 const RUN: usize = 16;
 
 impl Kernel {
-    /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline is
-    /// too wide for it, or cells too small.
+    /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline
+    /// is too wide for it, or cells too small.
     pub(super) fn new(shear: &Shear, sigma: f64, degree: usize, radius: f64) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
@@ -94,7 +109,7 @@ impl Kernel {
         (uu * u + 2.0 * uv * v) * u + vv * v * v
     }
 
-    /// The weights of a pixel at `place`, row by row, and the first cell of the first row.
+    /// The weights of a pixel at `place` (eq 36), row by row, and the first cell of the first row.
     ///
     /// With du, dv from the nearest cell to the pixel, and i, j from that to another one, the Gaussian is
     ///
@@ -147,20 +162,16 @@ impl Kernel {
         sum
     }
 
-    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring quotients.
+    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring
+    /// quotients.
     fn gaussian(&self, du: f64, dv: f64) -> [f64; 3] {
         let [uu, uv, _] = self.inverse;
         let weight = self.peak * libm::exp(-0.5 * self.square([du, dv]));
         [weight, libm::exp(uu * (du - 0.5) + uv * dv), libm::exp(-uu)]
     }
 
-    /// How far weights w~ are from those of the footprint, w = exp(-d^2 / (2 sigma^2)): for any voxels and any place,
-    /// sum |w~ - w| is at most this times the largest sum of w of any place.
-    ///
-    /// For if |w~ - w| <= sum over j of c_j w(d - t_j) for all places d, then all voxels are off by at most the sum of c_j
-    /// times what they weigh at places moved by t_j.
-    ///
-    /// Infinite as soon as it is known to be more than `most`.
+    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Infinite as soon as it is known to be
+    /// more than `most`.
     pub(super) fn error(&self, shear: &Shear, sigma: f64, most: f64) -> f64 {
         let mut off = vec![0.0; SIDE * SIDE];
         // From the middle outwards, and the same on the other side.
@@ -198,7 +209,8 @@ impl Kernel {
     }
 }
 
-/// The weights of the cells that a pixel reaches: of a row as many runs as of any other, of which those in its span count.
+/// The weights of the cells that a pixel reaches: of a row as many runs as of any other, of which those in its span
+/// count.
 #[derive(Debug)]
 pub(super) struct Weights {
     rows: Vec<[f64; RUN]>,
@@ -215,7 +227,8 @@ impl Weights {
         Self { rows: vec![[0.0; RUN]; kernel.table.len()], spans: kernel.spans.clone(), along, across }
     }
 
-    /// Row by row the weights that count: the number of the row and of its first cell that does, and those from there on.
+    /// Row by row the weights that count: the number of the row and of its first cell that does, and those from there
+    /// on.
     #[inline(always)]
     pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize, &[f64])> {
         let rows = self.rows.chunks_exact(self.along.len()).zip(&self.spans);
@@ -230,7 +243,7 @@ fn powers(x: f64, first: isize) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(lowest), move |power| Some(power * up))
 }
 
-/// (n + 1) (d^4 / 2880 - d^6 / 181440) of exp(-i x^2 / 2), in units of that, as a polynomial of (i x)^2.
+/// (n + 1) (D^4 / 2880 - D^6 / 181440) of exp(-i x^2 / 2), in units of that, as a polynomial of (i x)^2 (eq 36).
 fn bend(splines: f64, i: f64) -> [f64; 4] {
     let (fourth, sixth) = (splines / 2880.0, splines / 181_440.0);
     let constant = (3.0 * fourth + 15.0 * sixth * i) * i * i;

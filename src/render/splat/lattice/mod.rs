@@ -1,15 +1,18 @@
-//! Voxels to pictures without a footprint for each of them: planes of sums on the sheared lattice of the view.
+//! Splatting by way of a lattice: planes of sums on the sheared lattice of the view, instead of a footprint for each
+//! voxel.
 //!
 //! ```text
 //! amounts of a block, plane by plane    spread: to the cells around each voxel, by B-splines
 //! cells of a band of the picture        gather: to pixels, by the kernel that makes Gaussians of B-splines
 //! ```
 //!
-//! Voxels of a slice across the principal axis are whole cells apart ([`shear`]), so that all of them have the same weights, and
-//! a block costs a few products for each voxel, however wide footprints are in pixels. What a pixel costs depends on its
-//! cells alone.
+//! The lattice is that of the shear-warp factorization ([Lacroute](crate::bibliography)): the voxels of a slice across
+//! the principal axis are whole cells apart (eq 35, `shear`). So they all have the same weights, and a block costs a
+//! few products a voxel, however wide footprints are in pixels. A pixel's cost depends on its cells alone. Spreading by
+//! splines and correcting for them afterwards (eq 36, `kernel`) is how nonuniform Fourier transforms place samples on a
+//! grid ([Greengard](crate::bibliography)).
 //!
-//! Each plane has one owner and meets blocks in file order, so that sums depend neither on threads nor on memory.
+//! Each plane has one owner and meets blocks in file order, so sums depend neither on threads nor on memory.
 
 mod cells;
 mod gather;

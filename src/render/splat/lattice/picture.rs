@@ -1,14 +1,14 @@
-//! The lattice of one view as a way of splatting: when it is used, the sums of blocks, and from sums to pixels.
+//! The lattice of one view as a way of splatting: when it is used (its stated error, eq 37, is small enough and it is
+//! less work than footprints), the sums of blocks, and from sums to pixels.
 
-use super::cells::{Cells, LINE, Rectangle};
-use super::gather::side_by_side;
+use super::cells::{Cells, LINE, Rectangle, side_by_side};
 use super::kernel::{Kernel, SINGLES};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
-use super::{Gather, Placed, Spreading};
+use super::{Placed, Spreading};
 use crate::base::grid::{Grid, Region};
 use crate::render::splat::slab::Slab;
-use crate::render::splat::tile_rect::{TILE, TileRect, pixels_around};
+use crate::render::splat::tile_rect::{TILE, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
 use std::ops::Range;
@@ -34,8 +34,8 @@ const STEEPEST: f64 = 0.5;
 const TILE_CELLS: usize = 4096;
 
 impl Lattice {
-    /// The lattice that splats within `error` (as in [`Method::within`]), and as what it is reported; none if footprints
-    /// are better.
+    /// The lattice that splats within `error` (as in [`Method::within`]), and as what it is reported; none if
+    /// footprints are better.
     pub(in crate::render) fn within(
         error: f64,
         gaussian: Gaussian,
@@ -147,8 +147,8 @@ impl Lattice {
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in cells,
-    /// for planes of `seen`.
+    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in
+    /// cells, for planes of `seen`.
     pub(in crate::render) fn placed(
         &self,
         region: &Region,
@@ -165,11 +165,6 @@ impl Lattice {
         let end = |i: usize| (first[i] + size[i] as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
-    }
-
-    /// The cells of a tile of a band, as far as its pixels see them, in layers of so many planes each.
-    pub(in crate::render) fn gather<'a>(&'a self, layers: (&[&Cells], usize), place: &'a TileRect) -> Gather<'a> {
-        Gather::new(self, layers, place)
     }
 
     /// Pixels a side of a tile: as many as have cells that stay in a core's cache with all planes.
@@ -196,8 +191,8 @@ impl Lattice {
     }
 }
 
-/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product from
-/// voxels to cells; in units of a product of a footprint, as measured.
+/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product
+/// from voxels to cells; in units of a product of a footprint, as measured.
 const GATHERING: f64 = 0.5;
 const COPYING: f64 = 5.0;
 const SPREADING: f64 = 0.15;

@@ -1,4 +1,4 @@
-//! What of the voxels of a block is in a slab.
+//! The shares of a block's voxels that lie in a slab (eq 29).
 
 use super::Shear;
 use crate::render::splat::slab::Slab;

@@ -1,13 +1,13 @@
 //! The sheared lattice of a view: where voxels are in cells.
 //!
 //! The principal axis a is the one most along the view; b and c are the others. On the screen, a step along a is
-//! `alpha` steps along b and `beta` along c, so that voxel (i_b, i_c, k) is at the cells
+//! `alpha` steps along b and `beta` along c, so voxel (i_b, i_c, k) is at the cells
 //!
 //! ```text
-//! u = q (i_b + alpha k)        v = q (i_c + beta k)        q cells per voxel
+//! u = q (i_b + alpha k)        v = q (i_c + beta k)        q cells a voxel                                (eq 35)
 //! ```
 //!
-//! and voxels of one slice k are whole cells apart: a footprint in a slice is another one, moved by whole cells.
+//! The voxels of one slice k are whole cells apart, so their footprints differ by whole cells only.
 
 use crate::base::grid::Grid;
 use crate::view::camera::Camera;
@@ -44,7 +44,7 @@ impl Shear {
         Self { axes, slopes, depths: [b[2], c[2], a[2]], pixels, origin, fineness }
     }
 
-    /// The cells of a voxel.
+    /// The place of a voxel in cells (eq 35).
     pub(in crate::render) fn place(&self, voxel: [usize; 3]) -> [f64; 2] {
         let [b, c, a] = self.axes.map(|axis| voxel[axis] as f64);
         let q = self.fineness as f64;

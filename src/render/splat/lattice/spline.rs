@@ -1,4 +1,5 @@
-//! The B-splines that spread an amount over the cells around it.
+//! The B-splines that spread an amount over the cells around it ([Unser](crate::bibliography)), by the recurrence of
+//! [DeBoor](crate::bibliography).
 
 /// The highest degree.
 pub(super) const MOST_DEGREE: usize = 7;
@@ -6,14 +7,15 @@ pub(super) const MOST_DEGREE: usize = 7;
 /// Weights of the cells around a place.
 pub(super) type Spread = [f64; MOST_DEGREE + 1];
 
-/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1, odd
-/// degrees only. They sum to 1, and the centre of the amount stays where it is.
+/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1,
+/// odd degrees only. They sum to 1, and the centre of the amount stays where it is.
 pub(super) fn spread(degree: usize, place: f64) -> (isize, Spread) {
     let below = place.floor();
     (below as isize - (degree / 2) as isize, weights(degree, place - below))
 }
 
-/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first (de Boor's recurrence).
+/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first, by the recurrence of
+/// [DeBoor](crate::bibliography).
 fn weights(degree: usize, t: f64) -> Spread {
     let mut n = Spread::default();
     n[0] = 1.0;

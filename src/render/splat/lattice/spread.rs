@@ -1,6 +1,6 @@
-//! The amounts of a block's voxels to the cells around them.
+//! The amounts of a block's voxels to the cells around them, by B-splines at the places of eq 35.
 //!
-//! All voxels of a slice across the principal axis are spread by the same weights, so that a row of them is convolved with
+//! All voxels of a slice across the principal axis are spread by the same weights. So a row of them is convolved with
 //! the weights along u, once for each phase, and rows of cells are sums of such rows times the weights along v.
 
 use super::Spreading;
@@ -61,8 +61,8 @@ pub(in crate::render) struct Work {
 }
 
 impl Placed {
-    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for planes of
-    /// some cells.
+    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for
+    /// planes of some cells.
     pub(super) fn new(
         spreading: &Spreading,
         region: &Region,
@@ -290,8 +290,8 @@ fn live_lines(row: &[f64]) -> u64 {
     live
 }
 
-/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c, what is
-/// spread along u stays in registers for all rows of cells that it reaches.
+/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c,
+/// what is spread along u stays in registers for all rows of cells that it reaches.
 #[inline(always)]
 fn add_rows<const Q: usize, const TAPS: usize>(
     (slice, rectangle): (&Slice, &Rectangle),

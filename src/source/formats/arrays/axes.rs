@@ -1,19 +1,21 @@
 //! What the axes of a variable count: by the user's word, by the conventions of CF, by their names, else by their order.
 
 use super::Variable;
-use crate::source::Parsed;
+use crate::base::error::{Note, Remedy};
+use crate::source::Advised;
 use crate::source::layout::Counts;
 
 const ORDER: [Counts; 4] = [Counts::Frames, Counts::Voxels(2), Counts::Voxels(1), Counts::Voxels(0)];
 const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];
 
 /// A note on axes that were taken by their order alone, since they are not `known`; nothing if there are none.
-fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Option<String> {
+fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Option<Note> {
     let guessed = |axis: &usize| known[*axis].is_none() && !matches!(counts[*axis], Counts::Only(_));
     (0..counts.len()).find(guessed)?;
     let letter = |c: &Counts| ORDER.iter().position(|role| role == c).map_or('c', |at| LETTERS[at]);
     let letters: String = counts.iter().map(letter).collect();
-    Some(format!("the axes {:?} are taken as {letters}, slowest first; --axes says otherwise", variable.lengths))
+    let text = format!("the axes {:?} are taken as {letters}, slowest first", variable.lengths);
+    Some(Note::with(text, Remedy::Set("axes")))
 }
 
 /// What each axis counts, the slowest first, and a note on what is guessed; `index` is that of an axis beside space and time,
@@ -23,7 +25,7 @@ pub(super) fn counts(
     all: &[Variable],
     index: Option<usize>,
     letters: Option<&str>,
-) -> Parsed<(Vec<Counts>, Option<String>)> {
+) -> Advised<(Vec<Counts>, Option<Note>)> {
     let Some(letters) = letters else {
         let known = known(variable, all);
         let counts = complete(variable, by_order(variable, known.clone(), index.is_some()), index)?;
@@ -34,21 +36,23 @@ pub(super) fn counts(
 }
 
 /// What is left counts nothing that an archive is continued along: of it the index is taken, or the only one.
-fn complete(variable: &Variable, guess: Vec<Option<Counts>>, index: Option<usize>) -> Parsed<Vec<Counts>> {
+fn complete(variable: &Variable, guess: Vec<Option<Counts>>, index: Option<usize>) -> Advised<Vec<Counts>> {
     let only = |(axis, counts): (usize, Option<Counts>)| match (counts, variable.lengths[axis], index) {
         (Some(counts), _, _) => Ok(counts),
         (None, 1, _) => Ok(Counts::Only(0)),
         (None, n, Some(index)) if index < n => Ok(Counts::Only(index)),
         (None, n, Some(index)) => {
-            Err(format!("{}: axis {} has no index {index}", shown(variable), named(variable, axis, n)))
+            Err(format!("{}: axis {} has no index {index}", shown(variable), named(variable, axis, n)).into())
         }
         (None, n, None) => Err(too_many(variable, axis, n)),
     };
-    let counts = guess.into_iter().enumerate().map(only).collect::<Parsed<Vec<_>>>()?;
+    let counts = guess.into_iter().enumerate().map(only).collect::<Advised<Vec<_>>>()?;
     let beside = (0..counts.len()).filter(|i| matches!(counts[*i], Counts::Only(_)) && variable.lengths[*i] > 1);
     match beside.count() {
-        0 if index.is_some_and(|i| i > 0) => Err(format!("{}: has no axis beside space and time", shown(variable))),
-        n if n > 1 => Err(format!("{}: has {n} axes beside space and time; one is supported", shown(variable))),
+        0 if index.is_some_and(|i| i > 0) => {
+            Err(format!("{}: has no axis beside space and time", shown(variable)).into())
+        }
+        n if n > 1 => Err(format!("{}: has {n} axes beside space and time; one is supported", shown(variable)).into()),
         _ => Ok(counts),
     }
 }
@@ -62,25 +66,23 @@ fn named(variable: &Variable, axis: usize, len: usize) -> String {
     if dim.is_empty() { format!("{axis} of length {len}") } else { format!("{dim} of length {len}") }
 }
 
-fn too_many(variable: &Variable, axis: usize, len: usize) -> String {
-    let name = variable.shown();
-    format!(
-        "{}: axis {} counts neither voxels nor frames; --variable '{name}[0]' takes its first index, --axes with one letter of \
-         t z y x (or c for another) for each axis, slowest first, says it otherwise",
-        shown(variable),
-        named(variable, axis, len)
-    )
+fn too_many(variable: &Variable, axis: usize, len: usize) -> Note {
+    let axis = named(variable, axis, len);
+    let text = format!("{}: axis {axis} counts neither voxels nor frames", shown(variable));
+    Note::with(text, Remedy::ChooseIndex { name: variable.shown().into() })
 }
 
 /// One letter an axis; none for other letters.
-fn by_letters(variable: &Variable, letters: &str) -> Parsed<Vec<Option<Counts>>> {
+fn by_letters(variable: &Variable, letters: &str) -> Advised<Vec<Option<Counts>>> {
     let of = |c: char| LETTERS.iter().position(|letter| *letter == c).map(|at| ORDER[at]);
     let counts: Vec<_> = letters.chars().map(of).collect();
     if let Some(twice) = ORDER.into_iter().position(|role| counts.iter().filter(|c| **c == Some(role)).count() > 1) {
-        return Err(format!("--axes {letters} has {} twice", LETTERS[twice]));
+        let text = format!("the axes {letters} have {} twice", LETTERS[twice]);
+        return Err(Note::with(text, Remedy::Set("axes")));
     }
     if counts.len() != variable.lengths.len() {
-        return Err(format!("{}: --axes {letters} names {}", shown(variable), counts.len()));
+        let text = format!("{}: the axes {letters} are {}", shown(variable), counts.len());
+        return Err(Note::with(text, Remedy::Set("axes")));
     }
     Ok(counts)
 }

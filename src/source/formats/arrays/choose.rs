@@ -1,7 +1,8 @@
 //! Which variable of a file is meant.
 
 use super::{Variable, component};
-use crate::source::Parsed;
+use crate::base::error::{Note, Remedy};
+use crate::source::{Advised, Parsed};
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 
@@ -52,7 +53,7 @@ pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>,
 }
 
 /// The one variable that can be an archive, or of several the one that is `active`.
-pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Parsed<Choice<'a>> {
+pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Choice<'a>> {
     let bounds = bounds(all);
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
     let mut volumes = choices(all.iter().filter(|v| is_volume(v, least) && !bounds.contains(v.name())));
@@ -63,8 +64,8 @@ pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Parsed<Choi
     }
     match volumes.len() {
         1 => Ok(volumes.remove(0)),
-        0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&choices(all.iter())))),
-        _ => Err(format!("has several variables: --variable chooses one of{}", listed(&volumes))),
+        0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&choices(all.iter()))).into()),
+        _ => Err(Note::with(format!("has several variables:{}", listed(&volumes)), Remedy::ChooseVariable)),
     }
 }
 

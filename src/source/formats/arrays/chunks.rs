@@ -38,7 +38,7 @@ const COPIES: usize = 2;
 /// The error of a chunk that is too large.
 fn too_large(path: &Path, bytes: usize) -> Error {
     let needed = bytes.saturating_mul(SHARE).div_ceil(1 << 20);
-    Error::usage(format!("{}: is in chunks of {bytes} bytes: --memory {needed}MiB holds them", path.display()))
+    Error::setting("memory", format!("{} is in chunks of {bytes} bytes, which need {needed}MiB", path.display()))
 }
 
 impl Chunks {
@@ -231,6 +231,6 @@ mod tests {
         let how = How { access: Access::Read, memory: 200 };
         let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
         let refused = Chunks::new(&variable, &counts, Vec::new(), &opener).expect_err("chunks of 240 bytes");
-        assert!(refused.to_string().contains("--memory"), "{refused}");
+        assert!(matches!(refused, Error::Setting { setting: "memory", .. }), "{refused}");
     }
 }

@@ -6,7 +6,9 @@
 mod axes;
 mod choose;
 mod chunks;
+#[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(feature = "netcdf")]
 mod netcdf;
 mod openpmd;
 mod places;
@@ -16,12 +18,12 @@ mod vtkhdf;
 mod zarr;
 
 use super::component;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
-use crate::source::{OpenOptions, Parsed, numbering};
+use crate::source::{Advised, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
 use places::Places;
@@ -165,17 +167,22 @@ impl Opener {
 }
 
 /// Reads what an HDF5 file holds.
+#[cfg(feature = "hdf5")]
 pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, hdf5::open, options);
     let file = opener.open()?;
     // What the NetCDF library wrote says so, whatever its name is.
     match file.group("/").contains_key("_NCProperties") {
+        #[cfg(feature = "netcdf")]
         true => describe_netcdf(path, options),
+        #[cfg(not(feature = "netcdf"))]
+        true => Err(super::not_built_in(path, super::Format::NetCdf)),
         false => describe(&opener, file.as_ref(), path, options),
     }
 }
 
 /// Reads what a NetCDF file holds.
+#[cfg(feature = "netcdf")]
 pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let opener = Opener::new(path, netcdf::open, options);
     describe(&opener, opener.open()?.as_ref(), path, options)
@@ -199,14 +206,15 @@ fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &Ope
         all.clone_from(&image.variables);
     }
     let (choice, index) = match options.variable.as_deref() {
-        Some(name) => choose::named(&all, name),
+        Some(name) => choose::named(&all, name).map_err(Note::from),
         None => choose::only(&all, image.as_ref().and_then(|i| i.active.as_deref())).map(|choice| (choice, None)),
     }
-    .map_err(refused)?;
+    .map_err(|e| Error::input(path, e))?;
     check_steps(path, &choice, options)?;
     let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
     let context = Context { file, all: &all, image, index, axes, spaced };
-    let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Parsed<Vec<_>>>().map_err(refused)?;
+    let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Advised<Vec<_>>>();
+    let found = found.map_err(|e| Error::input(path, e))?;
     let mut parts = Vec::new();
     for found in &found {
         let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), opener)?;
@@ -217,7 +225,7 @@ fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &Ope
         (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
     }
     if choice.arrays.len() > 1 {
-        described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path));
+        described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
     }
     Ok(described)
 }
@@ -228,7 +236,8 @@ fn check_steps(path: &Path, choice: &Choice<'_>, options: &OpenOptions) -> Resul
     if options.allow_gaps {
         return Ok(());
     }
-    numbering::check(&names).map_err(|e| Error::input(path, format!("{}: {e}", choice.path)))
+    numbering::check(&names)
+        .map_err(|e| Error::input(path, Note { text: format!("{}: {e}", choice.path), remedy: e.remedy() }))
 }
 
 /// One archive of the arrays of all steps.
@@ -274,7 +283,7 @@ struct Found {
 }
 
 impl Context<'_> {
-    fn found(&self, variable: &Variable) -> Parsed<Found> {
+    fn found(&self, variable: &Variable) -> Advised<Found> {
         let mesh = openpmd::Mesh::of(self.file, variable);
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
@@ -282,7 +291,7 @@ impl Context<'_> {
             format!("{path} is of type {ty}, which is not supported; integers up to 32 bits and floats are")
         })?;
         if variable.lengths.contains(&0) {
-            return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths));
+            return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths).into());
         }
         let (counts, guessed) = axes::counts(&variable, self.all, self.index, self.axes)?;
         let mut places = Places::of((self.file, self.all), &variable, &counts, self.spaced);

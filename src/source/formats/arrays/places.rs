@@ -1,6 +1,7 @@
 //! Where voxels and frames are, by the coordinates of a variable's axes.
 
 use super::{ArrayFile, Variable, axes};
+use crate::base::error::{Note, Remedy};
 use crate::source::Parsed;
 use crate::source::layout::Counts;
 
@@ -34,7 +35,7 @@ pub(super) struct Places {
     pub(super) space_unit: Option<String>,
     pub(super) time_unit: Option<String>,
     pub(super) calendar: Option<String>,
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
 }
 
 /// What the coordinates of an axis come to.
@@ -88,7 +89,7 @@ impl Places {
         let line = numbers(file, coordinate).ok().and_then(|at| Line::of(at, coordinate));
         if line.is_none() {
             let name = coordinate.name();
-            self.notes.push(format!("{name} does not lead from one end to the other: its voxels are numbered"));
+            self.notes.push(format!("{name} does not lead from one end to the other: its voxels are numbered").into());
         }
         line
     }
@@ -96,7 +97,7 @@ impl Places {
     fn take_times(&mut self, file: &dyn ArrayFile, times: &Variable) {
         match numbers(file, times) {
             Ok(numbers) => self.times = numbers,
-            Err(_) => self.notes.push(format!("{} cannot be read: frames are numbered", times.name())),
+            Err(_) => self.notes.push(format!("{} cannot be read: frames are numbered", times.name()).into()),
         }
         self.time_unit = times.text("units").map(String::from);
         self.calendar = times.text("calendar").map(String::from);
@@ -116,7 +117,7 @@ impl Places {
                     (self.origin[along], self.spacing[along]) =
                         (line.first * factor, line.step.map_or(step, |s| s * factor));
                     if !line.is_regular {
-                        self.notes.push(format!("{} is not regular: its mean step is taken", line.name));
+                        self.notes.push(format!("{} is not regular: its mean step is taken", line.name).into());
                     }
                 }
                 Some((line, None)) => {
@@ -185,13 +186,13 @@ impl Line {
     }
 
     /// A note on an axis whose lengths do not compare with those of the leading one.
-    fn other_unit(&self, leading: &Self) -> String {
+    fn other_unit(&self, leading: &Self) -> Note {
         let uneven = if self.is_regular { "" } else { " and not regular" };
-        format!(
-            "{} is in {:?}{uneven}, {} in {:?}: its voxels are numbered, and drawn as far apart as those of {}; --spacing sets \
-             another distance",
+        let text = format!(
+            "{} is in {:?}{uneven}, {} in {:?}: its voxels are numbered, and drawn as far apart as those of {}",
             self.name, self.unit, leading.name, leading.unit, leading.name
-        )
+        );
+        Note::with(text, Remedy::Set("spacing"))
     }
 }
 

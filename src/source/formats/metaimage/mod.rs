@@ -6,13 +6,13 @@ mod header;
 use super::component;
 use super::directions::{Directions, Placed};
 use super::words::numbers;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::Parsed;
 use crate::source::file_header::{FileHeader, Stored, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::{Advised, Parsed};
 use header::Header;
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, Header::parse)?;
-    let samples = samples(&header, variable).map_err(refused)?;
+    let samples = samples(&header, variable).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &samples)?;
     let times = times(&header, &samples).map_err(refused)?;
     let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
@@ -68,13 +68,13 @@ impl Samples {
     }
 }
 
-fn samples(header: &Header, variable: Option<&str>) -> Parsed<Samples> {
+fn samples(header: &Header, variable: Option<&str>) -> Advised<Samples> {
     if header.flag(&["binarydata"])? == Some(false) {
         return Err("has its samples as text (BinaryData = False), which is not supported; write them as binary".into());
     }
     let axes = header.required("NDims")?.parse().map_err(|_| "NDims is no number")?;
     if axes != 3 && axes != 4 {
-        return Err(format!("has {axes} dimension(s); supported are 3 (x y z) and 4 (x y z t)"));
+        return Err(format!("has {axes} dimension(s); supported are 3 (x y z) and 4 (x y z t)").into());
     }
     let sizes: Vec<usize> = numbers(header.required("DimSize")?, "DimSize", axes)?;
     let (lengths, frames) = ([sizes[0], sizes[1], sizes[2]], sizes.get(3).copied().unwrap_or(1));
@@ -143,7 +143,7 @@ fn per_axis(header: &Header, names: &[&str], default: f64, axes: usize) -> Parse
 }
 
 /// What the header says and nothing is done about.
-fn unheeded(header: &Header, axes: usize) -> Parsed<Vec<String>> {
+fn unheeded(header: &Header, axes: usize) -> Parsed<Vec<Note>> {
     let mut notes = Vec::new();
     let matrix = matrix(header, axes)?;
     let of_time = |a: usize| [matrix[3][a], matrix[a][3]];

@@ -112,7 +112,7 @@ fn one_component_of_several_is_read() {
         assert_eq!(source.archive().variable.as_deref(), Some("samples[1]"));
         check_inputs(&file, &named("samples[x]"), ty, 4);
         crate::source::testing::check_window(&*source.window(0, 4).expect("window"), ty, 1);
-        refused(&file, &options(), "samples has 2 components: --variable 'samples[0]' takes the first, up to [1]");
+        refused(&file, &options(), "samples has 2 components; ChooseComponent { name: \"samples\", components: 2 }");
         refused(&file, &named("[2]"), "none with number 2");
         refused(&file, &named("b"), "has no array b");
     }
@@ -133,7 +133,7 @@ fn the_grid_and_times_are_read() {
     assert_eq!((a.grid.spacing, a.grid.origin), ([3.0; 3], [1.0; 3]));
     assert!(a.notes.is_empty());
     let a = archive("Orientation = 0.6 0.8 0 0 -0.8 0.6 0 0 0 0 1 0 0 0 0 1\nElementToIntensityFunctionSlope = 2\n");
-    assert!(a.times.is_empty() && a.notes[0].contains("not kept") && a.notes[1].contains("not applied"));
+    assert!(a.times.is_empty() && a.notes[0].text.contains("not kept") && a.notes[1].text.contains("not applied"));
 }
 
 #[test]
@@ -160,11 +160,11 @@ fn straight_directions_are_turned() {
         let source = open(&file, &options()).expect("opening");
         let grid = source.archive().grid;
         assert_eq!((grid.spacing, grid.origin), ([0.5, 2.0, 1.0], [-2.0, -6.0, 3.0]));
-        assert!(source.archive().notes[0].contains("along -x -y +z of the world"));
+        assert!(source.archive().notes[0].text.contains("along -x -y +z of the world"));
     }
     let mixed = fields.replace("-1 0 0 0 0 -1", "-1 0 0 1 0 -1");
     let source = open(&[folder.write("a.mha", local(&mixed, &turned))], &options()).expect("opening");
-    assert!(source.archive().notes[1].contains("mixes time with space"));
+    assert!(source.archive().notes[1].text.contains("mixes time with space"));
 }
 
 #[test]

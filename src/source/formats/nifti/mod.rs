@@ -7,14 +7,14 @@ pub(in crate::source) use header::is_nifti;
 
 use super::component;
 use super::deflated::{Compression, Stream};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::Parsed;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units, check_size, head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::packing::Packing;
+use crate::source::{Advised, Parsed};
 use header::{Header, LONGEST};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let (bytes, compressed) = header_bytes(path)?;
     let header = Header::parse(&bytes).map_err(refused)?;
     let (data, compressed) = if header.pair { image_of(path)? } else { (path.clone(), compressed) };
-    let array = Array::new(&header, variable).map_err(refused)?;
+    let array = Array::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let part = array.part(&header, &data, compressed)?;
     Ok(array.described(&header, part))
 }
@@ -87,11 +87,11 @@ struct Known {
     spacing: [f64; 3],
     origin: [f64; 3],
     variable: Option<String>,
-    notes: Vec<String>,
+    notes: Vec<Note>,
 }
 
 impl Array {
-    fn new(header: &Header, variable: Option<&str>) -> Parsed<Self> {
+    fn new(header: &Header, variable: Option<&str>) -> Advised<Self> {
         let [x, y, z, frames, components] = lengths(&header.dim)?;
         let own = Some(header.intent_name.as_str()).filter(|name| !name.is_empty());
         let (index, variable) = component::of_only(own, components, variable)?;

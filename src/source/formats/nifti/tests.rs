@@ -210,14 +210,14 @@ fn the_grid_is_that_of_the_sform_or_the_qform_or_of_the_steps() {
     [0.0, 0.0, 0.0, -1.0, 10.0, 104.0].into_iter().enumerate().for_each(|(i, n)| header.real(QFORM, i, n));
     let a = archive(&header);
     assert_eq!((a.grid.spacing, a.grid.origin), ([0.5, 1.0, 2.0], [-1.0, 10.0, 100.0]));
-    assert!(a.notes[0].contains("along +x +y -z"), "{:?}", a.notes);
+    assert!(a.notes[0].text.contains("along +x +y -z"), "{:?}", a.notes);
     header.code(SFORM_CODE, 1);
     let rows = [3.0, 0.0, 0.0, 1.0, 0.0, 4.0, 0.0, 2.0, 0.0, 0.0, 5.0, 3.0];
     rows.into_iter().enumerate().for_each(|(i, n)| header.real(SFORM, i, n));
     let a = archive(&header);
     assert_eq!((a.grid.spacing, a.grid.origin, a.notes.len()), ([3.0, 4.0, 5.0], [1.0, 2.0, 3.0], 0));
     header.real(SFORM, 1, 4.0);
-    assert!(archive(&header).notes[0].contains("directions of the NIfTI are not kept"));
+    assert!(archive(&header).notes[0].text.contains("directions of the NIfTI are not kept"));
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn one_component_of_vectors_is_read() {
         let file = [folder.write(name, bytes)];
         check_inputs(&file, &taken("samples[1]"), SampleType::U16, 4);
         check_inputs(&file, &taken("[y]"), SampleType::U16, 4);
-        refused(&file, &options(), "--variable 'samples[0]' takes the first");
+        refused(&file, &options(), "ChooseComponent { name: \"samples\", components: ");
         refused(&file, &taken("samples[3]"), "none with number 3");
         refused(&file, &taken("speed"), "has no array speed");
     }
@@ -317,7 +317,7 @@ fn what_is_not_supported_is_named() {
     refused(&[folder.write("a.nii", second.with(&samples))], &options(), "as if it were text");
     refused(&[folder.write("a.nii.gz", b"\x1f\x8bnonsense")], &options(), "cannot be decompressed");
     let sized = OpenOptions { dims: Some(vec![7, 5, 3]), ..options() };
-    refused(&[folder.write("a.nii.gz", "")], &sized, "--dims is for headerless data");
+    refused(&[folder.write("a.nii.gz", "")], &sized, "a.nii.gz says itself what it holds; this is for headerless data");
 }
 
 #[test]

@@ -13,10 +13,10 @@ use super::directions::Placed;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::Parsed;
 use crate::source::file_header::{FileHeader, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::{Advised, Parsed};
 use axes::Axes;
 use header::Header;
 use std::path::Path;
@@ -26,7 +26,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, Header::parse)?;
-    let array = Array::new(&header, variable).map_err(refused)?;
+    let array = Array::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &array)?;
     let times = array.axes.times(&header).map_err(refused)?;
     let units = array.axes.units(&header);
@@ -48,7 +48,7 @@ struct Array {
 }
 
 impl Array {
-    fn new(header: &Header, variable: Option<&str>) -> Parsed<Self> {
+    fn new(header: &Header, variable: Option<&str>) -> Advised<Self> {
         let gzip = is_gzip(header.required("encoding")?)?;
         let axes = Axes::parse(header)?;
         if axes.len(axes.frames) == 0 {

@@ -62,7 +62,7 @@ fn the_grid_and_times_are_read() {
     assert!(a.notes.is_empty() && a.times.is_empty());
     let a = archive("space directions: (-2,0,0) (0,3,4) (0,0,4) none\nkinds: space space space list\n");
     assert_eq!(a.grid.spacing, [2.0, 5.0, 4.0]);
-    assert!(a.notes[0].contains("not kept"));
+    assert!(a.notes[0].text.contains("not kept"));
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn what_is_not_supported_is_named() {
         "2 of space, 1 of frames",
     );
     with("dimension: 4\nsizes: 7 5 3 4", "dimension: 5\nsizes: 7 5 3 4 1", "axes 4 of space, 1 of frames");
-    with("# a comment", "kinds: 2-vector domain domain domain", "--variable 'samples[0]' takes the first");
+    with("# a comment", "kinds: 2-vector domain domain domain", "ChooseComponent { name: \"samples\", components: 7 }");
     with("# a comment", "kinds: time list domain domain", "2 of space, 2 of frames");
     with("# a comment", "kinds: mood domain domain domain", "axis 0 is of kind mood");
     with("sizes: 7 5 3 4", "sizes: 0 5 3 4\nkinds: vector domain domain domain", "0 components");

@@ -11,10 +11,10 @@ mod skeleton;
 use super::component::{self, Chosen};
 use super::directions::{Directions, Placed};
 use crate::base::error::{Error, Result};
-use crate::source::Parsed;
 use crate::source::file_header::{FileHeader, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::{Advised, Parsed};
 use extent::Extent;
 use header::{Array, Header};
 use image::{Image, sample_type};
@@ -48,7 +48,7 @@ struct Wanted<'a> {
 }
 
 impl<'a> Wanted<'a> {
-    fn of(header: &'a Header, variable: Option<&str>) -> Parsed<Self> {
+    fn of(header: &'a Header, variable: Option<&str>) -> Advised<Self> {
         let arrays = header.arrays();
         let names: Vec<_> = arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
         let active =
@@ -58,7 +58,7 @@ impl<'a> Wanted<'a> {
         let points = header.whole.points()?;
         let Some(sample) = sample_type(&array.ty) else {
             let types = "UInt8 to Int32, Float32 and Float64 are";
-            return Err(format!("array {}: type {} is not supported; {types}", array.name, array.ty));
+            return Err(format!("array {}: type {} is not supported; {types}", array.name, array.ty).into());
         };
         let lengths = array.of.dims(points);
         let placed = directions(header, array, points)?.placed(lengths, "directions of the .vti");

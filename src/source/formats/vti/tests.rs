@@ -131,7 +131,7 @@ fn the_array_is_the_named_the_active_or_the_only_one() {
     refused(&[active], &named("L"), "has no array L; it has J, K");
     vti.arrays = vti.arrays.replace(" Scalars=\"J\"", "");
     let none_active = [folder.write("a.vti", vti.bytes())];
-    refused(&none_active, &OpenOptions::default(), "--variable chooses one of J, K");
+    refused(&none_active, &OpenOptions::default(), "none is active: J, K; ChooseVariable");
     check_inputs(&none_active, &named("J"), SampleType::U8, 1);
     let archive = open(&none_active, &named("J")).expect("opening").archive().clone();
     assert_eq!(archive.variable.as_deref(), Some("J"));
@@ -250,7 +250,7 @@ fn straight_directions_are_turned() {
         let source = open(&file, &OpenOptions::default()).expect("opening");
         let grid = source.archive().grid;
         assert_eq!((grid.spacing, grid.origin), ([0.5, 1.0, 2.0], [-3.0, 2.0, -1.0]));
-        assert!(source.archive().notes[0].contains("along -x +y -z of the world"));
+        assert!(source.archive().notes[0].text.contains("along -x +y -z of the world"));
     }
     // Axes of 5, 3, 7 voxels that go along y, z, x.
     let order = |[y, z, x]: [usize; 3]| all[2 * ((z * 5 + y) * 7 + x)..][..2].to_vec();
@@ -272,7 +272,7 @@ fn an_oblique_direction_is_noted_and_frames_must_agree() {
     let a = folder.write("a1.vti", vti.bytes());
     let b = folder.write("b.vti", directed(&vti, "0.6 -0.8 0 0.8 0.6 0 0 0 1"));
     let source = open(&[b], &OpenOptions::default()).expect("opening");
-    assert!(source.archive().notes[0].contains("directions of the .vti are not kept"));
+    assert!(source.archive().notes[0].text.contains("directions of the .vti are not kept"));
     assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 2.0]);
     let renamed = Vti { arrays: vti.arrays.replace("\"J\"", "\"K\""), ..vti };
     let c = folder.write("c.vti", renamed.bytes());
@@ -389,7 +389,7 @@ fn one_component_of_several_is_read() {
     let named = |name: &str| OpenOptions { variable: Some(name.into()), ..OpenOptions::default() };
     for vti in [raw(TAGS[0], "UInt16", &both), appended(&tag, "UInt16", "raw", &[before, blocks].concat())] {
         let file = vectors(vti);
-        refused(&file, &OpenOptions::default(), "J has 2 components: --variable 'J[0]' takes the first, up to [1]");
+        refused(&file, &OpenOptions::default(), "J has 2 components; ChooseComponent { name: \"J\", components: 2 }");
         refused(&file, &named("J[2]"), "none with number 2");
         check_inputs(&file, &named("J[x]"), ty, 1);
         let mut source = open(&file, &named("J[1]")).expect("opening");

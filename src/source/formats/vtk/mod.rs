@@ -19,13 +19,13 @@ use std::path::Path;
 
 /// Goes through the text of one file and finds the array.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
-    let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = Header::read(&file)?;
     let arrays: Vec<_> = header.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
-    let chosen = component::choose(&arrays, header.scalars.first().copied(), variable).map_err(refused)?;
+    let chosen = component::choose(&arrays, header.scalars.first().copied(), variable);
+    let chosen = chosen.map_err(|e| Error::input(path, e))?;
     let array = &header.arrays[chosen.array];
-    let (shape, stored) = stored(&header, array, chosen).map_err(refused)?;
+    let (shape, stored) = stored(&header, array, chosen).map_err(|e| Error::input(path, e))?;
     let at = if header.ascii { text(&file, array, shape) } else { DataLocation::Byte(array.start) };
     let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at };
     let mut described = FileHeader::plain(shape, vec![part]);

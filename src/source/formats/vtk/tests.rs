@@ -75,8 +75,8 @@ fn one_array_of_several_is_read() {
         b"\n",
     ]);
     let file = [folder.write("a.vtk", &bytes)];
-    refused(&file, &options(), "--variable chooses one of v, with space, last, n");
-    refused(&file, &named("v"), "v has 3 components: --variable 'v[0]' takes the first");
+    refused(&file, &options(), "none is active: v, with space, last, n; ChooseVariable");
+    refused(&file, &named("v"), "v has 3 components; ChooseComponent { name: \"v\", components: 3 }");
     refused(&file, &named("w"), "has no array w; it has v");
     check_inputs(&file, &named("v[0]"), ty, 1);
     check_inputs(&file, &named("with space"), SampleType::U8, 1);

@@ -1,4 +1,4 @@
-//! The paper's own case (table 1): eddy currents in a plate, Haar and multiwavelet, beside both conventional forms.
+//! The case of [Dobashi](wavesplat::bibliography), table 1: eddy currents in a plate, Haar and multiwavelet, beside both conventional forms.
 
 use super::convert::{Conversion, Scheme};
 use super::measured::Measured;

@@ -1,0 +1,112 @@
+//! Options that every program takes, and what they do: workers, notes, progress, reports.
+
+use super::print;
+use super::terminal::{ProgressKind, TerminalProgress};
+use super::values::Size;
+use crate::base::error::{Error, Result};
+use clap::Args;
+use serde::Serialize;
+use std::io::{self, Write};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Options that every program and subcommand takes.
+#[derive(Debug, Clone, Args)]
+pub struct CommonArgs {
+    /// TOML file with more options, by their long names: tolerance = 0.001; those of one command in a table of its name. What
+    /// the command line says wins [default: the file that WAVESPLAT_CONFIG, or WAVESPLAT_RENDER_CONFIG of wavesplat-render,
+    /// names]
+    #[arg(long, value_name = "FILE", help_heading = "Common options")]
+    pub config: Option<PathBuf>,
+    /// Worker threads; by default one for each core
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = "Common options")]
+    pub threads: Option<NonZeroUsize>,
+    /// Budget for what the program allocates
+    #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Common options")]
+    pub memory: Size,
+    /// Progress, on standard error: a bar if that is a terminal, lines of JSON, or none
+    #[arg(long, value_enum, value_name = "HOW", default_value = "auto", help_heading = "Common options")]
+    pub progress: ProgressKind,
+    /// Neither progress nor notes
+    #[arg(short, long, help_heading = "Common options")]
+    pub quiet: bool,
+    /// More notes
+    #[arg(short, long, conflicts_with = "quiet", help_heading = "Common options")]
+    pub verbose: bool,
+    /// Print one JSON object with everything measured and decided (to standard error if data goes to standard output)
+    #[arg(long, help_heading = "Common options")]
+    pub json: bool,
+}
+
+impl CommonArgs {
+    /// Starts the workers. Call once.
+    pub fn start(&self) -> Result<()> {
+        let threads = self.threads.map_or(0, NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}")))
+    }
+
+    /// The part of the budget that a stream may take for the frames of one window.
+    pub fn stream_memory(&self) -> usize {
+        self.memory.0 / 4
+    }
+
+    /// Progress of a stage that counts `unit`s.
+    pub fn progress(&self, stage: &'static str, unit: &'static str) -> TerminalProgress {
+        let kind = if self.quiet { ProgressKind::None } else { self.progress };
+        TerminalProgress::new(kind, stage, unit)
+    }
+
+    /// A note on standard error, unless quiet.
+    pub fn note(&self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            note(text);
+        }
+    }
+
+    /// A note that only `--verbose` shows.
+    pub fn detail(&self, text: impl std::fmt::Display) {
+        if self.verbose {
+            note(text);
+        }
+    }
+
+    /// With `--json`, prints a report to standard output, or to standard error if `data_on_stdout`.
+    pub fn report(&self, report: &impl Serialize, data_on_stdout: bool) -> Result<()> {
+        if !self.json {
+            return Ok(());
+        }
+        let text = report_text(report)?;
+        if data_on_stdout {
+            note(text.trim_end());
+            return Ok(());
+        }
+        print(&text)
+    }
+}
+
+/// A number of threads.
+///
+/// # Errors
+/// It is no whole number above 0.
+fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
+    text.parse().map_err(|_| "takes a whole number, at least 1; without --threads each core has one".into())
+}
+
+/// What `--json` prints of a report.
+pub fn report_text(report: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
+    text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
+}
+
+/// The object that `--json` prints; a change of a key's meaning changes `schema`.
+#[derive(Debug, Serialize)]
+struct Versioned<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    report: &'a T,
+}
+
+pub(super) fn note(text: impl std::fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "{text}"); // nowhere is left to report a failure
+}

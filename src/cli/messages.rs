@@ -1,0 +1,111 @@
+//! Errors and notes of the library as the programs print them: fields become options, remedies become advice.
+
+use crate::base::error::{Error, Note, Remedy};
+use clap::Command;
+use std::borrow::Cow;
+
+/// An error in one line or more, and a tip where something helps.
+pub(super) fn of_error(error: &Error, command: &Command) -> String {
+    let text = match error {
+        Error::Setting { setting, problem, .. } => format!("error: {}: {problem}", option(setting, command)),
+        other => format!("error: {other}"),
+    };
+    error.remedy().map(|remedy| format!("{text}\n  tip: {}", advice(&remedy))).unwrap_or(text)
+}
+
+/// A note, and what can be done about it.
+pub fn of_note(note: &Note) -> String {
+    note.remedy.as_ref().map_or(note.text.clone(), |remedy| format!("{note}; {}", advice(remedy)))
+}
+
+/// Fields whose option has another name.
+const OPTIONS: [(&str, &str); 6] = [
+    ("sample", "dtype"),
+    ("big_endian", "endian"),
+    ("azimuth", "view"),
+    ("elevation", "view"),
+    ("certify", "error-image"),
+    ("limited", "error"),
+];
+
+/// The option that sets a field; the field's own name if a program has none for it.
+fn option(setting: &str, command: &Command) -> String {
+    let other = OPTIONS.iter().find(|(field, _)| *field == setting).map(|(_, option)| (*option).to_string());
+    let name = other.unwrap_or_else(|| setting.replace('_', "-"));
+    let mut commands = std::iter::once(command).chain(command.get_subcommands());
+    let is_option = commands.any(|c| c.get_arguments().any(|arg| arg.get_long() == Some(name.as_str())));
+    if is_option { format!("--{name}") } else { setting.replace('_', " ") }
+}
+
+/// What helps, by the options of the programs.
+fn advice(remedy: &Remedy) -> Cow<'static, str> {
+    let fixed = match remedy {
+        Remedy::Set(field) => return format!("--{field} says otherwise").into(),
+        Remedy::ChooseVariable => "--variable chooses one",
+        Remedy::ChooseComponent { name, components } => {
+            return format!("--variable '{name}[0]' takes the first, up to [{}]", components.saturating_sub(1)).into();
+        }
+        Remedy::ChooseIndex { name } => return index(name).into(),
+        Remedy::ChooseFrames => "--frames a:b chooses those that the file holds",
+        Remedy::DescribeSamples => "headerless data needs --dims NXxNYxNZ and --dtype",
+        Remedy::CorrectSamples => "check --dims, --dtype and --offset",
+        Remedy::SetDims { dims: [x, y, z], frames: 1 } => return format!("say --dims {x}x{y}x{z}").into(),
+        Remedy::SetDims { dims: [x, y, z], frames } => return format!("say --dims {x}x{y}x{z}x{frames}").into(),
+        Remedy::AllowGaps => "--allow-gaps takes the files as they are",
+        Remedy::MaskMissing => "--missing mask keeps them as they are",
+        Remedy::BuildWith(feature) => {
+            return format!("cargo build --release --features {feature} builds it in").into();
+        }
+        Remedy::Replace => "--force replaces it",
+        Remedy::BeginAnew => "--force begins anew",
+        Remedy::ResumeOrBeginAnew => "--resume goes on with it, --force begins anew",
+        Remedy::AppendOrBeginAnew { frames } => return append(*frames).into(),
+        Remedy::RecoverOrSkip => {
+            "wavesplat recover saves what is whole; --skip-damaged gives the rest where only blocks are damaged"
+        }
+        Remedy::ResumeOrRecover => {
+            "an unfinished conversion: --resume of what made it goes on, wavesplat recover saves what it holds"
+        }
+        Remedy::RangeAboveZero => "give --range, or --norm linear",
+        Remedy::Project => "leave it out, or make projections with --mode projection",
+        Remedy::ProjectOrConvertSamples => "leave --mode out, or convert without --transfer-function",
+    };
+    fixed.into()
+}
+
+fn index(name: &str) -> String {
+    format!(
+        "--variable '{name}[0]' takes its first index, --axes with one letter of t z y x (or c for another) for each axis, \
+         slowest first, says it otherwise"
+    )
+}
+
+fn append(frames: u64) -> String {
+    format!("--frames 0:{frames} makes a file of these, to which append adds the others; --force begins anew")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Arg;
+
+    fn command() -> Command {
+        let arg = |name: &'static str| Arg::new(name).long(name);
+        Command::new("wavesplat").subcommand(Command::new("convert").args(["splat-error", "dtype"].map(arg)))
+    }
+
+    #[test]
+    fn fields_are_options_where_a_program_has_them() {
+        let found = ["splat_error", "sample", "inputs", "some_field"].map(|field| option(field, &command()));
+        assert_eq!(found, ["--splat-error", "--dtype", "inputs", "some field"]);
+        let error = Error::setting("sample", Note::with("is wrong", Remedy::CorrectSamples));
+        let text = of_error(&error, &command());
+        assert_eq!(text, "error: --dtype: is wrong\n  tip: check --dims, --dtype and --offset");
+    }
+
+    #[test]
+    fn notes_end_with_what_can_be_done() {
+        assert_eq!(of_note(&"a".into()), "a");
+        assert_eq!(of_note(&Note::with("a", Remedy::Set("axes"))), "a; --axes says otherwise");
+    }
+}

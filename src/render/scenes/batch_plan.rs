@@ -1,0 +1,108 @@
+//! What a batch of frames of a coefficient file splats: which coefficients or values, into which planes.
+
+use crate::base::error::Result;
+use crate::codec::WindowCodec;
+use crate::file::CoefficientFile;
+use crate::render::config::RenderConfig;
+use crate::render::layout::{Layout, Order};
+use crate::render::scene::BatchRequest;
+use crate::wavelet::needed;
+use wavesplat_format::Window;
+
+/// What of a file is splatted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SplatSource {
+    /// Coefficients.
+    Coefficients,
+    /// The decoded samples of every frame: the conventional method.
+    Samples,
+}
+
+/// Decided once for a batch, before any block is read.
+pub(super) struct BatchPlan {
+    pub(super) what: SplatSource,
+    pub(super) codec: WindowCodec,
+    /// Counted from the first frame of the window.
+    pub(super) frames: Vec<usize>,
+    /// For each coefficient, whether the frames need it.
+    pub(super) wanted: Vec<bool>,
+    /// The coefficients that the frames need, ascending.
+    pub(super) kept: Vec<usize>,
+    /// Whether planes hold the values of each frame instead of coefficients.
+    pub(super) by_values: bool,
+    pub(super) layout: Layout,
+}
+
+impl BatchPlan {
+    /// The plan for the frames of a request, which are all of one window.
+    pub(super) fn new(
+        file: &CoefficientFile,
+        what: SplatSource,
+        window: u32,
+        request: &BatchRequest<'_>,
+    ) -> Result<Self> {
+        let BatchRequest { channel, config, .. } = *request;
+        let first = file.window_range(window).start;
+        let frames: Vec<usize> = request.frames.iter().map(|f| f - first).collect();
+        let codec = file.codec(window)?;
+        let wanted = needed(&codec.synthesis, &frames);
+        let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
+        let by_values = what != SplatSource::Samples && !config.certify && few_asked(file, &codec, window, config);
+        let counts = (kept.len(), frames.len());
+        let layout = layout(file, &codec, (window, channel), (what, by_values), counts, config);
+        Ok(Self { what, codec, frames, wanted, kept, by_values, layout })
+    }
+}
+
+/// What holds in every frame, and what each level part that is left out counts in a frame.
+pub(super) fn error_planes(config: &RenderConfig, levels: usize) -> usize {
+    match (config.certify, config.allowed) {
+        (false, _) => 0,
+        (true, None) => 1,
+        (true, Some(_)) => 1 + levels,
+    }
+}
+
+/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a
+/// pixel are added faster.
+fn is_dense(window: &Window, series: usize) -> bool {
+    window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
+}
+
+/// The planes of a batch of `frames` frames that needs `kept` coefficients.
+fn layout(
+    file: &CoefficientFile,
+    codec: &WindowCodec,
+    (window, channel): (u32, usize),
+    (what, by_values): (SplatSource, bool),
+    (kept, frames): (usize, usize),
+    config: &RenderConfig,
+) -> Layout {
+    let leaves = file.leaves_of(window, channel);
+    let coded = leaves.iter().any(|leaf| leaf.coded > 0);
+    let exact = leaves.iter().any(|leaf| leaf.exact > 0);
+    let record = &file.metadata().windows[window as usize];
+    let (values, missing) = (what == SplatSource::Samples || by_values, file.has_missing(window));
+    let is_dense = is_dense(record, file.channels() * file.grid.whole().voxels());
+    Layout {
+        coefficients: if values || !coded { 0 } else { kept },
+        frames,
+        values: values || exact || record.outliers > 0 || missing,
+        absent: missing,
+        error_planes: error_planes(config, codec.parts()),
+        lengths: false,
+        order: if values || is_dense { Order::Pixels } else { Order::Planes },
+    }
+}
+
+/// Whether so few frames of a window are asked for that their values are less work than the coefficients that they
+/// need. Judged by all that are asked for, not by a batch, whose frames depend on the memory that there is.
+fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
+    let range = file.window_range(window);
+    let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();
+    let needed = needed(&codec.synthesis, &asked).into_iter().filter(|needed| *needed).count();
+    COEFFICIENTS_FOR_A_VALUE * asked.len() <= needed
+}
+
+/// Measured: with half as many frames as coefficients both take as long, with a quarter values a fifth less.
+const COEFFICIENTS_FOR_A_VALUE: usize = 4;
