@@ -77,7 +77,7 @@ pub use scene::{
 };
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
@@ -136,9 +136,8 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
-        return Err(Error::usage(
-            "--mode: the samples are colours already, of which only projections are made; leave it out, or convert without --transfer-function",
-        ));
+        let what = "the samples are colours already, of which only projections are made";
+        return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
     }
     let volume = (*scene.grid(), scene.blocks());
     let setup = |view: &View| without_what_is_dim(ViewSetup::new(volume, config, view)?, config);

@@ -96,7 +96,7 @@ impl<R: Read> Stream<R> {
         let (frame, bytes) = (self.next, self.shape.frame_bytes());
         if got > 0 {
             let what = format!("ends inside frame {frame}: expected {bytes} bytes, got {got}");
-            return Err(Error::input(STANDARD, Note::with(what, Remedy::CorrectSamples)));
+            return Err(Error::input(STANDARD, Note::with(what, Remedy::Adjust(&["dims", "sample"]))));
         }
         match self.archive.frames {
             Some(all) => Err(Error::input(STANDARD, format!("ends after {frame} of {all} frames"))),

@@ -49,7 +49,7 @@ fn places_times_and_units_go_from_file_to_file() {
 }
 
 #[test]
-fn what_files_declare_missing_is_missing_unasked() {
+fn declared_missing_values_are_missing_by_default() {
     for name in ["fill_1e20", "fill_nan", "packed_i16", "missing_value"] {
         let (work, source) = (Work::new(), input(&format!("netcdf/{name}.nc")));
         work.wavesplat(&format!("convert {source} -o a.wspl")).ok();
@@ -61,7 +61,7 @@ fn what_files_declare_missing_is_missing_unasked() {
 }
 
 #[test]
-fn what_is_ambiguous_is_listed_and_chosen() {
+fn ambiguous_variables_are_listed_and_chosen() {
     let (work, source) = (Work::new(), input("netcdf/several.nc"));
     let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
     work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
@@ -76,7 +76,7 @@ fn what_is_ambiguous_is_listed_and_chosen() {
 }
 
 #[test]
-fn info_tells_of_frames_and_how_large_they_would_become() {
+fn info_describes_frames_and_estimates_their_file() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([50, 40, 30], 40).npy());
     let told = work.wavesplat("info a.npy").ok();
@@ -108,7 +108,7 @@ fn coefficients_go_through_a_pipe_as_they_are() {
 
 #[cfg(not(feature = "zarr"))]
 #[test]
-fn a_zarr_store_that_is_not_built_in_says_how_to_get_it() {
+fn zarr_without_its_feature_explains_how_to_get_it() {
     let source = input("zarr/v3_zstd.zarr");
     Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["cargo build --release --features zarr"]);
 }

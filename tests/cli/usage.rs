@@ -84,7 +84,7 @@ fn bad_values_of_render_are_named() {
 }
 
 #[test]
-fn an_ending_that_says_no_format_is_refused_with_those_that_do() {
+fn an_extension_without_a_format_is_refused_with_the_known_ones() {
     let work = Work::with_file("");
     work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", "png npy y4m rgb24 gray16"]);
     work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);

@@ -2,7 +2,7 @@
 
 use super::png::{self, Samples};
 use super::{Picture, Rendered, SinkConfig};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::Output;
 
 /// More pixels a side than most programs show.
@@ -64,7 +64,7 @@ pub(super) fn size([width, height]: [usize; 2], pictures: usize) -> Result<[usiz
     let [across, down] = size;
     let what =
         format!("a sheet of {pictures} pictures would have {across}x{down} pixels, of at most {MOST_SIDE} a side");
-    Err(Error::usage(format!("--format sheet: {what}; give a smaller --size or fewer --frames")))
+    Err(Error::setting("format", Note::with(what, Remedy::Adjust(&["size", "frames"]))))
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ fn remedy(len: u64, shape: &Shape, options: &OpenOptions) -> Remedy {
     let payload = len.saturating_sub(options.offset);
     match (payload / shape.frame_bytes() as u64, payload % shape.frame_bytes() as u64) {
         (frames, 0) if frames > 0 => Remedy::SetDims { dims: shape.dims(), frames },
-        _ => Remedy::CorrectSamples,
+        _ => Remedy::Adjust(&["dims", "sample", "offset"]),
     }
 }
 
@@ -94,7 +94,11 @@ mod tests {
         refused(&file, &options(Some(5), SampleType::F32), "expected 2100 bytes");
         refused(&file, &options(Some(4), SampleType::U8), "SetDims { dims: [7, 5, 3], frames: 16 }");
         refused(&file, &options(Some(4), SampleType::F64), "right for samples of 4 byte(s)");
-        refused(&file, &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) }, "CorrectSamples");
+        refused(
+            &file,
+            &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) },
+            "Adjust([\"dims\", \"sample\", \"offset\"])",
+        );
         let empty = [folder.write("empty.raw", "")];
         refused(&empty, &options(None, SampleType::F32), "found 0");
     }
