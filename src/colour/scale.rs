@@ -29,6 +29,14 @@ pub struct Scale {
 const SHARES: u16 = 1 << 13;
 
 impl Scale {
+    /// A map by its name (see [`super::NAMES`]), spread evenly over a range of values, on black.
+    ///
+    /// # Errors
+    /// As [`TransferFunction::open`] and [`Self::new`].
+    pub fn named(name: &str, range: (f64, f64)) -> Result<Self> {
+        Self::new(&TransferFunction::open(name)?, range, Norm::Linear, [0; 3])
+    }
+
     /// From the first to the last colour over `range`.
     ///
     /// # Errors

@@ -10,6 +10,8 @@ mod stream;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::Annotation;
+use super::config::RenderConfig;
+use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
@@ -105,34 +107,53 @@ pub enum Depth {
     Sixteen,
 }
 
-/// What all pictures have in common.
+/// What all pictures have in common. [`SinkConfig::new`] has the defaults; change others by struct update.
 #[derive(Debug, Clone)]
 pub struct SinkConfig {
-    /// How they are written.
+    /// How they are written. Default: PNG.
     pub format: PictureFormat,
-    /// Width and height.
+    /// Width and height in pixels.
     pub size: [usize; 2],
-    /// Which view and which frame each picture is of.
+    /// Which view and which frame each picture is of. Default: all frames of the first view.
     pub shown: Vec<(usize, usize)>,
-    /// What made the pictures.
+    /// What made the pictures. Default: this library.
     pub provenance: Arc<Provenance>,
-    /// Frames a second, where the format says it.
+    /// Frames a second, where the format says it. Default: 25.
     pub fps: u32,
-    /// What the numbers of a pixel are.
+    /// What the numbers of a pixel are. Default: those of the scene and mode.
     pub pixel: Pixel,
     /// Values to colours.
     pub colours: Scale,
-    /// Bits of these in a PNG.
+    /// Bits of these in a PNG. Default: 8.
     pub depth: Depth,
-    /// Whether an array holds colours instead of values.
+    /// Whether an array holds colours instead of values. Default: no.
     pub coloured_array: bool,
-    /// What is drawn into pictures that are in colours.
+    /// What is drawn into pictures that are in colours. Default: nothing.
     pub annotation: Option<Annotation>,
-    /// Replace existing files.
+    /// Whether existing files are replaced. Default: no.
     pub force: bool,
 }
 
 impl SinkConfig {
+    /// For what [`render`](crate::render::render) makes of a scene.
+    pub fn new(scene: &dyn Scene, config: &RenderConfig, colours: Scale) -> Self {
+        let software = format!("wavesplat {}", env!("CARGO_PKG_VERSION"));
+        let size = config.size();
+        Self {
+            format: PictureFormat::Png,
+            size,
+            shown: config.frames.iter().map(|frame| (0, *frame)).collect(),
+            provenance: Arc::new(Provenance { software, size, ..Provenance::default() }),
+            fps: 25,
+            pixel: if scene.channels() > 1 { Pixel::Channels } else { config.mode.pixel() },
+            colours,
+            depth: Depth::Eight,
+            coloured_array: false,
+            annotation: None,
+            force: false,
+        }
+    }
+
     /// What of a rendering is to be written.
     fn shown_of<'a>(&self, rendered: &Rendered<'a>) -> Option<Picture<'a>> {
         match self.provenance.shows {
