@@ -1,4 +1,5 @@
-//! A coefficient file back to samples: any frames, any region, without reading the rest; and into files of other programs.
+//! Extracts samples from a coefficient file: any frames and any region, without reading the rest. Writes them in the
+//! formats of other programs.
 
 mod contents;
 mod encoding;
@@ -26,11 +27,11 @@ use wavesplat_format::BlockEntry;
 /// What to extract.
 #[derive(Debug, Clone)]
 pub struct ExtractConfig {
-    /// Which frames, ascending.
+    /// The frames, ascending.
     pub frames: Vec<usize>,
-    /// Which voxels.
+    /// The voxels.
     pub region: Region,
-    /// Which channel, from 0.
+    /// The channel, from 0.
     pub channel: usize,
     /// Bytes that may be allocated.
     pub memory: usize,
@@ -41,15 +42,15 @@ pub struct ExtractConfig {
 pub struct ExtractReport {
     /// Frames written.
     pub frames: usize,
-    /// Blocks that were decoded, each time counted.
+    /// Decoded blocks; a block decoded twice counts twice.
     pub blocks_read: u64,
-    /// Stored bytes that were read of blocks.
+    /// Stored bytes of blocks that were read.
     pub bytes_read: u64,
-    /// Bytes of the file that were read, directory and all.
+    /// Bytes that were read of the file, including its directory.
     pub file_bytes_read: u64,
-    /// Bytes that the file has.
+    /// Bytes of the file.
     pub file_bytes: u64,
-    /// Bytes of samples, in the type that they have in the file.
+    /// Bytes of the extracted samples, in the file's sample type.
     pub bytes: u64,
 }
 
@@ -58,7 +59,7 @@ pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()
     Pieces::new(file, config).map(|_| ())
 }
 
-/// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
+/// Writes the samples in the file's sample type, little-endian, frame by frame, x fastest. Messages call `out` `name`.
 pub fn extract(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -70,7 +71,7 @@ pub fn extract(
     extract_to(file, config, &mut write, progress)
 }
 
-/// As [`extract`]; `write` is given the samples in pieces: whole frames, or some of one frame.
+/// As [`extract`]; `write` gets the samples in pieces: whole frames, or part of one frame.
 pub fn extract_to(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -96,15 +97,15 @@ pub fn extract_to(
     Ok(report)
 }
 
-/// How much is decoded at a time: some frames of a window whole, or one frame by slabs of z.
+/// The amount decoded at a time: whole frames of a window, or slabs of z of one frame.
 struct Pieces {
     frames: usize,
     slab: usize,
-    /// Blocks that are decoded at a time.
+    /// Blocks decoded at a time.
     blocks: usize,
 }
 
-/// Frames (of one window) and voxels that are decoded together, in the order of the output.
+/// Frames of one window and voxels that are decoded together, in the order of the output.
 struct Piece {
     window: u32,
     frames: Vec<usize>,
@@ -141,7 +142,7 @@ impl Pieces {
     }
 }
 
-/// Bytes that decoding one block takes: as it is read and refined, and its samples.
+/// Bytes of memory to decode one block: its codes, its coefficients and its samples.
 fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
@@ -177,7 +178,7 @@ fn read_piece(
     Ok(())
 }
 
-/// Copies the rows that a block and the piece share.
+/// Copies the rows shared by a block and the piece.
 fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], piece: &Region, out: &mut [u8]) {
     let size = codec.sample.size();
     let shared = block.intersect(piece);
