@@ -251,7 +251,7 @@ impl Refined<'_> {
         let mut i = 0;
         while i < predicted.len() {
             let taps = taps(self.stencil, i, count);
-            // All nodes between the faces have the same taps, one further each.
+            // All nodes between the faces have the same taps, each shifted by one.
             let run = if taps.count == INNER { (count - 2 - i).min(predicted.len() - i) } else { 1 };
             let from = |t: usize| if t < taps.count { &evens[taps.first + t..] } else { &[] };
             taps.sum(std::array::from_fn(from), &mut predicted[i..i + run]);
@@ -349,10 +349,11 @@ impl Taps {
     }
 }
 
-/// The stencil for odd node `i`, between the even nodes i and i + 1 of `evens` (eq 33). Sums go from the first tap to the last.
+/// The stencil for odd node `i`, between the even nodes i and i + 1 of `evens` (eq 33). Sums go from the first tap to
+/// the last.
 ///
-/// The polynomial through the nearest nodes: cubic through four, quadratic through three next to a face, and a straight line
-/// (-1, 3)/2 beyond the last even node.
+/// The polynomial through the nearest nodes: cubic through four, quadratic through three next to a face, and a straight
+/// line (-1, 3)/2 beyond the last even node.
 fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {

@@ -40,7 +40,7 @@ pub enum SpatialPredictor {
 }
 
 impl SchemeConstraint {
-    /// Everything is chosen.
+    /// No constraint: everything is chosen.
     pub const AUTO: Self = Self { basis: None, space: SpatialPredictor::Any };
 }
 

@@ -37,6 +37,7 @@ pub struct Estimate {
 /// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive. For a bound
 /// that refers to a range.
 ///
+/// # Errors
 /// Those of a conversion; also an error if the source is a stream.
 pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
     let archive = source.archive().clone();

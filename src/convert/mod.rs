@@ -58,7 +58,7 @@ pub enum MissingPolicy {
     Mask,
 }
 
-/// How to convert.
+/// The settings of a conversion.
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
     /// The scheme, or the fixed parts of it.
@@ -109,7 +109,7 @@ impl ConvertConfig {
     }
 }
 
-/// What a conversion did.
+/// The report of a conversion.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConvertReport {
     /// Frames of the file.
@@ -178,7 +178,8 @@ pub fn convert<W: Write>(
 
 /// As [`convert`], continuing a partial file after its complete windows; `out` must be at their end.
 ///
-/// Also an error if the partial file has other settings, or was converted from other frames.
+/// # Errors
+/// Those of [`convert`]; also an error if the partial file has other settings, or was converted from other frames.
 pub fn resume<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
@@ -376,7 +377,7 @@ fn most_coefficients(config: &ConvertConfig) -> usize {
 const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
 
-/// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
+/// The worker stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
 fn encode(
     level: i32,
     plan: &Plan<'_>,
@@ -449,7 +450,7 @@ fn bug(error: wavesplat_format::Error) -> Error {
     Error::CoefficientFile { path: "encoding".into(), source: error }
 }
 
-/// Coded blocks on their way to the file, in order.
+/// Coded blocks for the writer, in order.
 #[derive(Debug)]
 struct EncodedBatch {
     window: Arc<WindowJob>,

@@ -59,7 +59,8 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    /// The root mean square over the window's frames of `tolerance` times the mean of |g| at `pixels`: delta (eq 11 and 13).
+    /// delta (eq 11 and 13): the root mean square over the window's frames of `tolerance` times the mean of |g| at
+    /// `pixels`.
     pub(super) fn bound(&self, tolerance: f64, pixels: &[Pixel]) -> Result<f64> {
         let kernel = Kernel::new(None, 0.0, self.grid)?;
         let scale = scale(self.magnitude);

@@ -24,7 +24,7 @@ use serde::Serialize;
 use std::io::Write;
 use wavesplat_format::BlockEntry;
 
-/// What to extract.
+/// The frames, voxels and channel to extract.
 #[derive(Debug, Clone)]
 pub struct ExtractConfig {
     /// The frames, ascending.
@@ -37,7 +37,7 @@ pub struct ExtractConfig {
     pub memory: usize,
 }
 
-/// What an extraction did.
+/// The report of an extraction.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct ExtractReport {
     /// Frames written.
@@ -161,7 +161,7 @@ fn read_piece(
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
-    out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
+    out.resize(frames.len() * piece.region.voxels() * size, 0); // blocks overwrite all of it
     for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let decode =
