@@ -75,7 +75,7 @@ use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
 use splat::ViewSetup;
-use splat::reference_weights::without_what_is_dim;
+use splat::reference_weights::without_dim_voxels;
 use std::time::{Duration, Instant};
 
 /// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
@@ -134,7 +134,7 @@ fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
         ));
     }
     let volume = (*scene.grid(), scene.blocks());
-    let setup = |view: &View| without_what_is_dim(ViewSetup::new(volume, config, view)?, config);
+    let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
     let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
     match config.mode {
         Mode::Projection => Budget::check(config, scene, &setups)?,

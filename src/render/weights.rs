@@ -66,10 +66,10 @@ impl Weights {
     /// The sum at a point of the picture, or of the nearest pixel for points up to `reach` pixels outside; at least the
     /// background threshold. `None` for other points.
     pub(super) fn near(&self, point: [f64; 2], reach: f64) -> Option<f64> {
-    let within = |a: usize| point[a] >= -reach && point[a] < self.size[a] as f64 + reach;
-    let pixel = |a: usize| (point[a].max(0.0) as usize).min(self.size[a] - 1);
-    let is_visible = within(0) && within(1) && self.threshold > 0.0;
-    is_visible.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
+        let within = |a: usize| point[a] >= -reach && point[a] < self.size[a] as f64 + reach;
+        let pixel = |a: usize| (point[a].max(0.0) as usize).min(self.size[a] - 1);
+        let is_visible = within(0) && within(1) && self.threshold > 0.0;
+        is_visible.then(|| self.sums[pixel(1) * self.size[0] + pixel(0)].max(self.threshold))
     }
 
     /// The weights of the pixel in a column and a row.

@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn frames_show_their_time_or_their_number() {
-    let stamps = |unit: Option<&str>| {
+        let stamps = |unit: Option<&str>| {
             let timed = Annotation { times: vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0], unit: unit.map(String::from) };
             (0..5).map(|frame| timed.stamps(frame)[0].clone()).collect::<Vec<_>>()
         };
