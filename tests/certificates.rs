@@ -19,14 +19,14 @@ use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 
 /// The reference pictures of one view, with which several pictures are compared.
-struct Truth<'a> {
+struct Reference<'a> {
     trial: &'a Trial,
     config: RenderConfig,
     images: Images,
     masked: bool,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> Reference<'a> {
     /// Renders all frames by brute force; the kernel's sigma may differ from the default.
     fn new(trial: &'a Trial, (view, tau): (View, f64), sigma: Option<f64>) -> Self {
         let samples = values(&trial.memory, trial.ty());
@@ -94,7 +94,7 @@ fn no_pixel_is_beyond_its_certificate() {
     for trial in doubles() {
         let mut used = 0.0_f64;
         for view in views() {
-            let truth = Truth::new(&trial, view, None);
+            let truth = Reference::new(&trial, view, None);
             used = used.max(truth.check(&mut coefficients(&trial), None));
             used = used.max(truth.check(&mut samples(&trial), None));
             used = used.max(truth.check(&mut direct(&trial.memory, trial.config.missing_value), None));
@@ -113,7 +113,7 @@ fn kernels_far_narrower_and_wider_than_a_cell_are_certified() {
     let trial = Trial::new("kernels", memory, settings(Basis::Haar, 4, 0.1));
     for sigma in [0.02, 0.1, 0.3, 1.0, 4.0, 50.0] {
         for view in views() {
-            Truth::new(&trial, view, Some(sigma)).check(&mut coefficients(&trial), Some(0.7));
+            Reference::new(&trial, view, Some(sigma)).check(&mut coefficients(&trial), Some(0.7));
         }
     }
 }
@@ -277,11 +277,11 @@ fn masked_within_the_cut() -> Trial {
 }
 
 #[test]
-fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
+fn the_rest_of_a_masked_pixel_is_certified_or_background() {
     let trial = masked_within_the_cut();
     for tau in [0.0, 0.05] {
         let view = View { scale: Some(11.0), center: Some([-12.6, 20.0, 0.0]), ..view(0.0, 0.0, [24, 3]) };
-        let truth = Truth::new(&trial, (view, tau), Some(4.0));
+        let truth = Reference::new(&trial, (view, tau), Some(4.0));
         for scene in [&mut coefficients(&trial) as &mut dyn Scene, &mut direct(&trial.memory, None)] {
             for splat_error in [0.0, 0.02, 0.5, 2.0] {
                 let (found, errors, _) = rendered(scene, &RenderConfig { splat_error, ..truth.config.clone() });
@@ -298,7 +298,7 @@ fn what_is_left_of_a_masked_pixel_is_certified_or_background() {
 }
 
 #[test]
-fn what_cannot_be_certified_is_infinitely_uncertain() {
+fn pixels_without_a_certificate_have_infinite_errors() {
     let grid = Grid { origin: [1e16, 0.0, 0.0], ..Grid::unit([2, 2, 2]) };
     let trial =
         Trial::new("far away", archive(grid, SampleType::F64, &field(&grid, 2, 1)), settings(Basis::Haar, 2, 0.1));

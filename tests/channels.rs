@@ -33,7 +33,7 @@ const SHARES: [Point; 7] = [
 ];
 
 /// An archive of colours and the reference's result for it.
-struct Painted {
+struct ColouredArchive {
     memory: Memory,
     config: ConvertConfig,
     missing: Vec<bool>,
@@ -41,7 +41,7 @@ struct Painted {
     channels: [Vec<f64>; 3],
 }
 
-impl Painted {
+impl ColouredArchive {
     fn new(memory: Memory, config: ConvertConfig) -> Self {
         let samples = values(&memory, memory.archive().sample);
         let missing_at = |v: f64| !v.is_finite() || Some(v) == config.missing_value;
@@ -138,7 +138,7 @@ fn every_channel_is_within_the_bound_of_the_colours_of_the_samples() {
                 let (tolerance, bound) = ([0.2, 0.02, 1e-3, 0.0][(n + m + i) % 4], bounds[(m + i) % 3]);
                 let config =
                     ConvertConfig { missing_value, bound, block: Some(4), ..settings(basis, window, tolerance) };
-                let painted = Painted::new(Memory::new(SKEWED, ty, samples.clone()), config);
+                let painted = ColouredArchive::new(Memory::new(SKEWED, ty, samples.clone()), config);
                 off += painted.check(&format!("{kind:?} {ty} {basis:?} {bound:?} {tolerance}"));
                 tried += 3 * painted.missing.len();
             }
@@ -152,7 +152,7 @@ fn a_sampled_bound_holds_for_every_channel_that_is_not_dark() {
     let samples: Vec<f64> = (0..19 * 315).map(|i| (i % 315) as f64 / 700.0).collect(); // the third channel stays dark
     let bound = Bound::Sampled { samples: 50, seed: 1 };
     let config = ConvertConfig { bound, ..settings(Basis::Haar, 8, 0.05) };
-    let mut painted = Painted::new(archive(SKEWED, SampleType::F32, &samples), config);
+    let mut painted = ColouredArchive::new(archive(SKEWED, SampleType::F32, &samples), config);
     let points = vec![(0.0, [0.0, 1.0, 0.0]), (1.0, [1.0, 0.5, 0.0])];
     painted.channels = [0, 1, 2].map(|c| samples.iter().map(|v| colour(&points, f64::from(*v as f32))[c]).collect());
     painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
@@ -163,14 +163,14 @@ fn a_sampled_bound_holds_for_every_channel_that_is_not_dark() {
 }
 
 /// Means and emissions of a field with and without missing samples.
-fn scenes() -> Vec<Painted> {
+fn scenes() -> Vec<ColouredArchive> {
     let plain = field(&SKEWED, 19, 2);
     let masked = plain.iter().enumerate();
     let masked: Vec<f64> =
         masked.map(|(i, v)| if i % 11 == 3 || i % 315 < 60 || i / 315 == 12 { f64::NAN } else { *v }).collect();
     let of = |samples: &[f64], basis, window| {
         let config = ConvertConfig { block: Some(4), ..settings(basis, window, 0.02) };
-        Painted::new(archive(SKEWED, SampleType::F64, samples), config)
+        ColouredArchive::new(archive(SKEWED, SampleType::F64, samples), config)
     };
     let each = windows(8).into_iter().flat_map(|(basis, window)| [(basis, window, &plain), (basis, window, &masked)]);
     each.map(|(basis, window, samples)| of(samples, basis, window)).collect()
@@ -261,7 +261,7 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
     let config = ConvertConfig { block: Some(8), ..settings(Basis::Learned, 16, 1e-3) };
     let wave = |[x, y, z]: [usize; 3], t: usize| (0.1 * (x + 2 * y) as f64 - 0.2 * t as f64).sin() + 0.01 * z as f64;
     let samples: Vec<f64> = (0..16).flat_map(|t| grid.whole().iter().map(move |voxel| wave(voxel, t))).collect();
-    let mut painted = Painted::new(archive(grid, SampleType::F32, &samples), config);
+    let mut painted = ColouredArchive::new(archive(grid, SampleType::F32, &samples), config);
     let points = vec![(-1.0, [0.0, 0.2, 1.0]), (1.2, [1.0, 0.8, 0.0])]; // a map with steps would allow no omission
     painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
     let file = painted.file();
@@ -289,7 +289,7 @@ fn neither_threads_nor_memory_change_a_bit_of_coloured_pictures() {
     samples.iter_mut().enumerate().filter(|(i, _)| i % 7 == 0).for_each(|(_, v)| *v = f64::NAN);
     for (basis, window) in windows(8) {
         let config = ConvertConfig { block: Some(8), ..settings(basis, window, 0.01) };
-        let painted = Painted::new(archive(grid, SampleType::F32, &samples), config);
+        let painted = ColouredArchive::new(archive(grid, SampleType::F32, &samples), config);
         let file = painted.file();
         let scene = || CoefficientScene::new(file.open(), SplatSource::Coefficients);
         let look = looking(view(30.0, 25.0, [80, 60]), 0.05, Quantity::Mean, &grid, 19);
@@ -316,7 +316,7 @@ fn memory_changes_no_byte_of_a_file_of_colours() {
     let samples = volume(Kind::Wave, SampleType::I16, Mask::None, grid.whole().voxels(), 20, 4);
     for basis in [Basis::Haar, Basis::Samples] {
         let config = ConvertConfig { block: Some(8), ..settings(basis, 16, 0.01) };
-        let painted = Painted::new(Memory::new(grid, SampleType::I16, samples.clone()), config);
+        let painted = ColouredArchive::new(Memory::new(grid, SampleType::I16, samples.clone()), config);
         let mut files = Vec::new();
         for mib in [16, 20, 40, 300] {
             let config = ConvertConfig { memory: mib << 20, ..painted.config.clone() };

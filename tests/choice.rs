@@ -53,7 +53,7 @@ fn schemes(like: &Pyramid) -> Vec<Scheme> {
 }
 
 #[test]
-fn what_is_chosen_is_nearly_the_smallest_that_there_is() {
+fn the_chosen_scheme_is_nearly_the_smallest() {
     for axis in 0..4 {
         for tolerance in [1e-2, 1e-3] {
             let samples = bytes(SampleType::F32, &long_along(axis));

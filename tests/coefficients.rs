@@ -219,7 +219,7 @@ fn pictures_of_any_type_are_within_the_bound() {
 }
 
 #[test]
-fn some_frames_from_coefficients_are_the_same_as_in_all() {
+fn some_frames_from_coefficients_equal_those_of_a_full_rendering() {
     for trial in doubles().into_iter().filter(|t| t.file.open().frames() == FRAMES) {
         let (view, tau) = views()[2];
         let config = looking(view, tau, Quantity::Mean, &trial.grid(), FRAMES);

@@ -54,7 +54,7 @@ fn threads_change_no_byte_and_no_pixel() {
 /// (`--features portable` has none) and on every machine. They change when the content of files changes (which
 /// includes the versions of the program and of zstd) or when splatting changes, and must then be updated.
 #[test]
-fn files_and_pictures_are_those_of_every_machine() {
+fn files_and_pictures_are_the_same_on_every_machine() {
     let sample = |i: usize| {
         let [x, y, z, t] = [i % 40, i / 40 % 33, i / 1320 % 20, i / 26_400].map(|n| n as f32);
         let square = |a: f32, b: f32| (a - b) * (a - b);

@@ -34,14 +34,14 @@ fn patterns(places: Range<u64>, pattern: fn(u64) -> u32) -> Computed<4, impl Sam
 
 /// Counts of the comparison.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Seen {
+struct Counts {
     /// Finite samples, and those of them that did not come back bit for bit.
     finite: u64,
     changed: u64,
     missing: u64,
 }
 
-impl Add for Seen {
+impl Add for Counts {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -57,7 +57,7 @@ impl Add for Seen {
 const TOLERANCE: f64 = 1e-3;
 
 /// Converts the patterns into a file in memory, decodes it and compares.
-fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -> Seen {
+fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -> Counts {
     let config = ConvertConfig { range: Some((0.0, 1.0)), block: Some(EDGE), ..settings(basis, window, TOLERANCE) };
     let mut file = Vec::new();
     convert(&mut patterns.clone(), &config, Path::new("a.wspl"), &mut file, &Silent).unwrap();
@@ -75,17 +75,17 @@ fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -
             let frames = samples.chunks_exact(voxels * 4).zip(window.first_frame as usize..);
             let compared =
                 frames.map(|(found, frame)| compare(found, |i| u32::from_le_bytes(patterns.at(frame, block + i))));
-            compared.fold(Seen::default(), Add::add)
+            compared.fold(Counts::default(), Add::add)
         };
-        entries.par_iter().map(of_block).reduce(Seen::default, Add::add)
+        entries.par_iter().map(of_block).reduce(Counts::default, Add::add)
     };
-    windows.iter().enumerate().map(of_window).fold(Seen::default(), Add::add)
+    windows.iter().enumerate().map(of_window).fold(Counts::default(), Add::add)
 }
 
 /// Compares the samples of a block and frame with their bit patterns.
-fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Seen {
+fn compare(found: &[u8], expected: impl Fn(usize) -> u32) -> Counts {
     let limit = Limit::range(TOLERANCE, 0.0, 1.0);
-    let mut seen = Seen::default();
+    let mut seen = Counts::default();
     for (i, bytes) in found.as_chunks().0.iter().enumerate() {
         let (found, expected) = (u32::from_le_bytes(*bytes), expected(i));
         if expected >> 23 & 0xff == 0xff {
@@ -114,7 +114,7 @@ fn consecutive(place: u64) -> u32 {
 fn every_pattern_of_32_bits_comes_back_within_the_bound() {
     let started = Instant::now();
     let chunk = |first| check(&patterns(first..first + CHUNK, consecutive), Basis::Haar, 1);
-    let seen = (0..1 << 32).step_by(CHUNK as usize).map(chunk).fold(Seen::default(), Add::add);
+    let seen = (0..1 << 32).step_by(CHUNK as usize).map(chunk).fold(Counts::default(), Add::add);
     report(&format!("every f32: {seen:?} in {:.1?}", started.elapsed()));
     assert_eq!((seen.missing, seen.finite), (1 << 24, (1 << 32) - (1 << 24)));
     assert!(seen.changed > 1 << 31, "few were coded: {seen:?}");
@@ -131,7 +131,7 @@ fn shuffled(place: u64) -> u32 {
 #[test]
 fn patterns_side_by_side_come_back_within_the_bound_in_windows() {
     let started = Instant::now();
-    let (mut place, mut all) = (0, Seen::default());
+    let (mut place, mut all) = (0, Counts::default());
     for (basis, window) in [(Basis::Haar, 2), (Basis::Multi, 3), (Basis::Haar, 8), (Basis::Multi, 9)] {
         let end = place + (window * VOXELS) as u64;
         let seen = check(&patterns(place..end, shuffled), basis, window);

@@ -163,7 +163,7 @@ fn keep(name: &str, bytes: &[u8]) {
 }
 
 #[test]
-fn what_a_later_version_needs_is_refused_by_name() {
+fn features_of_later_versions_are_refused_by_name() {
     let mut file = fs::read(folder().join("haar-u8.wspl")).unwrap();
     let work = tempfile::tempdir().unwrap();
     let refused = |file: &mut [u8]| {

@@ -180,7 +180,7 @@ fn a_region_is_splatted_alone_and_in_its_place() {
 }
 
 #[test]
-fn some_frames_are_the_same_as_in_all() {
+fn some_frames_equal_those_of_a_full_rendering() {
     let grid = SKEWED;
     let memory = archive(grid, SampleType::F32, &field(&grid, 40, 8));
     let config = looking(view(40.0, 20.0, [40, 30]), 0.1, Quantity::Mean, &grid, 40);
@@ -204,7 +204,7 @@ pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config
     for memory in [MEMORY, 32 << 20, 24 << 20, 18 << 20, 16 << 20, 14 << 20, 12 << 20, 11 << 20, 10 << 20, 9 << 20] {
         let config = RenderConfig { memory, ..config.clone() };
         let found = rendered_if_it_can_be(scene, &config);
-        if let Err(Error::Usage(_)) = found {
+        if let Err(Error::Setting { setting: "memory", .. }) = found {
             continue;
         }
         let (again, errors_again, _) = found.unwrap();

@@ -150,7 +150,7 @@ fn memory_changes_no_bit_of_a_lattice() {
 }
 
 #[test]
-fn what_is_too_deep_to_be_seen_is_left_out_within_the_stated_error() {
+fn invisible_depths_are_omitted_within_the_stated_error() {
     let grid = Grid::unit([20, 130, 21]);
     let samples = field(&grid, FRAMES, 11);
     let mut memory = archive(grid, SampleType::F64, &samples);
@@ -199,7 +199,7 @@ fn parts_of_other_frames_are_counted_and_not_read() {
 }
 
 #[test]
-fn few_frames_by_their_values_are_as_in_all() {
+fn few_frames_by_value_equal_those_of_a_full_rendering() {
     let (grid, view, tau) = scenes()[1];
     let voxels = grid.whole().voxels();
     let samples: Vec<f64> = field(&grid, 33, 7).into_iter().map(|v| v + 20.0).collect();

@@ -30,7 +30,7 @@ fn coefficients(file: &CoefficientFile, codec: &WindowCodec, entry: &BlockEntry,
 }
 
 #[test]
-fn a_part_states_just_what_leaving_it_and_finer_ones_out_changes() {
+fn a_part_states_the_exact_change_if_it_and_finer_parts_are_omitted() {
     let grid = Grid::unit([21, 14, 9]);
     let samples = field(&grid, FRAMES, 3);
     let mut checked = 0;
@@ -58,7 +58,7 @@ fn a_part_states_just_what_leaving_it_and_finer_ones_out_changes() {
 }
 
 #[test]
-fn codes_too_large_to_decode_are_larger_than_anything_that_is_stated() {
+fn codes_too_large_to_decode_exceed_every_stated_value() {
     let grid = Grid::unit([12, 12, 12]);
     let settings = settings(Basis::Samples, FRAMES, 0.01);
     let file = stored(&mut archive(grid, SampleType::F32, &field(&grid, FRAMES, 3)), &settings).open();

@@ -33,7 +33,7 @@ fn reading(of: &crate::common::Stored, frames: Vec<usize>, region: Region) -> Ex
 }
 
 #[test]
-fn what_is_read_is_near_what_is_needed() {
+fn little_more_is_read_than_is_needed() {
     let (stored, whole) = (file(), Grid::unit(DIMS).whole());
     let all = || (0..FRAMES).collect::<Vec<_>>();
     let held = stored.bytes().len() as u64;

@@ -34,7 +34,7 @@ fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
 }
 
 #[test]
-fn after_a_power_failure_whole_windows_alone_are_gone_on_with() {
+fn after_a_power_failure_only_complete_windows_are_resumed() {
     let dims = [9, 7, 5];
     let data = volume(Kind::Wave, SampleType::F32, Mask::Special, dims.iter().product(), 40, 3);
     let config = ConvertConfig { block: Some(5), ..settings(Basis::Samples, 8, 0.05) };

@@ -52,7 +52,7 @@ fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
     let mut sufficed = 0;
     for memory in [MEMORY, 24 << 20, 16 << 20, 12 << 20, 10 << 20] {
         match by_view(scene, &RenderConfig { memory, ..config.clone() }) {
-            Err(Error::Usage(_)) => continue,
+            Err(Error::Setting { setting: "memory", .. }) => continue,
             Err(other) => panic!("{other}"),
             Ok((found, report)) => {
                 let same: Vec<bool> = found.iter().zip(&expected).map(|(a, b)| a == b).collect();
@@ -67,7 +67,7 @@ fn each_as_alone(scene: &mut dyn Scene, config: &RenderConfig) -> usize {
 }
 
 #[test]
-fn every_view_of_a_run_is_what_it_is_alone() {
+fn every_view_of_a_run_equals_the_view_rendered_alone() {
     let samples = field(&GRID, FRAMES, 5);
     let mut memory = archive(GRID, SampleType::F32, &samples);
     let haar = ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) };
@@ -113,6 +113,6 @@ fn views_of_one_run_are_of_one_size() {
     let config = looking(view(0.0, 0.0, [70, 66]), 0.0, Quantity::Mean, &GRID, 1);
     for views in [vec![], vec![view(0.0, 0.0, [70, 66]), view(0.0, 0.0, [66, 70])]] {
         let refused = by_view(&mut direct(&memory, None), &RenderConfig { views, ..config.clone() });
-        assert!(matches!(refused, Err(Error::Usage(_))));
+        assert!(matches!(refused, Err(Error::Setting { setting: "views", .. })));
     }
 }

@@ -158,7 +158,9 @@ mod tests {
 
     #[test]
     fn foreign_files_are_explained() {
-        for (start, word) in [(&b"\x09WSP"[..], "stripped"), (b"\x89WSP\n", "line ends"), (b"CDF\x01....", "another")] {
+        for (start, word) in
+            [(&b"\x09WSP"[..], "stripped"), (b"\x89WSP\n", "line endings"), (b"CDF\x01....", "another")]
+        {
             assert!(matches!(check_magic(start), Err(Error::Foreign(why)) if why.contains(word)));
         }
     }

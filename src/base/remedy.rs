@@ -26,8 +26,8 @@ pub enum Remedy {
     ChooseFrames,
     /// Say by `dims` and `sample` what headerless data is.
     DescribeSamples,
-    /// Correct `dims`, `sample` or `offset`: they do not fit the size of the data.
-    CorrectSamples,
+    /// Give one of these fields another value.
+    Adjust(&'static [&'static str]),
     /// Set `dims` to this: the file holds just so many frames of that size.
     SetDims {
         /// Voxels along x, y, z.

@@ -1,6 +1,7 @@
 //! Errors and notes of the library as the programs print them: fields become options, remedies become advice.
 
 use crate::base::error::{Error, Note, Remedy};
+use crate::source::extensions;
 use clap::Command;
 use std::borrow::Cow;
 
@@ -28,10 +29,15 @@ const OPTIONS: [(&str, &str); 6] = [
     ("limited", "error"),
 ];
 
+/// What the option of a field is called.
+fn name(field: &str) -> String {
+    let other = OPTIONS.iter().find(|(known, _)| *known == field).map(|(_, option)| (*option).to_string());
+    other.unwrap_or_else(|| field.replace('_', "-"))
+}
+
 /// The option that sets a field; the field's own name if a program has none for it.
 fn option(setting: &str, command: &Command) -> String {
-    let other = OPTIONS.iter().find(|(field, _)| *field == setting).map(|(_, option)| (*option).to_string());
-    let name = other.unwrap_or_else(|| setting.replace('_', "-"));
+    let name = name(setting);
     let mut commands = std::iter::once(command).chain(command.get_subcommands());
     let is_option = commands.any(|c| c.get_arguments().any(|arg| arg.get_long() == Some(name.as_str())));
     if is_option { format!("--{name}") } else { setting.replace('_', " ") }
@@ -47,8 +53,8 @@ fn advice(remedy: &Remedy) -> Cow<'static, str> {
         }
         Remedy::ChooseIndex { name } => return index(name).into(),
         Remedy::ChooseFrames => "--frames a:b chooses those that the file holds",
-        Remedy::DescribeSamples => "headerless data needs --dims NXxNYxNZ and --dtype",
-        Remedy::CorrectSamples => "check --dims, --dtype and --offset",
+        Remedy::DescribeSamples => return known_formats().into(),
+        Remedy::Adjust(fields) => return format!("adjust {}", or(fields)).into(),
         Remedy::SetDims { dims: [x, y, z], frames: 1 } => return format!("say --dims {x}x{y}x{z}").into(),
         Remedy::SetDims { dims: [x, y, z], frames } => return format!("say --dims {x}x{y}x{z}x{frames}").into(),
         Remedy::AllowGaps => "--allow-gaps takes the files as they are",
@@ -73,6 +79,15 @@ fn advice(remedy: &Remedy) -> Cow<'static, str> {
     fixed.into()
 }
 
+/// Options with "or" before the last.
+fn or(fields: &[&str]) -> String {
+    let options: Vec<String> = fields.iter().map(|field| format!("--{}", name(field))).collect();
+    match &options[..] {
+        [before @ .., last] if !before.is_empty() => format!("{} or {last}", before.join(", ")),
+        _ => options.concat(),
+    }
+}
+
 fn index(name: &str) -> String {
     format!(
         "--variable '{name}[0]' takes its first index, --axes with one letter of t z y x (or c for another) for each axis, \
@@ -82,6 +97,12 @@ fn index(name: &str) -> String {
 
 fn append(frames: u64) -> String {
     format!("--frames 0:{frames} makes a file of these, to which append adds the others; --force begins anew")
+}
+
+/// What to type for headerless data, and then the formats that need no options.
+fn known_formats() -> String {
+    let known: Vec<String> = extensions().map(|extension| format!(".{extension}")).collect();
+    format!("for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: {}", known.join(", "))
 }
 
 #[cfg(test)]
@@ -98,9 +119,9 @@ mod tests {
     fn fields_are_options_where_a_program_has_them() {
         let found = ["splat_error", "sample", "inputs", "some_field"].map(|field| option(field, &command()));
         assert_eq!(found, ["--splat-error", "--dtype", "inputs", "some field"]);
-        let error = Error::setting("sample", Note::with("is wrong", Remedy::CorrectSamples));
+        let error = Error::setting("sample", Note::with("is wrong", Remedy::Adjust(&["dims", "sample", "offset"])));
         let text = of_error(&error, &command());
-        assert_eq!(text, "error: --dtype: is wrong\n  tip: check --dims, --dtype and --offset");
+        assert_eq!(text, "error: --dtype: is wrong\n  tip: adjust --dims, --dtype or --offset");
     }
 
     #[test]

@@ -1,4 +1,7 @@
 //! The samples of a block, loaded a few series at a time; missing ones are found, and filled.
+//!
+//! A block's samples stay bytes: finding, loading and checking make numbers of a few at a time, which costs less than eight
+//! bytes of memory for every sample.
 
 use super::WindowCodec;
 use super::truncate::Group;
@@ -15,20 +18,13 @@ pub(super) struct Missing {
 
 impl Missing {
     pub(super) fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
-        let mut found = Self { mask: vec![false; samples.len() / codec.sample.size()], count: 0, magnitude: 0.0 };
-        sample::for_each_run(codec.sample, samples, |first, values| {
-            if let Some((lo, hi)) = sample::range_unless_missing(values, codec.missing_value) {
-                found.magnitude = found.magnitude.max(-lo).max(hi);
-                return;
-            }
-            for (i, value) in values.iter().enumerate() {
-                found.mask[first + i] = codec.is_missing(*value);
-                found.count += u64::from(found.mask[first + i]);
-                found.magnitude =
-                    if found.mask[first + i] { found.magnitude } else { found.magnitude.max(value.abs()) };
-            }
+        let mut mask = vec![false; samples.len() / codec.sample.size()];
+        let mut count = 0;
+        let (lo, hi) = sample::range_of_present(codec.sample, samples, codec.missing_value, |i| {
+            mask[i] = true;
+            count += 1;
         });
-        found
+        Self { mask, count, magnitude: 0.0_f64.max(-lo).max(hi) }
     }
 
     /// The very bytes of the missing samples.

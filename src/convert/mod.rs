@@ -24,7 +24,7 @@ pub mod sampled;
 mod settings;
 mod task;
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::base::progress::Progress;
@@ -359,7 +359,10 @@ fn batch_len(
         let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
         let window = config.window;
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
-        Error::setting("memory", format!("{what}; give that, or a smaller window or block"))
+        Error::setting(
+            "memory",
+            Note::with(format!("{what}; give that, or make either smaller"), Remedy::Adjust(&["window", "block"])),
+        )
     })
 }
 

@@ -29,7 +29,10 @@ pub(super) fn remembered(
         .chain(range)
         .chain(colour_transform.into_iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
-    all.chain(units).map(|(name, value)| (name.to_string(), value)).chain(config.settings.clone()).collect()
+    let ours: Vec<(String, String)> = all.chain(units).map(|(name, value)| (name.to_string(), value)).collect();
+    let is_new = |(name, _): &&(String, String)| ours.iter().all(|(own, _)| own != name);
+    let given: Vec<_> = config.settings.iter().filter(is_new).cloned().collect();
+    [ours, given].concat()
 }
 
 /// The configuration that made a file, to append to it; none if it does not say.
@@ -61,7 +64,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
         memory,
-        settings: file.settings.iter().filter(|(name, _)| !is_ours(name)).cloned().collect(),
+        settings: file.settings.iter().filter(|(name, _)| !is_ours(file, name)).cloned().collect(),
     })
 }
 
@@ -83,14 +86,36 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
     }
     options.extend(file.missing_value.map(|value| ("missing-value", format!("{value:?}"))));
     options.push(("block", file.block_edge.to_string()));
-    let of_samples = STORED.into_iter().filter(|name| *name != "range" || colours.is_none()); // that of brightness is fixed
-    options.extend(of_samples.filter_map(|name| Some((name, setting(file, name)?.to_string()))));
+    let is_option = |name: &&str| match *name {
+        "range" => colours.is_none(),               // that of brightness is fixed
+        "dtype" => setting(file, "dims").is_some(), // else of samples that were coloured
+        _ => true,
+    };
+    options
+        .extend(STORED.into_iter().filter(is_option).filter_map(|name| Some((name, setting(file, name)?.to_string()))));
     options
 }
 
 /// Settings of a file that are options by the same names.
-const STORED: [&str; 10] =
-    ["range", "missing", "missing-value", "basis", "space", "window", "level", "frames", "region", "variable"];
+const STORED: [&str; 17] = [
+    "range",
+    "missing",
+    "missing-value",
+    "basis",
+    "space",
+    "window",
+    "level",
+    "frames",
+    "region",
+    "variable",
+    "axes",
+    "dims",
+    "dtype",
+    "endian",
+    "offset",
+    "spacing",
+    "origin",
+];
 
 /// The first thing in which two conversions differ, in words; the program's version may, unless it must be the same.
 pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) -> Option<String> {
@@ -138,10 +163,9 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
 }
 
 /// Whether [`remembered`] adds a setting by itself.
-fn is_ours(name: &str) -> bool {
-    OURS.contains(&name)
-        || Units::SETTINGS.contains(&name)
-        || ColourTransform::SETTINGS.iter().any(|(ours, _)| *ours == name)
+fn is_ours(file: &Metadata, name: &str) -> bool {
+    let of_colours = || ColourTransform::SETTINGS.iter().any(|(ours, _)| *ours == name);
+    OURS.contains(&name) || Units::SETTINGS.contains(&name) || setting(file, "colours").is_some() && of_colours()
 }
 
 /// The names of what [`remembered`] adds by itself, besides those of colours.

@@ -1,6 +1,6 @@
 //! The settings of a rendering.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Region;
 use crate::colour::TransferFunction;
 use crate::view::camera::View;
@@ -134,18 +134,19 @@ impl RenderConfig {
 
     pub(super) fn check(&self) -> Result<()> {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
-            return Err(Error::usage("takes one view or more, with pictures of one size"));
+            return Err(Error::setting("views", "takes one view or more, with pictures of one size"));
         }
         if self.mode.is_projection() {
             return Ok(());
         }
         let refused = [
-            (self.kernel.tau != 0.0, "--tau: is of projections alone (--mode projection)"),
-            (self.certify, "--error-image: certifies projections alone (--mode projection)"),
-            (self.chooses_by_view(), "--error expected: is of projections alone (--mode projection)"),
-            (self.quantity != Quantity::Mean, "--quantity: is of projections alone (--mode projection)"),
+            (self.kernel.tau != 0.0, "tau"),
+            (self.certify, "certify"),
+            (self.chooses_by_view(), "limited"),
+            (self.quantity != Quantity::Mean, "quantity"),
         ];
-        refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, what)| Err(Error::usage(*what)))
+        let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));
+        refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, setting)| Err(projects(setting)))
     }
 }
 

@@ -70,7 +70,7 @@ pub use report::{Picture, RenderReport, Rendered, ViewReport};
 pub use scene::{LeftOut, Scene};
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
@@ -129,9 +129,8 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
-        return Err(Error::usage(
-            "--mode: the samples are colours already, of which only projections are made; leave it out, or convert without --transfer-function",
-        ));
+        let what = "the samples are colours already, and colours are rendered as projections only";
+        return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
     }
     let volume = (*scene.grid(), scene.blocks());
     let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);

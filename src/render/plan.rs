@@ -49,9 +49,8 @@ impl<'a> Budget<'a> {
         }
         let ([width, height], mib) = (config.size(), least.div_ceil(1 << 20));
         let threads = rayon::current_num_threads();
-        Err(Error::usage(format!(
-            "--memory: pictures of {width}x{height} pixels of this volume need at least {mib}MiB with {threads} thread(s)"
-        )))
+        let pictures = format!("pictures of {width}x{height} pixels of this volume");
+        Err(Error::setting("memory", format!("{pictures} need at least {mib}MiB with {threads} thread(s)")))
     }
 
     /// The budget for pictures from these views, or for these slabs of one view.

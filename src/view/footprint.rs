@@ -21,7 +21,7 @@
 //! what lies beyond a cut at radius R sigma <= 4 exp(-R^2 / 2) * largest sum of w_i                        (eq 15)
 //! ```
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use std::ops::Range;
 
@@ -109,8 +109,8 @@ impl Footprint {
         let reach = (method.radius * in_pixels).max(1.0);
         let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
-            let what = "the kernel's weights are beyond numbers: choose another sigma, tau or scale";
-            return Err(Error::setting("kernel", format!("{what} (sigma {sigma:e}, tau {tau:e}, scale {scale:e})")));
+            let what = format!("its weights are beyond numbers (sigma {sigma:e}, tau {tau:e}, scale {scale:e})");
+            return Err(Error::setting("kernel", Note::with(what, Remedy::Adjust(&["sigma", "tau", "scale"]))));
         }
         Ok(Self { reach, peak, tau, decay, bend: libm::exp(-2.0 * decay) })
     }

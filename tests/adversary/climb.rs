@@ -101,7 +101,7 @@ fn targets(ty: SampleType) -> Vec<Target> {
 }
 
 #[test]
-fn no_climber_gets_over_the_bound() {
+fn hill_climbing_finds_no_series_beyond_the_bound() {
     let (started, mut series) = (Instant::now(), 0);
     for (n, ty) in (0..times()).flat_map(|_| TYPES).enumerate() {
         for (m, target) in targets(ty).into_iter().enumerate() {

@@ -30,7 +30,7 @@ fn below_an_ulp_every_bit_is_kept() {
 }
 
 #[test]
-fn tolerances_that_are_no_share_are_refused() {
+fn tolerances_outside_0_to_1_are_refused() {
     let work = Work::new();
     work.write("a.raw", [7; 64]);
     for tolerance in ["nan", "-1", "-0.001", "inf", "-inf", "1.0000001", "2"] {

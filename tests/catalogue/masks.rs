@@ -118,7 +118,7 @@ fn masks_that_touch_every_border_are_kept_and_not_shown() {
 
 /// Values under the mask change neither the other samples nor the pictures.
 #[test]
-fn what_is_under_a_mask_changes_nothing_else() {
+fn values_under_a_mask_change_nothing_else() {
     let (memory, _, holes) = masked(|[x, y, z], t| (x * 7 + y * 3 + z * 5 + t * t) % 6 == 0 || x == 2);
     let other = |bytes: [u8; 8]| {
         let samples = memory.frames.chunks_exact(8).zip(&holes);
@@ -146,7 +146,7 @@ fn what_is_under_a_mask_changes_nothing_else() {
 
 /// Includes types to which the declared value must be rounded.
 #[test]
-fn a_declared_value_widens_no_bound_and_an_undeclared_one_does() {
+fn only_undeclared_values_widen_the_bound() {
     for (ty, value) in
         [(SampleType::F32, 1e35), (SampleType::F32, -9999.0), (SampleType::F64, 1e30), (SampleType::I16, -9999.0)]
     {

@@ -55,7 +55,7 @@ fn constants_are_kept_exactly_or_in_one_coefficient() {
 }
 
 #[test]
-fn what_does_not_shrink_is_stored_as_it_is() {
+fn incompressible_series_are_stored_exactly() {
     let mut random = Random(12);
     let grid = Grid::unit([16, 16, 8]);
     let size = |i: usize| (1 + i % 2048) as f64 / 2048.0;

@@ -60,7 +60,7 @@ fn the_largest_value_takes_a_colour_map() {
 }
 
 #[test]
-fn options_that_say_nothing_of_a_mode_are_refused() {
+fn options_without_meaning_for_a_mode_are_refused() {
     let work = Work::with_file("");
     work.wavesplat("convert a.npy -o c.wspl --transfer-function turbo").ok();
     for (args, words) in [

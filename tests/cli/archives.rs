@@ -49,7 +49,7 @@ fn places_times_and_units_go_from_file_to_file() {
 }
 
 #[test]
-fn what_files_declare_missing_is_missing_unasked() {
+fn declared_missing_values_are_missing_by_default() {
     for name in ["fill_1e20", "fill_nan", "packed_i16", "missing_value"] {
         let (work, source) = (Work::new(), input(&format!("netcdf/{name}.nc")));
         work.wavesplat(&format!("convert {source} -o a.wspl")).ok();
@@ -61,11 +61,10 @@ fn what_files_declare_missing_is_missing_unasked() {
 }
 
 #[test]
-fn what_is_ambiguous_is_listed_and_chosen() {
+fn ambiguous_variables_are_listed_and_chosen() {
     let (work, source) = (Work::new(), input("netcdf/several.nc"));
     let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
     work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
-    work.wavesplat(&format!("info {source}")).fails(3, &listed);
     work.wavesplat(&format!("convert {source} -o a.wspl --variable density")).ok();
     work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // uses the variable that the file remembers
     work.wavesplat(&format!("convert {source} -o b.wspl --variable nothing")).fails(3, &["has no variable nothing"]);
@@ -76,7 +75,44 @@ fn what_is_ambiguous_is_listed_and_chosen() {
 }
 
 #[test]
-fn info_tells_of_frames_and_how_large_they_would_become() {
+fn info_lists_the_variables_of_which_one_must_be_chosen() {
+    let work = Work::new();
+    for (name, line) in [
+        ("netcdf/several.nc", "  density: i8 (time 4, z 3, y 5, x 7) in kg m-3\n"),
+        ("hdf5/several.h5", " (4, 3, 5, 7)"),
+        ("vti/several.vti", ": f32 (z 3, y 5, x 7)\n"),
+        ("vti/vector.vti", ", 3 components "),
+        ("nrrd/refused_vector.nrrd", "  samples[1]: "),
+        ("metaimage/refused_channels.mha", "  samples[1]: "),
+        ("nifti/refused_vector.nii", "[1]: "),
+    ] {
+        let told = work.wavesplat(&format!("info {}", input(name))).ok();
+        assert!(told.text().contains(line), "{name}: {}", told.text());
+        assert!(told.text().ends_with("choose one with --variable NAME\n"), "{name}: {}", told.text());
+        let told = work.wavesplat(&format!("info --json {}", input(name))).ok().json();
+        let first = &told["variables"][0];
+        let chosen = match first["components"].as_u64() {
+            Some(1) => first["name"].as_str().unwrap().into(),
+            _ => format!("{}[0]", first["name"].as_str().unwrap()),
+        };
+        let told = work.wavesplat(&format!("info --json {} --variable {chosen}", input(name))).ok().json();
+        assert_eq!(told["sample"], first["sample"], "{name}");
+        work.wavesplat(&format!("convert {} -o a.wspl", input(name))).fails(3, &["--variable"]);
+    }
+    for name in ["netcdf/era5.nc", "vti/active.vti", "vtk/several.vtk", "hdf5/gzip.h5", "nrrd/f32.nrrd"] {
+        assert!(work.wavesplat(&format!("info {}", input(name))).ok().text().starts_with("format "), "{name}");
+    }
+}
+
+#[test]
+fn a_filter_that_is_not_supported_is_named_with_the_command_that_removes_it() {
+    let source = input("hdf5/refused_lzf.h5");
+    let refused = Work::new().wavesplat(&format!("convert {source} -o a.wspl"));
+    refused.fails(3, &["refused_lzf.h5", "LZF", "h5repack -f GZIP=4 IN OUT"]);
+}
+
+#[test]
+fn info_describes_frames_and_estimates_their_file() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([50, 40, 30], 40).npy());
     let told = work.wavesplat("info a.npy").ok();
@@ -90,6 +126,16 @@ fn info_tells_of_frames_and_how_large_they_would_become() {
         let ratio = told["estimate"]["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
         assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");
     }
+    let estimate = |options: &str| {
+        let told = work.wavesplat(&format!("info --json {options}")).ok().json();
+        (told["estimate"]["tolerance"].as_f64(), told["frames"].as_u64())
+    };
+    assert_eq!(estimate("a.npy --estimate 0.1 --frames 0:4"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--estimate 0.1 --frames 0:4 a.npy"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--frames 0:4 --estimate a.npy"), (Some(0.01), Some(4)));
+    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate 1%", "no number", "type --estimate 0.01"]);
+    work.write("0.1", "a file with the name of a number");
+    work.wavesplat("info a.npy --estimate 0.1").fails(2, &["type --estimate=0.1", "./0.1"]);
     work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);
     work.piped("info - --estimate", &work.read("a.npy")).fails(2, &["standard input"]);
 }
@@ -108,7 +154,7 @@ fn coefficients_go_through_a_pipe_as_they_are() {
 
 #[cfg(not(feature = "zarr"))]
 #[test]
-fn a_zarr_store_that_is_not_built_in_says_how_to_get_it() {
+fn zarr_without_its_feature_explains_how_to_get_it() {
     let source = input("zarr/v3_zstd.zarr");
     Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["cargo build --release --features zarr"]);
 }

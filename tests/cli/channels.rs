@@ -120,7 +120,7 @@ fn neither_threads_nor_kills_nor_appends_change_a_byte_and_other_colours_are_ref
         work.write("d.wspl.part", &whole[..whole.len() * 4 / 5]);
         let other = convert.replace("1.5", "1.25");
         work.wavesplat(&format!("{other} -o d.wspl --resume"))
-            .fails(2, &["d.wspl", "another --transfer-function: rainbow -1.0 1.5, now rainbow -1.0 1.25"]);
+            .fails(2, &["d.wspl", "another transfer function: rainbow -1.0 1.5, now rainbow -1.0 1.25"]);
         let mut changed = archive.clone();
         changed.values[1000] += 1e-3;
         work.write("changed.npy", changed.npy());

@@ -27,7 +27,7 @@ fn a_files_own_values_are_its_range() {
 }
 
 #[test]
-fn maps_that_cannot_be_read_are_named_with_what_was_expected() {
+fn unreadable_maps_are_named_with_the_expected_form() {
     let work = Work::with_file("");
     work.write("maps.json", MAPS);
     work.write("cut.json", &MAPS[..90]);

@@ -27,7 +27,7 @@ force = true
 ";
 
 #[test]
-fn a_file_says_what_the_command_line_would() {
+fn a_config_file_equals_the_command_line() {
     let work = work(CONFIG);
     let run = work.wavesplat("convert a.npy --config run.toml").ok();
     assert!(run.err.is_empty(), "{}", run.err);
@@ -76,7 +76,7 @@ fn a_variable_of_each_program_names_a_file() {
 }
 
 #[test]
-fn a_file_that_is_wrong_is_named_with_line_and_key() {
+fn errors_in_a_config_file_name_line_and_key() {
     let work = work("");
     let cases: [(&str, &[&str]); 12] = [
         ("\ntolerence = 0.1", &["line 2", "tolerence: no option of wavesplat"]),
@@ -107,7 +107,7 @@ fn a_file_that_is_wrong_is_named_with_line_and_key() {
 }
 
 #[test]
-fn a_file_says_by_which_options_it_is_made_again() {
+fn info_gives_the_options_that_reproduce_a_file() {
     let work = work("");
     for options in [
         "",

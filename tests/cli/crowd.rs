@@ -12,7 +12,7 @@ fn together(job: &Job, more: &[&str]) -> Vec<Run> {
 }
 
 #[test]
-fn of_many_conversions_to_one_file_one_wins() {
+fn one_of_many_conversions_to_one_file_wins() {
     let job = Job::convert(&Archive::smooth([24, 20, 16], 24), "a.npy", "--window 4 --threads 1");
     let (started, mut held, mut existed) = (Instant::now(), 0, 0);
     for round in 0..25 * times() {
@@ -34,7 +34,7 @@ fn of_many_conversions_to_one_file_one_wins() {
 }
 
 #[test]
-fn of_many_that_replace_one_file_each_leaves_a_whole_one() {
+fn many_replacements_of_one_file_each_leave_a_complete_one() {
     let job = Job::convert(&Archive::smooth([24, 20, 16], 24), "a.npy", "--window 4 --threads 1");
     for _ in 0..8 * times() {
         job.reset();

@@ -3,7 +3,7 @@
 use super::{Archive, Work, npy, npy_ordered, small};
 
 #[test]
-fn inputs_that_are_not_what_they_say_give_code_3() {
+fn inputs_that_contradict_their_headers_give_code_3() {
     let work = Work::new();
     let archive = small();
     work.write("a.raw", archive.bytes());

@@ -27,7 +27,7 @@ fn part() -> Vec<u8> {
 }
 
 #[test]
-fn what_is_written_reads_back_with_places_and_times() {
+fn written_files_read_back_with_positions_and_times() {
     let work = with_places();
     for (name, files) in [
         ("p.nrrd", &["p.nrrd"][..]),
@@ -126,7 +126,7 @@ fn half_of(value: f32) -> [u8; 2] {
 }
 
 #[test]
-fn times_that_a_nrrd_cannot_hold_are_left_out_and_said_to_be() {
+fn times_that_a_nrrd_cannot_hold_are_omitted_with_a_note() {
     let work = with_places();
     let run = work.wavesplat("extract a.wspl --frames 1,2,7 -o p.nrrd").ok();
     assert!(run.err.contains("regular"), "{}", run.err);
@@ -141,7 +141,7 @@ fn times_that_a_nrrd_cannot_hold_are_left_out_and_said_to_be() {
 }
 
 #[test]
-fn every_file_that_would_be_written_is_spared() {
+fn no_existing_output_is_replaced_unasked() {
     let work = with_places();
     work.write("p/p_0007.vti", "mine");
     work.write("q.raw", "mine");
@@ -176,7 +176,7 @@ fn a_damaged_file_leaves_no_list_and_no_empty_folder() {
 }
 
 #[test]
-fn endings_that_are_not_known_are_refused_with_all_that_are() {
+fn unknown_extensions_are_refused_with_the_known_ones() {
     let work = with_places();
     let all = [".npy", ".raw", ".nrrd", ".nhdr", ".vti", ".pvd", ".nc", "--format"];
     work.wavesplat("extract a.wspl -o p.xyz").fails(2, &all);

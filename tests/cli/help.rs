@@ -31,7 +31,7 @@ fn long_help_has_headings() {
 }
 
 #[test]
-fn an_estimate_is_not_sold_as_a_guarantee() {
+fn an_estimate_is_not_reported_as_a_guarantee() {
     let run = Work::new().wavesplat("convert --help").ok();
     let text = run.text().split_whitespace().collect::<Vec<_>>().join(" ");
     for words in ["AN ESTIMATE, NOT A GUARANTEE", "--floor", "zeros must come back as zeros", "--samples", "--seed"] {

@@ -86,7 +86,7 @@ fn a_conversion_of_files_is_interrupted_and_resumed_to_the_same_bytes() {
 }
 
 #[test]
-fn what_cannot_be_gone_on_with_is_removed() {
+fn output_that_cannot_be_resumed_is_removed() {
     let work = Work::new();
     work.write("a.npy", archive().npy());
     work.wavesplat("convert a.npy -o a.wspl --window 4").ok();

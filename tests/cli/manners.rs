@@ -14,7 +14,7 @@ fn options(work: &Work, program: &str, command: &str) -> Vec<String> {
 }
 
 #[test]
-fn options_of_another_command_are_said_to_be_its() {
+fn options_of_another_command_are_named_as_such() {
     let work = Work::new();
     let (convert, render) = (options(&work, CONVERT, "convert"), options(&work, RENDER, ""));
     assert!(convert.len() > 20 && render.len() > 30, "{convert:?} {render:?}");
@@ -46,7 +46,7 @@ fn a_word_that_is_no_command_is_understood_as_far_as_it_can_be() {
 }
 
 #[test]
-fn what_is_missing_or_wrong_comes_with_what_is_right() {
+fn messages_about_missing_or_wrong_arguments_give_the_right_form() {
     let work = Work::with_file("");
     work.wavesplat("convert a.npy").fails(2, &["--output <FILE>", "wavesplat convert frames/ -o run.wspl"]);
     work.wavesplat("extract a.wspl").fails(2, &["--output <OUT>", "wavesplat extract run.wspl -o run.npy"]);
@@ -57,7 +57,7 @@ fn what_is_missing_or_wrong_comes_with_what_is_right() {
         ("--tolerance 1%", ["--tolerance", "2 % is 0.02"]),
         ("--threads 0", ["--threads", "at least 1"]),
         ("--memory 5", ["5 bytes", "as 512MiB"]),
-        ("--memory 5MiB --window 64", ["MiB; give that", "--window"]),
+        ("--memory 5MiB --window 64", ["MiB; give that", "--window or --block"]),
     ] {
         work.wavesplat(&format!("convert a.npy -o b.wspl {option}")).fails(2, &words);
     }
@@ -65,7 +65,7 @@ fn what_is_missing_or_wrong_comes_with_what_is_right() {
 }
 
 #[test]
-fn no_later_frames_are_nothing_to_append_and_no_error() {
+fn appending_without_later_frames_is_no_error() {
     let work = Work::with_file("");
     let before = work.read("a.wspl");
     let run = work.wavesplat("append a.wspl a.npy --frames 40:").ok();

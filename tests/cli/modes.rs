@@ -70,7 +70,7 @@ fn settings_of_a_bound_are_in_the_file() {
 }
 
 #[test]
-fn an_estimate_says_so_everywhere() {
+fn estimates_are_named_as_such_everywhere() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     let estimate = |run: &Run| format!("{}{}", run.text(), run.err).contains("NOT A GUARANTEE");
@@ -86,7 +86,7 @@ fn an_estimate_says_so_everywhere() {
 }
 
 #[test]
-fn other_settings_of_a_bound_give_other_bytes_and_none_with_no_tolerance_does() {
+fn settings_of_a_bound_change_bytes_only_with_a_tolerance() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     let options = ["", "--floor 0.5", "--samples 30", "--samples 30 --seed 1", "--samples 31"];
@@ -131,7 +131,7 @@ fn verify_a_lie(lie: impl Fn(&mut EncodedBlock, &mut Metadata)) -> Run {
 }
 
 #[test]
-fn a_block_that_is_further_off_than_it_says_gives_code_4() {
+fn a_block_with_errors_beyond_those_stated_gives_code_4() {
     verify_a_lie(|_, _| ()).ok();
     let words = ["further off than the file says: 1", "block 5 of window 1"];
     verify_a_lie(|b, _| b.stats.reached *= 0.999).fails(4, &words);
@@ -141,7 +141,7 @@ fn a_block_that_is_further_off_than_it_says_gives_code_4() {
 }
 
 #[test]
-fn a_block_whose_coefficients_are_larger_than_it_says_gives_code_3() {
+fn a_block_with_coefficients_beyond_those_stated_gives_code_3() {
     let lie = |b: &mut EncodedBlock, _: &mut Metadata| b.parts[0].stats.largest = b.parts[0].stats.largest.next_down();
     verify_a_lie(lie).fails(3, &["window 1 block 5", "larger than the directory says"]);
 }

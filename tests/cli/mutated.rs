@@ -125,7 +125,7 @@ impl Reading {
 }
 
 #[test]
-fn what_changes_while_it_is_read_is_noticed_or_makes_no_difference() {
+fn changes_while_reading_are_noticed_or_make_no_difference() {
     let (started, mut random, mut found) = (Instant::now(), Random(5), BTreeMap::new());
     for (line, victim, output) in [
         ("convert a.npy -o o.wspl --window 4 --block 16", "a.npy", Some("o.wspl")),

@@ -24,7 +24,7 @@ fn texts(bytes: &[u8]) -> BTreeMap<String, String> {
 }
 
 #[test]
-fn sixteen_bits_of_grey_are_those_of_the_values() {
+fn sixteen_bits_of_grey_hold_the_values() {
     let work = Work::with_file("");
     let options = format!("a.wspl {SIZE} --frames 2 --range=-1,1.5");
     work.render(&format!("{options} -o v.npy")).ok();
@@ -41,7 +41,7 @@ fn sixteen_bits_of_grey_are_those_of_the_values() {
 }
 
 #[test]
-fn sixteen_bits_of_colours_are_those_that_8_bits_round() {
+fn sixteen_bits_of_colours_round_to_those_of_8_bits() {
     let work = Work::with_file("");
     let options = "a.wspl --frames 2,9 --range=-1,1.5 --colormap turbo --background 102030";
     for more in ["--size 48x40", "--annotate --size 200x160", "--mode mip --size 48x40"] {
@@ -64,7 +64,7 @@ fn sixteen_bits_of_colours_are_those_that_8_bits_round() {
 }
 
 #[test]
-fn a_png_says_what_made_it_and_nothing_else() {
+fn a_png_holds_its_provenance_and_nothing_else() {
     let work = Work::with_file("--tolerance 0.004");
     let options =
         "--size 48x40 --frames 9 --view=-20,35 --colormap turbo --range 0,1.5 --norm linear --tau 0.1 --tolerance 0.02";
@@ -110,7 +110,7 @@ fn a_png_says_what_made_it_and_nothing_else() {
 }
 
 #[test]
-fn times_views_and_frames_are_said_of_the_pictures_in_a_file() {
+fn a_file_of_pictures_names_times_views_and_frames() {
     let work = Work::with_file("");
     let said = |options: &str| {
         work.render(&format!("a.wspl {SIZE} --range 0,1 --force {options}")).ok();
@@ -152,7 +152,7 @@ fn a_sidecar_has_the_report_with_what_made_the_pictures() {
 
 #[cfg(not(feature = "exr"))]
 #[test]
-fn an_exr_that_was_not_built_in_says_how_to_get_it() {
+fn exr_without_its_feature_explains_how_to_get_it() {
     let work = Work::with_file("");
     work.render("a.wspl -o p_%d.exr").fails(2, &["p_%d.exr", "cargo build --release --features exr"]);
     work.render("a.wspl -o - --format exr").fails(2, &["--features exr"]);

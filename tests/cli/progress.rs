@@ -26,7 +26,7 @@ fn counts(run: &Run, stages: &[&str]) {
 }
 
 #[test]
-fn every_command_that_works_long_tells_how_far_it_is() {
+fn every_long_command_reports_progress() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([20, 14, 10], 40).npy());
     counts(&work.wavesplat("convert a.npy -o a.wspl --window 8 --progress json").ok(), &["convert"]);
@@ -41,7 +41,7 @@ fn every_command_that_works_long_tells_how_far_it_is() {
 }
 
 #[test]
-fn nothing_is_told_of_progress_unasked() {
+fn progress_is_not_reported_by_default() {
     let work = Work::with_file("");
     for how in ["", "--progress auto", "--progress none", "--progress json -q"] {
         let run = work.wavesplat(&format!("convert a.npy -o a.wspl --force {how}")).ok();
@@ -51,7 +51,7 @@ fn nothing_is_told_of_progress_unasked() {
 }
 
 #[test]
-fn a_stage_that_fails_still_says_how_far_it_came() {
+fn a_failing_stage_reports_its_progress() {
     let work = Work::new();
     let archive = Archive::smooth([20, 14, 10], 40);
     let cut = &archive.npy()[..128 + 29 * 11_200];

@@ -111,7 +111,7 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
 }
 
 #[test]
-fn what_no_one_can_save_is_said() {
+fn unrecoverable_files_are_reported() {
     let (work, file) = work();
     work.write("text.wspl", "hello\n".repeat(1000));
     work.wavesplat("recover text.wspl -o saved.wspl").fails(3, &["text.wspl", "nothing can be recovered"]);

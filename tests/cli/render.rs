@@ -37,7 +37,7 @@ fn one_png_takes_one_frame() {
 }
 
 #[test]
-fn each_view_has_a_name_of_its_own() {
+fn each_view_has_its_own_name() {
     let work = Work::with_file("");
     work.render(&format!("a.wspl {SIZE} --frames 2 --view 30,30 --scale 1.5 -o plain.npy")).ok();
     work.render(&format!("a.wspl {SIZE} --frames 2 --view=-60,30 --orbit 4 --scale 1.5 -o view%02v.npy")).ok();

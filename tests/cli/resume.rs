@@ -27,7 +27,7 @@ const SETTINGS: [&str; 5] = [
 ];
 
 #[test]
-fn whole_windows_that_are_appended_are_as_if_converted_at_once() {
+fn appending_whole_windows_equals_a_single_conversion() {
     for settings in SETTINGS {
         let (work, _) = work();
         work.wavesplat(&format!("convert all.npy -o all.wspl {settings}")).ok();
@@ -77,7 +77,7 @@ fn an_append_keeps_links_and_permissions() {
 }
 
 #[test]
-fn frames_that_a_file_has_already_are_not_appended_unasked() {
+fn frames_already_in_a_file_are_not_appended_unasked() {
     let (work, _) = work();
     work.wavesplat("convert first.npy -o a.wspl --window 8").ok();
     work.wavesplat("append a.wspl all.npy").fails(2, &["a.wspl", "begins with these frames", "--frames 16:"]);
@@ -91,7 +91,7 @@ fn frames_that_a_file_has_already_are_not_appended_unasked() {
 }
 
 #[test]
-fn a_run_that_met_the_end_of_an_archive_does_not_go_on_where_that_has_grown() {
+fn a_run_that_reached_the_end_is_not_resumed_on_a_grown_archive() {
     let (work, archive) = work();
     work.write("few.npy", some_frames(&archive, 0..13));
     work.wavesplat("convert few.npy -o few.wspl --window 8").ok();
@@ -116,7 +116,7 @@ fn frames_of_a_growing_archive_are_appended_by_number() {
 }
 
 #[test]
-fn what_does_not_belong_to_a_file_is_not_appended_and_leaves_it_as_it_is() {
+fn unsuitable_frames_are_not_appended_and_leave_the_file_unchanged() {
     let (work, archive) = work();
     work.wavesplat("convert first.npy -o a.wspl --window 8").ok();
     let before = work.read("a.wspl");
@@ -142,7 +142,7 @@ fn what_does_not_belong_to_a_file_is_not_appended_and_leaves_it_as_it_is() {
 }
 
 #[test]
-fn a_run_that_stopped_goes_on_to_the_same_bytes() {
+fn a_stopped_run_resumes_to_the_same_bytes() {
     for settings in SETTINGS {
         let (work, archive) = work();
         work.wavesplat(&format!("convert all.npy -o all.wspl {settings}")).ok();
@@ -161,15 +161,15 @@ fn a_run_that_stopped_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn other_frames_or_settings_are_not_gone_on_with() {
+fn runs_are_not_resumed_with_other_frames_or_settings() {
     let (work, archive) = work();
     let args = "convert - -o a.wspl --window 8";
     work.piped(args, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["what is finished is kept"]);
     for (settings, word) in [
         ("--window 16", "another window: 8, now 16"),
-        ("--window 8 --tolerance 0.02", "another --tolerance: 0.01, now 0.02"),
+        ("--window 8 --tolerance 0.02", "another tolerance: 0.01, now 0.02"),
         ("--window 8 --basis haar", "another basis: auto, now haar"),
-        ("--window 8 --bound rms", "another --bound"),
+        ("--window 8 --bound rms", "another bound: Pointwise, now Rms"),
         ("--window 8 --range 0,1", "another range: none, now 0.0,1.0"),
     ] {
         let run = work.piped(&format!("convert - -o a.wspl --resume {settings}"), &archive.npy());

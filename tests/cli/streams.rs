@@ -27,7 +27,7 @@ fn fed<'a>(work: &Work, args: &str, pieces: impl Iterator<Item = (&'a [u8], Dura
 }
 
 #[test]
-fn neither_the_size_of_pieces_nor_pauses_change_a_byte() {
+fn sizes_of_pieces_and_pauses_change_no_byte() {
     let (work, bytes, mut random) = (Work::new(), archive().npy(), Random(3));
     work.write("a.npy", &bytes);
     work.wavesplat(&ARGS.replacen("- -o out", "a.npy -o right", 1)).ok();
@@ -53,7 +53,7 @@ fn neither_the_size_of_pieces_nor_pauses_change_a_byte() {
 }
 
 #[test]
-fn wherever_a_stream_ends_its_whole_windows_are_kept() {
+fn complete_windows_are_kept_wherever_a_stream_ends() {
     let (work, bytes, started) = (Work::new(), archive().npy(), Instant::now());
     work.piped(ARGS, &bytes).ok();
     let right = work.read("out.wspl");

@@ -31,7 +31,7 @@ struct Scene {
 }
 
 /// The brute-force result for a scene.
-struct Truth {
+struct Reference {
     images: Images,
     /// The largest sum of weights if no sample were missing: over the pixels, and over all places inside and outside
     /// of the picture.
@@ -49,7 +49,7 @@ impl Scene {
         !value.is_finite() || Some(value) == self.convert.missing_value
     }
 
-    fn truth(&self, scale: f64) -> Truth {
+    fn truth(&self, scale: f64) -> Reference {
         let voxels = self.grid.whole().voxels();
         let all = numbers(self.ty, &self.samples);
         let values: Vec<f64> =
@@ -64,7 +64,7 @@ impl Scene {
         let masked = all.iter().any(|v| self.missing(*v));
         let largest_weight = largest(&weights);
         let brightest = self.brightest(scale).max(largest_weight);
-        Truth { images, largest_weight, brightest, range, largest: largest(&all), masked }
+        Reference { images, largest_weight, brightest, range, largest: largest(&all), masked }
     }
 
     fn shows(&self, voxel: [usize; 3]) -> bool {
@@ -152,7 +152,7 @@ impl std::ops::Add for Compared {
     }
 }
 
-impl Truth {
+impl Reference {
     fn is_background(&self, at: usize) -> bool {
         let weight = self.images.weight[at];
         weight == 0.0 || weight < BACKGROUND * self.largest_weight
@@ -209,7 +209,7 @@ fn check_all(limits: &Limits, count: u64) {
 }
 
 #[test]
-fn pictures_of_random_scenes_are_within_what_is_promised() {
+fn pictures_of_random_scenes_are_within_their_bounds() {
     let limits = Limits { sigma: (0.02, 4.0), scale: (0.1, 8.0), moved: true, tau: 30.0 };
     check_all(&limits, 3000);
 }

@@ -53,13 +53,15 @@ enum Command {
     Synth(SynthArgs),
     /// Compare two pictures or two stacks of pictures
     Diff(diff::Args),
-    /// Measure run time against error, beside the conventional method; an interrupted run goes on where it was
+    /// Measure run time against error, compared with the conventional method; an interrupted run resumes
     Bench(Box<BenchArgs>),
     /// One measured stage of the benchmark
     #[command(hide = true)]
     BenchStep {
-        /// What to do, as JSON
-        step: String,
+        /// The name of the measurement
+        name: String,
+        /// Its settings, as JSON
+        task: String,
     },
 }
 
@@ -114,10 +116,10 @@ struct BenchArgs {
     /// The folder of results.json, results.md and the figures
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
-    /// Small volumes and few points: whether everything works, in seconds
+    /// Small volumes and few points, to check in seconds that everything works
     #[arg(long)]
     quick: bool,
-    /// Begin anew where there are results already
+    /// Start again and discard existing results
     #[arg(long)]
     force: bool,
     /// Voxels along x, y, z and the number of frames, 33 or more [default: 64x64x64x33]
@@ -126,16 +128,16 @@ struct BenchArgs {
     /// Pixels a side of the pictures [default: 256]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
-    /// What the archives show, with commas between them [default: all]
+    /// Kinds of archives, separated by commas [default: all]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
-    /// Tolerances, with commas between them [default: 1e-1 to 1e-6 by tens]
+    /// Tolerances, separated by commas [default: 1e-1 to 1e-6 by tens]
     #[arg(long, value_name = "E", value_delimiter = ',', value_parser = parse_tolerance)]
     tolerances: Option<Vec<f64>>,
-    /// How often every time is taken [default: 3]
+    /// Number of repetitions of every time [default: 3]
     #[arg(long, value_name = "N")]
     repeats: Option<usize>,
-    /// The day to write into the results [default: the clock's]
+    /// The date to write into the results [default: today]
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<String>,
 }
@@ -173,22 +175,22 @@ struct SpeedArgs {
     /// Archives (t, z, y, x), each one .npy
     #[arg(value_name = "INPUT.npy")]
     inputs: Vec<PathBuf>,
-    /// What archives that are made show, with commas between them [default: smooth,moving,sparse where there are no inputs]
+    /// What archives that are made show, separated by commas [default: smooth,moving,sparse where there are no inputs]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
-    /// Their sizes, with commas between them [default: 128x128x128x32,256x256x256x32,128x128x128x64]
+    /// Their sizes, separated by commas [default: 128x128x128x32,256x256x256x32,128x128x128x64]
     #[arg(long, value_name = "NXxNYxNZxNT", value_delimiter = ',', value_parser = parse_dims)]
     dims: Option<Vec<[usize; 4]>>,
-    /// Pixels from a voxel to the next, with commas between them
+    /// Pixels from a voxel to the next, separated by commas
     #[arg(long, value_name = "PX", value_delimiter = ',', default_value = "2.3,1", value_parser = parse_tolerance)]
     spacings: Vec<f64>,
     /// Pixels a side of the pictures [default: 512]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
-    /// Shares of the value range, with commas between them; targets are about the first
+    /// Shares of the value range, separated by commas; targets are about the first
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
-    /// Numbers of threads, with commas between them
+    /// Numbers of threads, separated by commas
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2")]
     threads: Vec<usize>,
     /// Rounds through all measurements; the least time of all is taken [default: 3]
@@ -205,7 +207,7 @@ struct SpeedArgs {
     /// The folder of speed.json and speed.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
-    /// The day to write into the results [default: the clock's]
+    /// The date to write into the results [default: today]
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<String>,
 }
@@ -240,10 +242,10 @@ struct LayersArgs {
     /// The folder of layers.json and layers.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
-    /// Of pictures, shares of the value range, with commas between them
+    /// Of pictures, shares of the value range, separated by commas
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-3,3e-3,1e-2,3e-2,1e-1,3e-1", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
-    /// The day to write into the results [default: the clock's]
+    /// The date to write into the results [default: today]
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<String>,
 }
@@ -261,7 +263,7 @@ struct SizeArgs {
     /// The folder of size.json and size.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
-    /// Shares of the value range, with commas between them
+    /// Shares of the value range, separated by commas
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3,1e-4", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
     /// Rounds through all coders; the least time of all is taken
@@ -270,7 +272,7 @@ struct SizeArgs {
     /// Small archives: whether everything works, in seconds
     #[arg(long)]
     small: bool,
-    /// The day to write into the results [default: the clock's]
+    /// The date to write into the results [default: today]
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: Option<String>,
 }
@@ -305,7 +307,7 @@ impl BenchArgs {
     }
 }
 
-/// Reads a tolerance that leaves something to measure.
+/// Parses a tolerance for which there is something to measure.
 fn parse_tolerance(text: &str) -> std::result::Result<f64, String> {
     diff::above_zero(text)
 }
@@ -324,7 +326,7 @@ fn parse_dims(text: &str) -> std::result::Result<[usize; 4], String> {
     }
 }
 
-/// Progress on standard error; that nobody reads it is no error.
+/// Prints progress on standard error; ignores errors of a closed stream.
 fn say(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
@@ -398,7 +400,7 @@ fn bench(args: &BenchArgs) -> Result<()> {
 }
 
 fn report(error: &Error) -> ExitCode {
-    // Nothing is left to do when even the message cannot be written.
+    // If even the message cannot be written, nothing more can be done.
     let _ = writeln!(io::stderr().lock(), "error: {error}");
     ExitCode::from(error.exit_code())
 }
@@ -415,7 +417,9 @@ fn main() -> ExitCode {
             Some(OtherBench::Speed(args)) => bench_speed(args),
             None => bench(&args),
         },
-        Command::BenchStep { step } => bench::run_step(&step).and_then(|answer| wavesplat::cli::print(&answer)),
+        Command::BenchStep { name, task } => {
+            bench::run_step(&name, &task).and_then(|answer| wavesplat::cli::print(&answer))
+        }
     };
     result.map_or_else(|e| report(&e), |()| ExitCode::SUCCESS)
 }

@@ -1,4 +1,4 @@
-//! Where frames go: one file, a folder with a file per frame, or standard output. One frame is in memory at a time.
+//! Writes frames to one file, a folder with a file per frame, or standard output. One frame is in memory at a time.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -24,7 +24,7 @@ impl Shape {
     }
 }
 
-/// How samples are stored; little-endian and x fastest in both.
+/// How samples are stored. Both are little-endian with x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// NumPy's, with a header
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// Writes what comes before the samples of an array whose last axis is the fastest.
+    /// Writes the bytes before the samples of an array whose last axis is the fastest.
     fn begin(self, writer: &mut impl Write, ty: SampleType, shape: &[usize]) -> io::Result<()> {
         if self == Self::Npy {
             wavesplat::base::npy::write_header(ty, shape, writer)?;
@@ -51,7 +51,7 @@ impl Format {
     }
 }
 
-/// Where frames go.
+/// The destination of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
     /// Standard output; all frames in one array.
@@ -63,7 +63,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// Understands `-`, `FILE.npy`, `FILE.raw`, and a folder, which exists already or ends with a slash.
+    /// Parses `-`, `FILE.npy`, `FILE.raw`, or a folder, which exists already or ends with a slash.
     pub fn parse(name: &str, format: Option<Format>) -> Result<Self> {
         let (path, default) = (PathBuf::from(name), format.unwrap_or(Format::Npy));
         if name == "-" {
@@ -77,8 +77,8 @@ impl Target {
         format.or(of_name).ok_or_else(unclear).map(|f| Self::File(path, f))
     }
 
-    /// Writes an archive whose frames `fill` brings one after the other. A reader of standard output that has seen
-    /// enough is no error.
+    /// Writes an archive; `fill` supplies the frames one after another. A reader of standard output that stops early
+    /// is no error.
     pub fn write(&self, shape: &Shape, fill: impl FnMut(usize, &mut [u8])) -> Result<()> {
         match self {
             Self::Directory(path, format) => directory(path, *format, shape, fill),

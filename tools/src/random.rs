@@ -1,9 +1,9 @@
-//! Random numbers that are the same everywhere: splitmix64 (Steele, Lea & Flood, OOPSLA 2014).
+//! Random numbers that are the same on every machine: splitmix64 (Steele, Lea & Flood, OOPSLA 2014).
 
-/// What the state grows by: 2^64 over the golden ratio, odd.
+/// The increment of the state: 2^64 over the golden ratio, made odd.
 const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// The generator. Its state advances by a constant, so that the n-th number is known without those before it.
+/// The generator. Its state advances by a constant, so that the n-th number can be computed without those before it.
 #[derive(Debug, Clone)]
 pub struct Random {
     state: u64,

@@ -1,4 +1,4 @@
-//! What the demo and the gallery have in common: archives to files, and scenes to pictures.
+//! Shared by demo and gallery: converts archives to files, and renders scenes to pictures.
 
 use std::path::Path;
 use wavesplat::base::error::Result;

@@ -1,4 +1,4 @@
-//! Pictures next to one another: contact sheets, a colour bar, differences, labels.
+//! Arranges pictures: contact sheets, a colour bar, differences, labels.
 
 use crate::diff::measure::of_pixels;
 use font8x8::legacy::BASIC_LEGACY;
@@ -29,20 +29,20 @@ pub struct Image {
 }
 
 impl Image {
-    /// A picture of what `colour(x, y)` says.
+    /// A picture with the pixels `colour(x, y)`.
     pub fn from_fn(width: usize, height: usize, colour: impl Fn(usize, usize) -> Rgb) -> Self {
         let pixels = (0..width * height).map(|i| colour(i % width, i / width)).collect();
         Self { width, height, pixels }
     }
 
-    /// Sets a pixel; outside the picture nothing happens.
+    /// Sets a pixel; does nothing outside of the picture.
     pub fn set(&mut self, x: usize, y: usize, colour: Rgb) {
         if x < self.width && y < self.height {
             self.pixels[y * self.width + x] = colour;
         }
     }
 
-    /// Copies a picture into this one with its upper left corner at (x, y); what does not fit is cut off.
+    /// Copies a picture into this one with its upper left corner at (x, y), and clips it.
     pub fn paste(&mut self, picture: &Self, x: usize, y: usize) {
         for (i, colour) in picture.pixels.iter().enumerate() {
             self.set(x + i % picture.width, y + i / picture.width, *colour);
@@ -84,7 +84,7 @@ impl Image {
 /// Pictures in rows of `columns`, with `gap` pixels between and around them.
 ///
 /// # Panics
-/// If the pictures have different sizes, or `columns` is 0.
+/// The pictures have different sizes, or `columns` is 0.
 pub fn contact_sheet(pictures: &[Image], columns: usize, gap: usize, background: Rgb) -> Image {
     let (w, h) = pictures.first().map_or((0, 0), |p| (p.width, p.height));
     assert!(pictures.iter().all(|p| (p.width, p.height) == (w, h)), "pictures of one size");
@@ -123,7 +123,7 @@ pub fn stacked(pictures: &[Image], paper: Rgb) -> Image {
     all
 }
 
-/// A sheet with a colour bar at its right, and what its top, its middle and its bottom mean.
+/// A sheet with a colour bar at its right and labels for the bar's top, middle and bottom.
 pub fn with_bar(sheet: &Image, labels: &[String; 3], ink: Rgb, paper: Rgb, colour: impl Fn(f64) -> Rgb) -> Image {
     let letters = labels.iter().map(String::len).max().unwrap_or(0);
     let (left, height) = (sheet.width + GAP, sheet.height.max(BAR[1] + 2 * GAP));
@@ -166,7 +166,7 @@ pub fn difference_images(
     colours.chunks_exact(width * height).map(picture).collect()
 }
 
-/// A difference as a share of `scale` in [`difference_colour`]; black for none, where both are background.
+/// The colour of a difference as a share of `scale`; black for none, where both are background.
 pub fn heat(difference: Option<f64>, scale: f64) -> Rgb {
     match difference {
         None => [0; 3],
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!((pixel(&sheet, 0, 0), pixel(&sheet, 5, 2)), ([7; 3], [7; 3]));
         assert_eq!((pixel(&sheet, 1, 1), pixel(&sheet, 4, 3)), (RED, RED));
         assert_eq!((pixel(&sheet, 6, 1), pixel(&sheet, 1, 5)), (BLUE, [9; 3]));
-        assert_eq!(pixel(&sheet, 6, 5), [7; 3]); // the place that stays free
+        assert_eq!(pixel(&sheet, 6, 5), [7; 3]); // the free place
     }
 
     #[test]

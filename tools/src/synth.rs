@@ -1,7 +1,7 @@
-//! Synthetic archives of any size, one frame at a time: what the tests and the benchmarks read.
+//! Synthetic archives of any size, one frame at a time, for tests and benchmarks.
 //!
-//! But for noise, a frame is a sum of products a * f(x) * g(y) * h(z). The factors are computed once a frame, so that
-//! a voxel costs a few multiplications. A frame depends on the settings and its number alone. Coordinates and time
+//! Except for noise, a frame is a sum of products a * f(x) * g(y) * h(z). The factors are computed once per frame, so
+//! that a voxel costs a few multiplications. A frame depends only on the settings and its number. Coordinates and time
 //! run over 0..1, so that more voxels or frames refine the same scene.
 
 use crate::output::Shape;

@@ -16,7 +16,7 @@ fn bench(output: &Path) -> (Results, Vec<String>) {
 }
 
 #[test]
-fn the_quick_sweep_is_sane_and_goes_on_after_an_interruption() {
+fn the_quick_sweep_is_sane_and_resumes_after_an_interruption() {
     let folder = tempfile::tempdir().unwrap();
     let (results, said) = bench(folder.path());
     assert_eq!(sanity::complaints(&results.points), [""; 0]);

@@ -195,7 +195,7 @@ fn background_in_one_alone_differs_infinitely() {
 }
 
 #[test]
-fn what_is_not_defined_is_said() {
+fn undefined_measures_are_reported() {
     let folder = Folder::new();
     let small = folder.npy("small.npy", SampleType::F32, &[2, 10, 20], &[1.0; 400]);
     let plain = folder.npy("plain.npy", SampleType::F32, &[HEIGHT, WIDTH], &[1.0; 300]);
@@ -234,7 +234,7 @@ fn folders_and_patterns_are_stacks_in_natural_order() {
 }
 
 #[test]
-fn two_that_cannot_be_compared_are_refused() {
+fn inputs_that_cannot_be_compared_are_refused() {
     let folder = Folder::new();
     let a = folder.npy("a.npy", SampleType::F32, &[HEIGHT, WIDTH], &floats(1));
     let wide = folder.npy("wide.npy", SampleType::F32, &[WIDTH, HEIGHT], &floats(1));

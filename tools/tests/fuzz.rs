@@ -38,7 +38,7 @@ fn replay(folder: &Path, target: Target) -> usize {
 }
 
 #[test]
-fn no_target_panics_on_what_was_found() {
+fn no_target_panics_on_corpus_and_regressions() {
     for (name, target) in TARGETS {
         let seeds = replay(&folder("corpus").join(name), target);
         assert!((1..=60).contains(&seeds), "{seeds} seeds of {name}");
@@ -54,7 +54,7 @@ fn no_target_panics_on_what_was_found() {
 }
 
 #[test]
-fn a_file_that_is_taken_apart_is_put_together_again() {
+fn a_dissected_file_reassembles_to_the_same_bytes() {
     for (number, (name, file)) in (0..).zip(SEEDS) {
         let (sound, seed) = fuzz::seeds::seed(number);
         assert_eq!((sound, seed.forge(&[])), (file, file.to_vec()), "{name}");

@@ -25,7 +25,7 @@ fn said(row: &Row) -> bool {
 }
 
 #[test]
-fn every_row_is_there_with_a_value_or_a_reason() {
+fn every_row_has_a_value_or_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let results = results(&speed(folder.path(), &["--large"]), folder.path());
     assert_eq!(results.archives.len(), 3);

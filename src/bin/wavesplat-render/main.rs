@@ -21,7 +21,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use targets::{Targets, parse_depth, parse_format};
+use targets::{Targets, parse_depth, parse_format, refuse_video};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::output::{Output, STANDARD};
@@ -269,6 +269,9 @@ impl Cli {
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
     fn targets(&self, config: &RenderConfig) -> Result<(Targets, Option<Targets>)> {
+        if self.format.is_none() {
+            refuse_video(&self.inputs, &self.output)?;
+        }
         let pictures = Targets::new(&self.output, self.format, config)?;
         self.colour.check(pictures.format)?;
         let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;

@@ -57,3 +57,18 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
         Error::usage(format!("{}: {what}", path.display()))
     })
 }
+
+/// Endings of videos, which ffmpeg makes from a stream of pictures.
+const VIDEOS: [&str; 6] = ["mp4", "mov", "avi", "mkv", "webm", "gif"];
+
+/// An error with the pipe to type if `output` is the name of a video.
+pub(crate) fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
+    let ending = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    if !VIDEOS.contains(&ending.as_str()) {
+        return Ok(());
+    }
+    let (name, pixels) = (output.display(), if ending == "gif" { "" } else { " -pix_fmt yuv420p" });
+    let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
+    let pipe = format!("wavesplat-render {} -o - --format y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
+    Err(Error::usage(format!("{name}: ffmpeg makes videos; type: {pipe}")))
+}

@@ -303,13 +303,12 @@ impl ConvertArgs {
         Ok(SchemeConstraint { basis, space })
     }
 
-    /// What `verify --against` must know to read the same samples again.
+    /// What `append` and `verify --against` must know to read the same samples again.
     fn settings(&self) -> Vec<(String, String)> {
         let frames = self.select.frames.map(|f| ("frames".to_string(), f.to_string()));
         let region = self.select.region.map(|r| ("region".to_string(), r.to_string()));
-        let variable = self.input.variable.clone().map(|v| ("variable".to_string(), v));
-        let axes = self.input.axes.clone().map(|a| ("axes".to_string(), a));
-        [frames, region, variable, axes].into_iter().flatten().collect()
+        let given = [frames, region].into_iter().flatten();
+        given.chain(self.input.settings().map(|(name, value)| (name.to_string(), value))).collect()
     }
 }
 

@@ -4,8 +4,7 @@
 pub(super) const IS_BUILT: bool = cfg!(feature = "exr");
 
 /// The message if it is not.
-pub(super) const HOW_TO_BUILD: &str =
-    "OpenEXR is not part of this build; make one with it by cargo build --release --features exr, or take .npy";
+pub(super) const NOT_BUILT: &str = "OpenEXR is not part of this build; .npy is";
 
 #[cfg(not(feature = "exr"))]
 pub(super) fn write(
@@ -14,7 +13,7 @@ pub(super) fn write(
     _: super::Picture<'_>,
     _: &mut impl std::io::Write,
 ) -> std::io::Result<()> {
-    Err(std::io::Error::other(HOW_TO_BUILD))
+    Err(std::io::Error::other(NOT_BUILT))
 }
 
 #[cfg(feature = "exr")]

@@ -11,7 +11,7 @@ pub use provenance::{Provenance, Shows};
 
 use super::annotate::Annotation;
 use super::{Picture, Pixel, Rendered};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
 use crate::colour::{Rgb, Scale};
 use png::Animation;
@@ -73,7 +73,7 @@ impl PictureFormat {
     /// An error if this build cannot write the format.
     pub fn check(self, path: &Path) -> Result<()> {
         if self == Self::Exr && !exr::IS_BUILT {
-            return Err(Error::usage(format!("{}: {}", path.display(), exr::HOW_TO_BUILD)));
+            return Err(Error::path(path, Note::with(exr::NOT_BUILT, Remedy::BuildWith("exr"))));
         }
         Ok(())
     }
@@ -197,8 +197,7 @@ impl Sink {
             return Ok(Self { target: Target::Many(Numbered::new(path, frames.len())?), config });
         }
         if path != Path::new(STANDARD) && Numbered::new(path, 1)?.digits.is_some() {
-            let what = format!("{}: a pattern numbers .png and .exr files; others hold all frames", path.display());
-            return Err(Error::usage(what));
+            return Err(Error::path(path, "a pattern numbers .png and .exr files; others hold all frames"));
         }
         let out = Output::create(path, config.force)?;
         let target = match config.format {

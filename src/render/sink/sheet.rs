@@ -2,7 +2,7 @@
 
 use super::png::{self, Samples};
 use super::{Picture, Rendered, SinkConfig};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::Output;
 
 /// Largest side in pixels; most programs show no larger pictures.
@@ -62,9 +62,10 @@ pub(super) fn size([width, height]: [usize; 2], pictures: usize) -> Result<[usiz
         return Ok(size);
     }
     let [across, down] = size;
-    let what =
-        format!("a sheet of {pictures} pictures would have {across}x{down} pixels, of at most {MOST_SIDE} a side");
-    Err(Error::usage(format!("--format sheet: {what}; give a smaller --size or fewer --frames")))
+    let what = format!(
+        "a sheet of {pictures} pictures would have {across}x{down} pixels; each side may have at most {MOST_SIDE}"
+    );
+    Err(Error::setting("format", Note::with(what, Remedy::Adjust(&["size", "frames"]))))
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub(in crate::render) fn count(setup: &ViewSetup, config: &RenderConfig) -> usiz
 pub(in crate::render) fn cut(setup: &ViewSetup, config: &RenderConfig) -> Result<Slabs> {
     let ([from, to], count) = (ends(setup, config), count(setup, config));
     if !(1..=MOST_SLABS).contains(&count) {
-        return Err(Error::usage(format!("--slabs: takes 1 to {MOST_SLABS}; here it would be {count}")));
+        return Err(Error::setting("slabs", format!("takes 1 to {MOST_SLABS}; here it would be {count}")));
     }
     let thickness = (to - from) / count as f64;
     let end = |n: usize| match n {

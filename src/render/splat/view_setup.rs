@@ -48,14 +48,17 @@ impl ViewSetup {
         let clip = config.region.unwrap_or(grid.whole());
         if !grid.whole().contains(&clip) || clip.is_empty() {
             let d = grid.dims;
-            return Err(Error::usage(format!("--region: not within the volume of {}x{}x{} voxels", d[0], d[1], d[2])));
+            return Err(Error::setting(
+                "region",
+                format!("not within the volume of {}x{}x{} voxels", d[0], d[1], d[2]),
+            ));
         }
         let camera = Camera::new(view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
         let nearest = camera.nearest_of(&grid.crop(&clip));
         if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
-            let what = "--tau: all voxels of the region lie so deep that their weights are beyond numbers";
-            return Err(Error::usage(format!("{what} (tau {:e})", config.kernel.tau)));
+            let what = "all voxels of the region lie so deep that their weights are beyond numbers";
+            return Err(Error::setting("tau", format!("{what} (tau {:e})", config.kernel.tau)));
         }
         let (backend, method) = SplatBackend::choose(config, (&grid, &clip), &camera, &footprint);
         let (tau, stated_error, deepest) = (config.kernel.tau, method.stated_error, f64::INFINITY);

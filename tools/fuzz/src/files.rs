@@ -1,4 +1,4 @@
-//! Whole files: as they are, with forged checksums, cut, damaged.
+//! Targets for whole files: unchanged, with forged checksums, truncated, damaged.
 
 use super::forge::edits;
 use super::input::Input;
@@ -13,16 +13,16 @@ use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat_format::*;
 
-/// Bytes once decompressed that are read of a file, and blocks.
+/// Limits for reading a file: decompressed bytes, and blocks.
 const MOST_RAW: u64 = 16 << 20;
 const MOST_BLOCKS: u64 = 4096;
 
-/// A file as it is.
+/// An unchanged file.
 pub fn file(data: &[u8]) {
     let _ = read_all(data);
 }
 
-/// A record of metadata: what is read is written as it was.
+/// A metadata record: a record that parses must encode to the same bytes.
 pub fn metadata(data: &[u8]) {
     let Ok(metadata) = Metadata::decode(data) else { return };
     assert_eq!(metadata.encode().expect("it was read"), data);
@@ -42,7 +42,7 @@ pub fn metadata(data: &[u8]) {
     }
 }
 
-/// A sound file with changes and checksums that fit, read by the format's package.
+/// A valid file with changes and updated checksums, read by the format package.
 pub fn forged(data: &[u8]) {
     let mut input = Input::new(data);
     let (sound, seed) = seed(input.byte());
@@ -64,7 +64,7 @@ pub fn decode(data: &[u8]) {
         let long = |window: &Window| window.frames.max(window.coefficients) > 64;
         let voxels = file.grid.dims.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).unwrap_or(usize::MAX);
         if file.largest_block() > 1 << 16 || voxels > 1 << 16 || file.metadata().windows.iter().any(long) {
-            return; // takes long, for good reason
+            return; // would take too long
         }
         let whole = file.grid.whole();
         let corner = Region { start: whole.end.map(|end| end - 1), end: whole.end };
@@ -78,13 +78,13 @@ pub fn decode(data: &[u8]) {
     });
 }
 
-/// A file that was cut, or whose end is something else: what is whole of it is gone on with to a sound file.
+/// A file that is truncated or has another end: its complete windows must resume to a valid file.
 pub fn prefix(data: &[u8]) {
     let mut input = Input::new(data);
     let (_, seed) = seed(input.byte());
     let cut = input.short();
     let mut file = seed.forge(&edits(&mut input));
-    file.truncate(cut * 64); // all that matters begins there
+    file.truncate(cut * 64); // all sections begin at multiples of 64
     let Ok(found) = CompletePrefix::read(&file) else { return };
     let (end, frames) = (found.bytes() as usize, found.metadata().frames);
     assert!(end <= file.len());
@@ -104,7 +104,7 @@ pub fn prefix(data: &[u8]) {
     }
 }
 
-/// A damaged file: what is saved is a file, and of a sound one that was damaged it is what it was.
+/// A damaged file: the recovered file must be valid, and if the damaged file was valid before, unchanged.
 pub fn recovery(data: &[u8]) {
     let mut input = Input::new(data);
     let (sound, seed) = seed(input.byte());
@@ -133,7 +133,7 @@ pub fn recovery(data: &[u8]) {
     is_part_of(&file, sound, &saved);
 }
 
-/// Damages a file: bits, a hole, bytes that were left out, put in or brought from elsewhere.
+/// Damages a file: flips bits, makes a hole, removes, inserts or moves bytes.
 fn hurt(file: &mut Vec<u8>, [how, at, len, more]: [usize; 4]) {
     let at = at % (file.len() + 1);
     let end = (at + len).min(file.len());
@@ -150,7 +150,7 @@ fn hurt(file: &mut Vec<u8>, [how, at, len, more]: [usize; 4]) {
     }
 }
 
-/// Whether every block that was saved is as it was.
+/// Whether every recovered block is unchanged.
 fn is_part_of(file: &[u8], sound: &[u8], saved: &Recovered) {
     read_all(file).expect("what was saved is sound");
     let (new, old) = (Reader::open(file).expect("sound"), Reader::open(sound).expect("sound"));
@@ -170,7 +170,7 @@ fn is_part_of(file: &[u8], sound: &[u8], saved: &Recovered) {
     }
 }
 
-/// Reads all of a file that is not too much; the first thing that is wrong, but for lost blocks.
+/// Reads a file completely unless it is too large. Returns the first error, except those about lost blocks.
 pub fn read_all(file: &[u8]) -> Result<()> {
     let reader = Reader::open(file)?;
     let (mut wrong, mut left) = (Vec::new(), MOST_RAW);
@@ -189,7 +189,7 @@ pub fn read_all(file: &[u8]) -> Result<()> {
     wrong.into_iter().next().map_or(Ok(()), Err)
 }
 
-/// Gives the path of a temporary file that holds some bytes.
+/// Calls a function with the path of a temporary file that holds some bytes.
 pub fn with_file<T>(bytes: &[u8], run: impl FnOnce(&Path) -> T) -> T {
     let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
     file.write_all(bytes).expect("writing a temporary file");

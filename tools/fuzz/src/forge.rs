@@ -1,5 +1,5 @@
-//! A sound file taken apart, changed, and put together again with lengths, places, sums and checksums that fit, so that
-//! changes reach what lies behind the checks. Written from `format/FORMAT.md`, apart from the format's own code.
+//! Takes a valid file apart, changes it, and reassembles it with updated lengths, offsets, sums and checksums, so that
+//! changes reach the code behind the checks. Written from `format/FORMAT.md`, independent of the format's own code.
 
 use super::input::Input;
 use std::cell::RefCell;
@@ -10,25 +10,25 @@ const HEADER: usize = 128;
 const FRAME: usize = 24;
 const ENTRY: usize = 64;
 const PART: usize = 56;
-/// What the blocks of a window add up to.
+/// The totals of a window's blocks.
 const SUMS: usize = 64;
 
-/// What of a file is changed. All but the first is what the file says, before sums and checksums are made of it.
+/// What is changed in a file. All but the first are fields of the file, before sums and checksums are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
-    /// Parts of a block: left out or doubled.
+enum EditTarget {
+    /// Parts of a block: omitted or duplicated.
     Parts,
     Header,
-    /// What start and metadata begin with alike: grid, type, blocks, channels.
+    /// The fields with which both start and metadata begin: grid, type, blocks, channels.
     Grid,
     Start,
-    /// A block's entry, before and after its places, lengths and checksums are filled in.
+    /// A block's entry, before and after its offsets, lengths and checksums are filled in.
     Entry,
     Placed,
-    /// What a part holds.
+    /// The payload of a part.
     Payload,
     Leaf,
-    /// A window's record, in its section and in the metadata; and what its end says, in both.
+    /// A window's record, in its section and in the metadata; and its totals, in both.
     Window,
     End,
     Metadata,
@@ -36,32 +36,32 @@ enum Place {
     Root,
     Footer,
     Frame,
-    /// The bytes of a part as they are stored.
+    /// The stored bytes of a part.
     Stored,
 }
 
-const PLACES: [Place; 15] = [
-    Place::Parts,
-    Place::Header,
-    Place::Grid,
-    Place::Start,
-    Place::Entry,
-    Place::Placed,
-    Place::Payload,
-    Place::Leaf,
-    Place::Window,
-    Place::End,
-    Place::Metadata,
-    Place::Root,
-    Place::Footer,
-    Place::Frame,
-    Place::Stored,
+const PLACES: [EditTarget; 15] = [
+    EditTarget::Parts,
+    EditTarget::Header,
+    EditTarget::Grid,
+    EditTarget::Start,
+    EditTarget::Entry,
+    EditTarget::Placed,
+    EditTarget::Payload,
+    EditTarget::Leaf,
+    EditTarget::Window,
+    EditTarget::End,
+    EditTarget::Metadata,
+    EditTarget::Root,
+    EditTarget::Footer,
+    EditTarget::Frame,
+    EditTarget::Stored,
 ];
 
-/// One change: of the bytes at `at` of the place with this number (counted as the file is written, modulo 256).
+/// One change: of the bytes at `at` of the target with this number (counted as the file is written, modulo 256).
 #[derive(Debug, Clone)]
 pub struct Edit<'a> {
-    place: Place,
+    place: EditTarget,
     number: usize,
     at: usize,
     how: u8,
@@ -69,7 +69,7 @@ pub struct Edit<'a> {
     bytes: &'a [u8],
 }
 
-/// The changes that an input asks for: at most 32, of 6 bytes or more each.
+/// The changes that an input describes: at most 32, of at least 6 bytes each.
 pub fn edits<'a>(input: &mut Input<'a>) -> Vec<Edit<'a>> {
     let mut edits = Vec::new();
     while !input.is_empty() && edits.len() < 32 {
@@ -111,7 +111,7 @@ fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
     bytes.iter_mut().skip(at).zip(value).for_each(|(to, from)| *to = *from);
 }
 
-/// A piece of a file, without what follows from others.
+/// A piece of a file, without values that are computed from other pieces.
 #[derive(Debug, Clone)]
 enum Piece {
     Start(Vec<u8>),
@@ -122,7 +122,7 @@ enum Piece {
     Metadata(Vec<u8>),
 }
 
-/// A sound file in pieces.
+/// A valid file in pieces.
 #[derive(Debug, Clone)]
 pub struct Seed {
     header: Vec<u8>,
@@ -130,7 +130,7 @@ pub struct Seed {
 }
 
 impl Seed {
-    /// Takes a file apart, which must be sound and without times.
+    /// Takes apart a file, which must be valid and without times.
     pub fn new(file: &[u8]) -> Self {
         let reader = Reader::open(file).expect("a sound seed");
         let leaves = (0..reader.metadata().windows.len() as u32).flat_map(|window| reader.leaves(window));
@@ -159,11 +159,11 @@ impl Seed {
         Self { header: file[..HEADER - 8].to_vec(), pieces }
     }
 
-    /// The file with changes.
+    /// The file with the changes.
     pub fn forge(&self, edits: &[Edit<'_>]) -> Vec<u8> {
         let mut forge = Forge { edits, ..Forge::default() };
         let mut header = self.header.clone();
-        forge.edit(Place::Header, &mut header);
+        forge.edit(EditTarget::Header, &mut header);
         header.resize(HEADER - 8, 0);
         forge.id.copy_from_slice(&header[32..48]);
         header.extend(xxh3_64(&header).to_le_bytes());
@@ -173,41 +173,44 @@ impl Seed {
     }
 }
 
-/// A file that is being put together.
+/// A file that is being reassembled.
 #[derive(Default)]
 struct Forge<'a> {
     edits: &'a [Edit<'a>],
-    /// How many of each place there were.
+    /// How many of each target occurred.
     counts: [usize; PLACES.len()],
     id: [u8; 16],
     out: Vec<u8>,
-    /// The leaf's entries so far, and where its first block is.
+    /// The leaf's entries so far, and the offset of its first block.
     entries: Vec<Vec<u8>>,
     data_offset: u64,
     /// The root so far, and the blocks of all leaves.
     root: Vec<u8>,
     blocks: u64,
-    /// Codes and outliers of the window.
+    /// Numbers of codes and outliers in the window.
     coded: u64,
     outliers: u64,
-    /// The window's number, and how it begins: as it was, and as it is now.
+    /// The window's number and record, before and after the changes.
     number: [u8; 4],
     begun: [Vec<u8>; 2],
-    /// Each window as it was, and as it is now.
+    /// Each window before and after the changes.
     windows: Vec<(Vec<u8>, Vec<u8>)>,
     /// Offset, lengths and checksum, as in a footer.
     metadata: Vec<u8>,
 }
 
 impl<'a> Forge<'a> {
-    fn changes(&mut self, place: Place) -> impl Iterator<Item = &'a Edit<'a>> + use<'a> {
+    fn changes(&mut self, place: EditTarget) -> impl Iterator<Item = &'a Edit<'a>> + use<'a> {
         let (edits, number) = (self.edits, self.counts[place as usize] % 256);
         self.counts[place as usize] += 1;
-        let alone = matches!(place, Place::Header | Place::Grid | Place::Start | Place::Metadata | Place::Footer);
+        let alone = matches!(
+            place,
+            EditTarget::Header | EditTarget::Grid | EditTarget::Start | EditTarget::Metadata | EditTarget::Footer
+        );
         edits.iter().filter(move |edit| edit.place == place && (alone || edit.number == number))
     }
 
-    fn edit(&mut self, place: Place, bytes: &mut Vec<u8>) {
+    fn edit(&mut self, place: EditTarget, bytes: &mut Vec<u8>) {
         self.changes(place).for_each(|edit| edit.apply(bytes));
     }
 
@@ -215,7 +218,7 @@ impl<'a> Forge<'a> {
         match piece.clone() {
             Piece::Start(mut start) => {
                 self.grid(&mut start);
-                self.edit(Place::Start, &mut start);
+                self.edit(EditTarget::Start, &mut start);
                 self.section(b"STRT", &[0; 10], [20, 0], &start, start.len());
             }
             Piece::Block { entry, parts } => self.block(entry, parts),
@@ -229,12 +232,12 @@ impl<'a> Forge<'a> {
     /// Changes to what start and metadata have alike are the same in both.
     fn grid(&mut self, record: &mut Vec<u8>) {
         let mut grid: Vec<u8> = record.drain(..82.min(record.len())).collect();
-        self.edit(Place::Grid, &mut grid);
+        self.edit(EditTarget::Grid, &mut grid);
         record.splice(..0, grid);
     }
 
     fn block(&mut self, mut entry: Vec<u8>, mut parts: Vec<Vec<u8>>) {
-        for Edit { at, how, .. } in self.changes(Place::Parts) {
+        for Edit { at, how, .. } in self.changes(EditTarget::Parts) {
             let part = at % parts.len().max(1);
             let place = ENTRY + PART * part;
             if parts.is_empty() {
@@ -249,15 +252,15 @@ impl<'a> Forge<'a> {
             }
             put(&mut entry, 10, &(parts.len() as u16).to_le_bytes());
         }
-        self.edit(Place::Entry, &mut entry);
+        self.edit(EditTarget::Entry, &mut entry);
         entry.resize(entry.len().max(ENTRY), 0);
         self.pad();
         let mut offset = (self.out.len() + FRAME + entry.len()) as u64;
         let mut all = Vec::new();
         for (number, mut payload) in parts.into_iter().enumerate() {
-            self.edit(Place::Payload, &mut payload);
+            self.edit(EditTarget::Payload, &mut payload);
             let mut stored = compress(&payload);
-            self.edit(Place::Stored, &mut stored);
+            self.edit(EditTarget::Stored, &mut stored);
             let place = ENTRY + PART * number;
             let kind = entry.get(place..place + 2).map_or([0; 2], |kind| [kind[0], kind[1]]);
             let checksum = self.checksum(&entry[..10], kind, &stored);
@@ -268,7 +271,7 @@ impl<'a> Forge<'a> {
             offset += stored.len() as u64;
             all.extend(stored);
         }
-        self.edit(Place::Placed, &mut entry);
+        self.edit(EditTarget::Placed, &mut entry);
         entry.resize(entry.len().max(ENTRY), 0);
         if self.entries.is_empty() {
             self.data_offset = self.out.len() as u64;
@@ -282,7 +285,7 @@ impl<'a> Forge<'a> {
     fn leaf(&mut self) {
         let entries = std::mem::take(&mut self.entries);
         let mut raw = entries.concat();
-        self.edit(Place::Leaf, &mut raw);
+        self.edit(EditTarget::Leaf, &mut raw);
         let stored = compress(&raw);
         let first = entries.first().map_or(vec![0; 10], |entry| entry[..10].to_vec());
         let place = self.section(b"LEAF", &first, [17, 0], &stored, raw.len());
@@ -291,7 +294,7 @@ impl<'a> Forge<'a> {
         leaf.extend(&place[..8]);
         leaf.extend(&place[16..]);
         self.sums(&entries, &mut leaf);
-        self.edit(Place::Root, &mut leaf);
+        self.edit(EditTarget::Root, &mut leaf);
         self.blocks += entries.len() as u64;
         self.root.extend(leaf);
     }
@@ -325,7 +328,7 @@ impl<'a> Forge<'a> {
     fn window(&mut self, mut record: Vec<u8>) {
         let begins = |record: &[u8]| record[4..record.len() - SUMS - 8].to_vec(); // there are no times
         let before = begins(&record);
-        self.edit(Place::Window, &mut record);
+        self.edit(EditTarget::Window, &mut record);
         record.resize(record.len().max(4 + SUMS + 8), 0);
         self.begun = [before, begins(&record)];
         self.number.copy_from_slice(&record[..4]);
@@ -338,7 +341,7 @@ impl<'a> Forge<'a> {
         put(&mut record, 4 + SUMS - 16, &self.coded.to_le_bytes());
         put(&mut record, 4 + SUMS - 8, &self.outliers.to_le_bytes());
         (self.coded, self.outliers) = (0, 0);
-        self.edit(Place::End, &mut record);
+        self.edit(EditTarget::End, &mut record);
         record.resize(record.len().max(4), 0);
         let [begun, begins] = std::mem::take(&mut self.begun);
         self.windows.push(([begun, before].concat(), [&begins[..], &record[4..]].concat()));
@@ -355,7 +358,7 @@ impl<'a> Forge<'a> {
             record.splice(at..at + before.len(), now);
         }
         self.grid(&mut record);
-        self.edit(Place::Metadata, &mut record);
+        self.edit(EditTarget::Metadata, &mut record);
         self.metadata = self.section(b"META", &[0; 10], [18, 0], &record, record.len());
     }
 
@@ -369,7 +372,7 @@ impl<'a> Forge<'a> {
         footer.extend(self.blocks.to_le_bytes());
         footer.extend(((raw.len() / HEADER) as u64).to_le_bytes());
         footer.resize(112, 0);
-        self.edit(Place::Footer, &mut footer);
+        self.edit(EditTarget::Footer, &mut footer);
         footer.resize(112, 0);
         footer.extend(xxh3_64(&footer).to_le_bytes());
         self.out.extend(footer);
@@ -383,7 +386,7 @@ impl<'a> Forge<'a> {
         let lengths = [stored.len() as u32, raw as u32].map(u32::to_le_bytes).concat();
         let checksum = self.checksum(id, kind, stored).to_le_bytes();
         let mut frame = [&tag[..], &lengths, &[0; 4], &checksum].concat();
-        self.edit(Place::Frame, &mut frame);
+        self.edit(EditTarget::Frame, &mut frame);
         let offset = (self.out.len() as u64).to_le_bytes();
         self.out.extend(frame);
         self.out.extend(stored);

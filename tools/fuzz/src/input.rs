@@ -1,21 +1,21 @@
-//! The bytes of a fuzzer, taken one thing after another; zeros once they are used up.
+//! Reads values from the bytes of a fuzzer; zeros after the end.
 
-/// What is left of an input.
+/// The rest of an input.
 #[derive(Debug, Clone)]
 pub struct Input<'a>(&'a [u8]);
 
 impl<'a> Input<'a> {
-    /// All of it.
+    /// The whole input.
     pub fn new(data: &'a [u8]) -> Self {
         Self(data)
     }
 
-    /// What was not taken.
+    /// The bytes that were not read.
     pub fn rest(&self) -> &'a [u8] {
         self.0
     }
 
-    /// Whether all was taken.
+    /// Whether all bytes were read.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -42,7 +42,7 @@ impl<'a> Input<'a> {
         usize::from(self.byte()) % limit
     }
 
-    /// One of some things.
+    /// One of several values.
     pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {
         of[self.below(of.len())]
     }

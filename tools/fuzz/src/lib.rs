@@ -1,7 +1,7 @@
-//! Fuzz targets: each takes any bytes and panics only where wavesplat is wrong.
+//! Fuzz targets: each takes any bytes and panics only if wavesplat has a bug.
 //!
-//! Here is no fuzzer. `fuzz_targets/` gives these functions to libFuzzer, and `tools/tests/fuzz.rs` includes this file and
-//! gives them what fuzzers found, on any toolchain.
+//! This file contains no fuzzer. `fuzz_targets/` passes these functions to libFuzzer. `tools/tests/fuzz.rs` includes
+//! this file and runs them on the corpus and regressions, on any toolchain.
 #![forbid(unsafe_code)]
 
 pub mod files;
@@ -16,7 +16,7 @@ pub mod values;
 /// A target.
 pub type Target = fn(&[u8]);
 
-/// Every target by its name, which is also that of its folder in `corpus/` and `regressions/`.
+/// Every target by name; its folders in `corpus/` and `regressions/` have the same name.
 pub const TARGETS: [(&str, Target); 13] = [
     ("file", files::file),
     ("metadata", files::metadata),

@@ -1,4 +1,4 @@
-//! What is inside a part once it is decompressed: what unpacks packs to the same bytes, what is packed unpacks.
+//! Targets for payloads: those that unpack must pack to the same bytes, and packed values must unpack.
 
 use super::input::Input;
 use wavesplat_format::*;
@@ -73,7 +73,7 @@ fn nonzero(codes: &[i32]) -> usize {
     codes.iter().filter(|&&code| code != 0).count()
 }
 
-/// Most codes are small: a byte each, but 128, after which four bytes are one.
+/// Most codes are small: one byte each. After a byte 128, four bytes are one code.
 fn numbers(data: &[u8]) -> Vec<i32> {
     let (mut input, mut codes) = (Input::new(data), Vec::new());
     while !input.is_empty() {

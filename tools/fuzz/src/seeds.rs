@@ -1,4 +1,4 @@
-//! Small sound files that are changed and damaged, one of each way in which blocks are coded.
+//! Small valid files to change and damage, one for each way of coding blocks.
 
 use super::forge::Seed;
 use std::sync::OnceLock;

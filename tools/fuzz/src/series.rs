@@ -1,4 +1,4 @@
-//! There and back: any samples, converted and decoded, keep what was promised.
+//! Round trips: any samples, converted and decoded, keep their error bound.
 
 use super::files::{read_all, with_file};
 use super::input::Input;
@@ -16,7 +16,7 @@ use wavesplat::file::verify::verify;
 use wavesplat::source::{FrameSource, OpenOptions, open_stream};
 use wavesplat::wavelet::Basis;
 
-/// What rounding may add to a sum or a product of the checks here.
+/// Upper bound on the rounding of a sum or a product in the checks here.
 const UP: f64 = 1.0 + 1e-9;
 const MEMORY: usize = 1 << 30;
 
@@ -51,7 +51,7 @@ impl Case {
         open_stream(Cursor::new(self.bytes.clone()), &options).expect("samples of these frames")
     }
 
-    /// The file of them, unless they cannot be converted so.
+    /// The file of the frames, unless they cannot be converted with these settings.
     pub fn convert(&self) -> Option<Vec<u8>> {
         let mut file = Vec::new();
         convert(&mut *self.source(), &self.config, Path::new("-"), &mut file, &Silent).ok()?;
@@ -84,7 +84,7 @@ fn config(input: &mut Input<'_>) -> ConvertConfig {
     }
 }
 
-/// Samples from the bits of an input, which are repeated, or smooth ones with some of these in between.
+/// Samples made of the bits of an input, repeated, or smooth samples with some of these in between.
 fn samples(input: &mut Input<'_>, sample: SampleType, count: usize) -> Vec<u8> {
     let (smooth, scale) = (input.below(3), input.pick(&[1.0, 100.0, 1e-30, 1e30]));
     let bits = if input.rest().is_empty() { &[0] } else { input.rest() };
@@ -101,7 +101,7 @@ fn samples(input: &mut Input<'_>, sample: SampleType, count: usize) -> Vec<u8> {
     bytes
 }
 
-/// Samples, converted and decoded. A tolerance of 0 keeps every bit, missing samples keep theirs always.
+/// Converts and decodes samples. A tolerance of 0 keeps every bit, and missing samples always keep theirs.
 pub fn roundtrip(data: &[u8]) {
     let case = Case::new(&mut Input::new(data));
     let Some(file) = case.convert() else { return };
@@ -146,7 +146,7 @@ fn check(case: &Case, file: &CoefficientFile, path: &Path) {
     }
 }
 
-/// Whether a series of given and decoded samples keeps its promise.
+/// Whether a series of source and decoded samples keeps its bound.
 fn keeps(config: &ConvertConfig, delta: f64, pairs: &[(f64, f64)], frames: usize) {
     let error = |(value, found): (f64, f64)| (value - found).abs();
     let worst = pairs.iter().map(|pair| error(*pair)).fold(0.0, f64::max);
@@ -157,7 +157,7 @@ fn keeps(config: &ConvertConfig, delta: f64, pairs: &[(f64, f64)], frames: usize
             assert!(pairs.iter().all(within), "{pairs:?}: {config:?}");
         }
         Bound::Rms | Bound::Sampled { .. } => {
-            // In units of the worst, as squares leave the range of numbers.
+            // In units of the largest error, because squares could overflow.
             let squares: f64 = pairs.iter().map(|pair| (error(*pair) / worst.max(f64::MIN_POSITIVE)).powi(2)).sum();
             let rms = worst * (squares / frames as f64).sqrt();
             assert!(rms <= delta * UP, "{rms} of {delta}: {config:?}");

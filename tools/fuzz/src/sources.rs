@@ -1,4 +1,4 @@
-//! Frames as others wrote them: streams and files.
+//! Frames written by other programs: streams and files.
 
 use super::input::Input;
 use std::io::Cursor;
@@ -7,10 +7,10 @@ use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::{SampleType, swap_endian};
 use wavesplat::source::{FrameSource, OpenOptions, open, open_stream};
 
-/// Bytes of a frame that are read; larger ones are opened only.
+/// Largest frame in bytes that is read; larger ones are only opened.
 const MOST: usize = 1 << 20;
 
-/// A stream: an `.npy`, or headerless samples. What is read is what is in it.
+/// A stream: an `.npy`, or headerless samples. The samples read must be those in the stream.
 pub fn stream(data: &[u8]) {
     let mut input = Input::new(data);
     let flags = input.byte();
@@ -39,7 +39,7 @@ fn headerless(input: &mut Input<'_>, options: &mut OpenOptions) {
     options.offset = input.byte().into();
 }
 
-/// By the first sign of a byte order, which the type is said with.
+/// Finds the byte order by its first mark before the type.
 fn npy_is_big_endian(bytes: &[u8]) -> bool {
     bytes.iter().find(|byte| b"<>|=".contains(byte)) == Some(&b'>')
 }
@@ -72,7 +72,7 @@ fn read(source: &mut dyn FrameSource) -> Option<Vec<u8>> {
     Some(found)
 }
 
-/// Names of input files; more come after these, which the corpus says by their number.
+/// Names of input files. The corpus refers to them by number, so new names are only appended.
 const NAMES: [&str; 15] = [
     "a.nrrd",
     "a.nhdr",
@@ -91,7 +91,7 @@ const NAMES: [&str; 15] = [
     "a.h5",
 ];
 
-/// An input file by its name, beside another with a little data.
+/// Writes an input file under its name, beside another with some data.
 pub fn inputs(data: &[u8]) {
     let mut input = Input::new(data);
     let name = input.pick(&NAMES);

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use wavesplat::base::grid::Grid;
 use wavesplat::cli::{Dims, FrameList, FrameRange, Pair, RegionSpec, Size, Triple, Whole};
 
-/// Text as every kind of value, for an archive of at most 999 frames and 256 voxels along an axis.
+/// Parses text as every kind of value, for an archive of at most 999 frames and 256 voxels along an axis.
 pub fn values(data: &[u8]) {
     let mut input = Input::new(data);
     let (frames, dims) = (1 + input.short() % 999, [(); 3].map(|()| 1 + usize::from(input.byte())));
@@ -38,7 +38,7 @@ pub fn values(data: &[u8]) {
     let _ = text.parse::<Triple>().map(|triple| finite(&triple.0));
 }
 
-/// The value, which its own words give again.
+/// The value, which must parse again from its own text.
 fn reads_back<T: FromStr + Display + PartialEq + Debug>(text: &str) -> Option<T> {
     let value: T = text.parse().ok()?;
     assert_eq!(value.to_string().parse().ok().as_ref(), Some(&value), "{text:?}");

@@ -1,7 +1,8 @@
 //! Finished points on disk, one JSON object a line after a line of settings: an interrupted run goes on where it was.
 
+use super::json::bad_json;
 use super::point::Point;
-use super::{Settings, bad_json};
+use super::settings::Settings;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::{self, File};

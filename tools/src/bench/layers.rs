@@ -1,10 +1,11 @@
 //! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
 
-use super::look::{Look, SIGMA};
-use super::machine::Made;
+use super::camera::{CameraSettings, SIGMA};
+use super::json::bad_json;
+use super::machine::Provenance;
+use super::process::{ProcessTask, in_process};
 use super::size::Data;
 use super::stages::MEMORY;
-use super::step::{Outcome, Step, in_process};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
@@ -51,7 +52,7 @@ pub struct Config {
 pub struct Results {
     /// By what, where and when.
     #[serde(flatten)]
-    pub made: Made,
+    pub made: Provenance,
     /// What was measured.
     pub data: Vec<Data>,
     /// Every archive at every tolerance by both measures, after the whole file.
@@ -81,7 +82,7 @@ pub struct Row {
     pub rms: f64,
 }
 
-/// One archive, measured in a process of its own.
+/// The settings of one archive's measurement, which runs in its own process.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Task {
     name: String,
@@ -105,21 +106,29 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
         let (tolerances, file) = (config.tolerances.clone(), file.clone());
         let (name, source, dims, frames, range) = (one.name.clone(), one.path.clone(), one.dims, one.frames, one.range);
         let task = Task { name, source, dims, frames, range, tolerances, file };
-        let outcome: Outcome<Vec<Row>> = in_process(&config.program, &Step::Layers(task))?;
-        rows.extend(outcome.did);
+        rows.extend(in_process(&config.program, &task)?.measured);
     }
-    let results = Results { made: Made::here(SCHEMA, config.date.as_ref()), data, rows };
+    let results = Results { made: Provenance::here(SCHEMA, config.date.as_ref()), data, rows };
     let text = markdown(&results);
     let json = config.output.join("layers.json");
-    let numbers = serde_json::to_string_pretty(&results).map_err(|e| super::bad_json(&json, &e))?;
+    let numbers = serde_json::to_string_pretty(&results).map_err(|e| bad_json(&json, &e))?;
     for (path, text) in [(json, &numbers), (config.output.join("layers.md"), &text)] {
         fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
     }
     Ok((results, text))
 }
 
+impl ProcessTask for Task {
+    const NAME: &'static str = "layers";
+    type Measured = Vec<Row>;
+
+    fn measure(&self) -> Result<Vec<Row>> {
+        measure(self)
+    }
+}
+
 /// Converts and renders in this process.
-pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
+fn measure(task: &Task) -> Result<Vec<Row>> {
     let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
     let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
     let settings =
@@ -145,7 +154,7 @@ pub(super) fn measure(task: &Task) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// All pictures of a view, and the report of the fastest time; the truth is rendered once.
+/// Renders all pictures of a view. Returns them and the report of the fastest run; the reference is rendered once.
 fn pictures(
     scene: &mut dyn Scene,
     task: &Task,
@@ -153,7 +162,7 @@ fn pictures(
     allowed: Option<(f64, Limit)>,
 ) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        views: vec![Look::first(task.dims, SIZE).view()],
+        views: vec![CameraSettings::first(task.dims, SIZE).view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: (0..task.frames).collect(),
@@ -202,10 +211,10 @@ fn row(
 }
 
 const HEAD: &str = "\
-Files keep every sample within 1e-3 of the value range. *Tolerance* is a share of that range, too; all errors are shares
-of the largest absolute pixel, against pictures of the archive by the exact method: *certified* no pixel is further off
-(but for what the splat adds, 1e-5 of the range), *expected* is an estimate of *rms*, which is the true root mean square
-over all pixels and frames. Codes, bytes and time are shares of what the whole file takes.
+Files keep every sample within 1e-3 of the value range. *Tolerance* is a share of that range, too. All errors are shares
+of the largest absolute pixel, relative to pictures of the archive by the exact method. No pixel's error exceeds *certified*
+(plus the splat error, 1e-5 of the range). *Expected* is an estimate of *rms*, the true root mean square over all pixels and
+frames. Codes, bytes and time are shares of those for the whole file.
 ";
 
 const TITLES: &str = "\
@@ -214,10 +223,10 @@ const TITLES: &str = "\
 ";
 
 fn markdown(results: &Results) -> String {
-    let Made { machine, version, date, .. } = &results.made;
+    let Provenance { machine, version, date, .. } = &results.made;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let made = format!("wavesplat {version}, {} threads of {cpu}, {}, {date}", machine.cores, machine.system);
-    let mut text = format!("# What a looser tolerance leaves unread\n\n{made}.\n\n{HEAD}\n{TITLES}");
+    let mut text = format!("# What a looser tolerance skips\n\n{made}.\n\n{HEAD}\n{TITLES}");
     for row in &results.rows {
         let Row { data, limit, codes, bytes, time, certified, expected, largest, rms } = row;
         let limit = limit.as_ref().map_or("whole file".into(), |(t, name)| format!("{t:e} {name}"));

@@ -7,9 +7,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// What times depend on besides the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
-    /// The processor's name, where the system tells.
+    /// The processor's name, if the system reports it.
     pub cpu: Option<String>,
-    /// How many threads may run at once: all stages use as many.
+    /// The number of threads that can run at once; all stages use this number.
     pub cores: usize,
     /// Operating system and architecture.
     pub system: String,
@@ -25,7 +25,7 @@ impl Machine {
 
 /// What stands first in every file of results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Made {
+pub struct Provenance {
     /// The number of the file's layout.
     pub schema: u32,
     /// The version of the tools.
@@ -36,7 +36,7 @@ pub struct Made {
     pub date: String,
 }
 
-impl Made {
+impl Provenance {
     /// Here; by default today.
     pub(super) fn here(schema: u32, date: Option<&String>) -> Self {
         let date = date.cloned().unwrap_or_else(today);

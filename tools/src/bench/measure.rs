@@ -1,12 +1,13 @@
-//! Measures a group: its contenders in turns, and the check of every sample.
+//! Measures a group: runs its contenders in turns, and checks every sample.
 
-use super::look::{Look, compared_frames};
+use super::camera::{CameraSettings, compared_frames};
+use super::json::bad_json;
 use super::plan::{Contender, Group, kind_name};
 use super::point::{Conversion, Point, Rendering, Spread};
-use super::stages::{MEMORY, open_frames};
-use super::step::{Convert, Converted, Outcome, Render, Rendered, Step, Way, in_process};
-use super::truth::Truth;
-use super::{Config, bad_json};
+use super::process::{Outcome, in_process};
+use super::reference::ReferencePixels;
+use super::settings::Config;
+use super::stages::{Convert, Converted, MEMORY, Render, RenderMethod, Rendered, open_frames};
 use crate::output::{Format, Shape, Target};
 use crate::synth::{Kind, Synth};
 use std::fs;
@@ -21,15 +22,15 @@ use wavesplat::file::verify::{Comparison, verify};
 /// What all groups share.
 pub(super) struct Bench<'a> {
     config: &'a Config,
-    look: Look,
+    camera: CameraSettings,
     /// The folder of archives and files; removed at the end.
     work: PathBuf,
-    /// What the archive in the folder shows.
+    /// The kind of the archive in the folder.
     kind: Option<Kind>,
 }
 
-/// A conversion, all times it was run, and what comparing every sample found.
-struct Checked {
+/// A conversion, the results of all its runs, and the comparison of every sample.
+struct CheckedConversion {
     runs: Vec<Outcome<Converted>>,
     found: Comparison,
 }
@@ -39,10 +40,10 @@ impl<'a> Bench<'a> {
         let work = config.output.join("work");
         fs::create_dir_all(&work).map_err(|e| Error::io(&work, "creating the folder", e))?;
         let [nx, ny, nz, _] = config.sweep.dims;
-        Ok(Self { config, look: Look::first([nx, ny, nz], config.sweep.size), work, kind: None })
+        Ok(Self { config, camera: CameraSettings::first([nx, ny, nz], config.sweep.size), work, kind: None })
     }
 
-    /// Removes what only the measurements needed.
+    /// Removes the files that only the measurements needed.
     pub(super) fn finish(self) -> Result<()> {
         fs::remove_dir_all(&self.work).map_err(|e| Error::io(&self.work, "removing", e))
     }
@@ -68,7 +69,7 @@ impl<'a> Bench<'a> {
         self.work.join(format!("{contender}.wspl"))
     }
 
-    /// Writes the archive and the truth of a kind, unless they are there.
+    /// Writes the archive and the reference of a kind, unless they exist.
     fn prepare(&mut self, kind: Kind) -> Result<()> {
         if self.kind == Some(kind) {
             return Ok(());
@@ -82,14 +83,14 @@ impl<'a> Bench<'a> {
         })?;
         let compared = compared_frames(Contender::Shared.frames(frames));
         let compared: Vec<(usize, Vec<f64>)> = compared.into_iter().map(|f| (f, frame(&synth, f))).collect();
-        let truth = Truth::new(synth.shape.dims, &self.look, &compared, range.1 - range.0);
+        let truth = ReferencePixels::new(synth.shape.dims, &self.camera, &compared, range.1 - range.0);
         write_json(&self.truth(), &truth)?;
         self.kind = Some(kind);
         Ok(())
     }
 
     /// Runs all conversions in turns, then compares every sample of each.
-    fn convert(&self, group: &Group) -> Result<Vec<Option<Checked>>> {
+    fn convert(&self, group: &Group) -> Result<Vec<Option<CheckedConversion>>> {
         let steps: Vec<Option<Convert>> =
             group.contenders.iter().enumerate().map(|(i, c)| self.conversion(group, i, c)).collect();
         let mut runs: Vec<Vec<Outcome<Converted>>> = steps.iter().map(|_| Vec::new()).collect();
@@ -97,11 +98,12 @@ impl<'a> Bench<'a> {
         for round in 0..repeats {
             for ((step, contender), runs) in steps.iter().zip(&group.contenders).zip(&mut runs) {
                 if let Some(step) = step.as_ref().filter(|_| round < contender.rounds(repeats)) {
-                    runs.push(in_process(&self.config.program, &Step::Convert(step.clone()))?);
+                    runs.push(in_process(&self.config.program, step)?);
                 }
             }
         }
-        let check = |(step, runs): (Option<Convert>, _)| step.map(|s| Ok(Checked { runs, found: compare(&s)? }));
+        let check =
+            |(step, runs): (Option<Convert>, _)| step.map(|s| Ok(CheckedConversion { runs, found: compare(&s)? }));
         steps.into_iter().zip(runs).map(|pair| check(pair).transpose()).collect()
     }
 
@@ -125,7 +127,7 @@ impl<'a> Bench<'a> {
             for ((number, contender), runs) in group.contenders.iter().enumerate().zip(&mut runs) {
                 if round < contender.rounds(repeats) {
                     let step = Render { certify: round == 0, ..self.rendering(group, number, contender) };
-                    runs.push(in_process(&self.config.program, &Step::Render(step))?);
+                    runs.push(in_process(&self.config.program, &step)?);
                 }
             }
         }
@@ -134,16 +136,16 @@ impl<'a> Bench<'a> {
 
     fn rendering(&self, group: &Group, number: usize, contender: &Contender) -> Render {
         let (input, way) = match contender {
-            Contender::Coefficients(..) => (self.file(number), Way::Coefficients),
-            Contender::Shared => (self.frames(), Way::Shared),
-            Contender::Textbook(radius) => (self.frames(), Way::Textbook(*radius)),
+            Contender::Coefficients(..) => (self.file(number), RenderMethod::Coefficients),
+            Contender::Shared => (self.frames(), RenderMethod::Shared),
+            Contender::Textbook(radius) => (self.frames(), RenderMethod::Textbook(*radius)),
         };
         let frames = contender.frames(self.config.sweep.dims[3]);
         Render {
             input,
             way,
             frames,
-            look: self.look,
+            camera: self.camera,
             splat_error: group.splat_error,
             truth: self.truth(),
             certify: false,
@@ -155,7 +157,7 @@ impl<'a> Bench<'a> {
         group: &Group,
         contender: &Contender,
         key: String,
-        converted: Option<&Checked>,
+        converted: Option<&CheckedConversion>,
         rendered: &[Outcome<Rendered>],
     ) -> Point {
         let frames = contender.frames(self.config.sweep.dims[3]);
@@ -176,15 +178,15 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// What no sample's error may exceed, as a share of the value range.
+/// The largest error that a sample may have, as a share of the value range.
 fn promised(contender: &Contender, conversion: &Conversion) -> Option<f64> {
     let Contender::Coefficients(basis, bound) = contender else { return Some(0.0) };
     (bound.worst)(basis.window as f64).map(|worst| worst * conversion.promised)
 }
 
-fn conversion(checked: &Checked, frames: usize) -> Conversion {
-    let (run, found) = (&checked.runs[0].did, &checked.found);
-    let seconds = Spread::of(checked.runs.iter().map(|r| r.did.seconds).collect());
+fn conversion(checked: &CheckedConversion, frames: usize) -> Conversion {
+    let (run, found) = (&checked.runs[0].measured, &checked.found);
+    let seconds = Spread::of(checked.runs.iter().map(|r| r.measured.seconds).collect());
     Conversion {
         megabytes_per_second: run.input_bytes as f64 / 1e6 / seconds.median,
         seconds,
@@ -203,14 +205,14 @@ fn conversion(checked: &Checked, frames: usize) -> Conversion {
     }
 }
 
-/// The share of the largest sum of weights that a pixel has at least, or it is background.
+/// The smallest share of the largest sum of weights with which a pixel is not background.
 const LEAST_WEIGHT: f64 = 0.01;
 
-/// `voxel` is what no sample's error may exceed, if anything.
+/// `voxel` is the largest error that a sample may have, if there is a bound.
 fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> Rendering {
-    let spread = |seconds: fn(&Rendered) -> f64| Spread::of(runs.iter().map(|r| seconds(&r.did)).collect());
+    let spread = |seconds: fn(&Rendered) -> f64| Spread::of(runs.iter().map(|r| seconds(&r.measured)).collect());
     let further_view = spread(|r| r.further_seconds);
-    let run = &runs[0].did;
+    let run = &runs[0].measured;
     Rendering {
         first_view: spread(|r| r.first_seconds),
         milliseconds_per_frame: 1e3 * further_view.median / frames as f64,
@@ -230,7 +232,7 @@ fn most<T>(runs: &[Outcome<T>]) -> Option<u64> {
     runs.iter().filter_map(|r| r.peak_bytes).max()
 }
 
-/// Every sample of a file against its source.
+/// Compares every sample of a file with its source.
 fn compare(step: &Convert) -> Result<Comparison> {
     let file = CoefficientFile::open(&step.output, Access::Map)?;
     let mut frames = open_frames(&step.frames, step.count)?;

@@ -1,112 +1,67 @@
-//! The benchmark: what a picture costs in time at which error, beside the conventional method.
+//! The benchmark: time and error of pictures, compared with the conventional method.
 //!
 //! ```text
-//! plan      which groups of contenders are measured side by side
-//! look      from where pictures are taken, and which of their pixels are compared
-//! truth     those pixels by brute force
-//! step      one measured stage in a process of its own: conversion, or rendering of two views
-//!   stages    ... by the library: conversion, coefficients, the conventional method with shared footprints
-//!   textbook  ... the conventional method's textbook form
-//! measure   a group: stages in turns (A B A B ...), and the check of every sample
-//! point     what is recorded
-//! journal   finished points on disk, so that a run can be interrupted
-//! sanity    what must hold of every point, on any machine
-//! machine   where it ran, and when
-//! report    results.json and results.md;  plot, chart: the figures
-//! size      another benchmark: sizes under a hard bound, and times, beside other coders
-//! layers    another: what a looser tolerance of a picture leaves unread, and the errors
-//! speed     another: views from files beside the conventional method, and what they are to reach
+//! chart      figures with logarithmic axes
+//! json       errors of JSON
+//! machine    where and when a run took place
+//! plan       the groups of contenders that are measured together
+//! camera     the views, and the pixels and frames that are compared with the reference
+//! settings   the settings of a run
+//! reference  the compared pixels by brute force
+//! textbook   the textbook form of the conventional method
+//! point      the recorded measurements
+//! journal    finished points on disk, so that a run can be interrupted
+//! sanity     what must hold of every point, on any machine
+//! process    runs a measurement in its own process
+//! stages     the measured stages: conversion, and rendering of two views
+//! measure    measures a group: stages in turns (A B A B ...), and the check of every sample
+//! report     results.json and results.md
+//! plot       the figures
+//! size       another benchmark: sizes under a hard bound, and times, compared with other coders
+//! layers     another: the bytes that a looser tolerance of a picture skips, and the errors
+//! speed      another: views from files compared with the conventional method, and the targets
+//! step       the command `bench-step`
 //! ```
+//!
+//! The modules are listed in the order of their layers: each uses only earlier ones (`tests/layering.rs`).
 //!
 //! Errors are shares of the archive's value range throughout.
 
 mod chart;
-mod journal;
-pub mod layers;
-mod look;
+mod json;
 mod machine;
-mod measure;
 pub mod plan;
-mod plot;
-pub mod point;
-mod report;
-pub mod sanity;
-pub mod size;
-pub mod speed;
-mod stages;
-mod step;
+mod camera;
+mod settings;
+mod reference;
 mod textbook;
-mod truth;
+pub mod point;
+mod journal;
+pub mod sanity;
+mod process;
+mod stages;
+mod measure;
+mod report;
+mod plot;
+pub mod size;
+pub mod layers;
+pub mod speed;
+mod step;
 
+pub use settings::{Config, SCHEMA, Settings};
 pub use step::run_step;
 
 use journal::Journal;
-use machine::Machine;
 use measure::Bench;
-use plan::Sweep;
 use point::Results;
-use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 
-/// The number of the layout of `results.json` and `points.jsonl`; a change of a key's meaning changes it.
-pub const SCHEMA: u32 = 1;
-
-/// What to measure, with what, and where results go.
-#[derive(Debug, Clone)]
-pub struct Config {
-    /// What to measure.
-    pub sweep: Sweep,
-    /// The folder of results.
-    pub output: PathBuf,
-    /// `wavesplat-tools` itself, whose `bench-step` runs the stages.
-    pub program: PathBuf,
-    /// Begin anew where there are results already.
-    pub force: bool,
-    /// The day to write into the results; by default that of the clock.
-    pub date: Option<String>,
-}
-
-/// What all points of a run share: a run goes on only with the same.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// Voxels along x, y, z and the number of frames.
-    pub dims: [usize; 4],
-    /// Pixels a side of a picture.
-    pub size: usize,
-    /// How often every time is taken.
-    pub repeats: usize,
-    /// The version of the tools.
-    pub version: String,
-    /// A digest of the program.
-    pub build: String,
-    /// Where it ran.
-    pub machine: Machine,
-}
-
-impl Settings {
-    fn of(config: &Config) -> Result<Self> {
-        let program = std::fs::read(&config.program).map_err(|e| Error::io(&config.program, "reading", e))?;
-        Ok(Self {
-            schema: SCHEMA,
-            dims: config.sweep.dims,
-            size: config.sweep.size,
-            repeats: config.sweep.repeats,
-            version: env!("CARGO_PKG_VERSION").into(),
-            build: format!("{:016x}", xxhash_rust::xxh3::xxh3_64(&program)),
-            machine: Machine::this(),
-        })
-    }
-}
-
-/// Measures what is not measured yet and writes all results; `say` hears what is going on.
+/// Measures the points that are not measured yet and writes all results. Reports progress through `say`.
 pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<Results> {
     config.sweep.check()?;
     std::fs::create_dir_all(&config.output).map_err(|e| Error::io(&config.output, "creating the folder", e))?;
-    let settings = Settings::of(config)?;
+    let settings = Settings::new(config)?;
     let mut journal = Journal::open(&config.output, &settings, config.force)?;
     let groups = config.sweep.groups();
     let mut bench = Bench::new(config)?;
@@ -127,9 +82,4 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<Results> {
     report::write(&results, &config.output)?;
     plot::write(&results, &config.output)?;
     Ok(results)
-}
-
-/// What serde found, as an error about a file.
-fn bad_json(path: &std::path::Path, error: &serde_json::Error) -> Error {
-    Error::input(path, error.to_string())
 }

@@ -1,14 +1,14 @@
-//! What the figures show.
+//! The content of the figures.
 
-use super::Settings;
 use super::chart::{Curve, Figure, Line, Marker, Panel, draw};
 use super::plan::{BASES, BOUNDS, BasisRow, BoundRow};
 use super::point::{Conversion, Point, Results};
 use super::report::kinds;
+use super::settings::Settings;
 use std::path::Path;
 use wavesplat::base::error::Result;
 
-/// Colours that are told apart by everyone (Okabe & Ito, 2008).
+/// Colours that people with colour blindness can distinguish (Okabe & Ito, 2008).
 const BLUE: (u8, u8, u8) = (0, 114, 178);
 const ORANGE: (u8, u8, u8) = (213, 94, 0);
 const GREEN: (u8, u8, u8) = (0, 158, 115);
@@ -90,7 +90,7 @@ fn conversion(results: &Results) -> Figure {
     }
 }
 
-/// What was measured where.
+/// A note on the archive and the machine.
 fn note(settings: &Settings, pictures: bool) -> String {
     let Settings { dims: [x, y, z, frames], size, machine, .. } = settings;
     let pictures = if pictures { format!("pictures of {size}x{size} pixels, ") } else { String::new() };
@@ -102,7 +102,7 @@ fn panels(points: &[Point], curves: impl Fn(&str) -> Vec<Curve>) -> Vec<Panel> {
     kinds(points).into_iter().map(|kind| Panel { title: title(kind), curves: curves(kind) }).collect()
 }
 
-/// What a kind shows, for those who have not met it.
+/// A description of each kind of archive.
 fn title(kind: &str) -> String {
     let shows = match kind {
         "smooth" => "slow diffusion",

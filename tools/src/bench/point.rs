@@ -1,7 +1,7 @@
 //! What is recorded.
 
-use super::Settings;
-use super::truth::ImageError;
+use super::reference::ImageError;
+use super::settings::Settings;
 use serde::{Deserialize, Serialize};
 
 /// All results of a run.
@@ -69,7 +69,7 @@ pub struct Conversion {
     pub share_of_bound: f64,
     /// Series outside the bound.
     pub series_outside: u64,
-    /// The most memory of the process, pages of mapped files included.
+    /// Peak memory of the process, with pages of mapped files.
     pub peak_bytes: Option<u64>,
 }
 
@@ -96,7 +96,7 @@ pub struct Rendering {
     pub certificate_tightness: Option<f64>,
     /// Compared pixels that are further off than certified.
     pub beyond_certificate: usize,
-    /// The most memory of the process, pages of mapped files included.
+    /// Peak memory of the process, with pages of mapped files.
     pub peak_bytes: Option<u64>,
 }
 

@@ -1,20 +1,21 @@
 //! `results.json` for programs, `results.md` for people.
 
+use super::json::bad_json;
 use super::point::{Conversion, Point, Results};
-use super::{Settings, bad_json};
+use super::settings::Settings;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 
 const HEAD: &str = "\
-Every stage ran in a process of its own, the contenders of a group in turns. Errors are shares of the value range.
-Pictures of other bounds than the first are rendered once, for their errors.
+Every stage ran in its own process; the contenders of a group took turns. Errors are shares of the value range.
+Pictures of bounds other than the first are rendered once, for their errors.
 *textbook*: a table of 32 x 32 footprints, one look-up for each voxel and frame. *shared*: the conventional method with
-footprints shared by 32 frames. *first*: from opening the input; *further*: another view. Milliseconds for each frame, the
-median and in brackets the least. Memory is the peak of the process, pages of mapped files included. Image errors are
-against brute force, at every fifth pixel along each axis of four frames of the first view. In the figure of times,
-coefficients run over tolerances with the default splat error, the conventional forms over splat methods.
+footprints shared by 32 frames. *first*: from opening the input; *further*: another view. Times are milliseconds per frame:
+the median and, in brackets, the least. Memory is the peak of the process, with pages of mapped files. Image errors are
+relative to brute force, at every fifth pixel along each axis of four frames of the first view. In the figure of times,
+coefficients vary in tolerance with the default splat error, the conventional forms vary in splat method.
 ";
 
 /// Writes both.
@@ -64,7 +65,7 @@ const RENDER_HEAD: &str = "\
 |---|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
-/// A line for each of some points; `all` holds those they were measured with.
+/// A line for each of these points; `all` holds the points measured together with them.
 fn rows<'a>(points: impl Iterator<Item = &'a Point>, all: &[Point]) -> String {
     points.map(|point| rendered(point, all)).collect()
 }

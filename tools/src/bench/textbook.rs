@@ -5,7 +5,7 @@
 //! Where voxels are in the picture is computed once a view. Voxels of value 0 add nothing and are passed over. All
 //! is f32. Frames are rendered in parallel, each by one thread. There is no attenuation: weights do not depend on depth.
 
-use super::look::{Look, SIGMA};
+use super::camera::{CameraSettings, SIGMA};
 use rayon::prelude::*;
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::Grid;
@@ -21,12 +21,12 @@ const BACKGROUND: f32 = 0.01;
 pub(super) fn render(
     source: &mut dyn FrameSource,
     frames: usize,
-    look: &Look,
+    camera: &CameraSettings,
     radius: f64,
     sink: &mut dyn FnMut(usize, &[f32]),
 ) -> Result<()> {
     let grid = source.archive().grid;
-    let splatter = Splatter::new(&grid, look, radius)?;
+    let splatter = Splatter::new(&grid, camera, radius)?;
     let weights = splatter.splat(&vec![1.0; grid.whole().voxels()]);
     let at_once = rayon::current_num_threads();
     for first in (0..frames).step_by(at_once) {
@@ -52,12 +52,12 @@ const OUTSIDE: u32 = u32::MAX;
 /// All that is the same for every frame of a view.
 struct Splatter {
     table: Table,
-    places: Vec<Place>,
+    places: Vec<FootprintPosition>,
     size: usize,
 }
 
 /// Where a voxel's footprint goes.
-struct Place {
+struct FootprintPosition {
     /// The first pixel of the first row, in a picture with a margin.
     start: u32,
     /// Which of the table's footprints.
@@ -65,19 +65,19 @@ struct Place {
 }
 
 impl Splatter {
-    fn new(grid: &Grid, look: &Look, radius: f64) -> Result<Self> {
-        let (camera, table) = (Camera::new(&look.view(), grid)?, Table::new(SIGMA * look.scale, radius));
-        let width = look.size + table.side;
+    fn new(grid: &Grid, settings: &CameraSettings, radius: f64) -> Result<Self> {
+        let (camera, table) = (Camera::new(&settings.view(), grid)?, Table::new(SIGMA * settings.scale, radius));
+        let width = settings.size + table.side;
         let place = |voxel: [usize; 3]| {
             let [x, y, _] = camera.project(grid.position(voxel));
             let part = |c: f64| ((c - c.floor()) * POSITIONS as f64) as usize;
             // The margin is as wide as a footprint reaches, so that column 0 is where that of pixel 0 begins.
             let start = y.floor() as usize * width + x.floor() as usize;
-            let inside = [x, y].iter().all(|c| (0.0..look.size as f64).contains(c));
+            let inside = [x, y].iter().all(|c| (0.0..settings.size as f64).contains(c));
             let footprint = (part(y) * POSITIONS + part(x)) as u32;
-            Place { start: if inside { start as u32 } else { OUTSIDE }, footprint }
+            FootprintPosition { start: if inside { start as u32 } else { OUTSIDE }, footprint }
         };
-        Ok(Self { places: grid.whole().iter().map(place).collect(), table, size: look.size })
+        Ok(Self { places: grid.whole().iter().map(place).collect(), table, size: settings.size })
     }
 
     /// The sums of value times footprint, in a picture with a margin.
@@ -141,8 +141,8 @@ mod tests {
 
     #[test]
     fn one_voxel_is_a_gaussian_in_the_middle() {
-        let look = Look { azimuth: 0.0, elevation: 0.0, size: 9, scale: 2.0 };
-        let splatter = Splatter::new(&Grid::unit([1; 3]), &look, 2.0).expect("a view");
+        let camera = CameraSettings { azimuth: 0.0, elevation: 0.0, size: 9, scale: 2.0 };
+        let splatter = Splatter::new(&Grid::unit([1; 3]), &camera, 2.0).expect("a view");
         let (reach, width) = (splatter.table.side / 2, 9 + splatter.table.side);
         assert_eq!(reach, 3, "two sigma of one and a half pixels");
         let sums = splatter.splat(&[10.0]);

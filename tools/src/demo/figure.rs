@@ -1,4 +1,4 @@
-//! Figure 5: a row for each method, and a row for what each differs from the first.
+//! Figure 5: a row for each method, and a row for the difference of each from the first.
 
 use super::{Demo, Run};
 use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, titled, with_bar};
@@ -12,7 +12,7 @@ const SHOWN: [usize; 4] = [5, 10, 15, 20];
 const PAPER: Rgb = [40; 3];
 const INK: Rgb = [255; 3];
 
-/// Draws the runs of three channels, of which the first is the truth.
+/// Draws the runs with three channels. The first one is the reference.
 pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Result<()> {
     let means = Scale::new(colours, (0.0, 1.0), Norm::Linear, [0; 3])?;
     let bound = runs.iter().map(Run::bound).fold(0.0, f64::max);
@@ -27,14 +27,14 @@ pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Res
     out.commit()
 }
 
-/// What the bars of the pictures and of the differences say, equally wide.
+/// The labels of the bars of pictures and of differences, equally wide.
 fn bars((lo, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
     let shares = [format!("{bound:.2} bound"), "difference".into(), "0".into()];
     let labels = [[format!("{hi:.1e}"), "|J|, A/m^2".into(), format!("{lo:.1e}")], shares];
     labels.map(|bar: [String; 3]| bar.map(|label| format!("{label:<10}")))
 }
 
-/// Rows of what the methods make of the shown frames.
+/// A row for each method with its pictures of the shown frames.
 fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
     let [width, height] = demo.size;
     let mut rows = Vec::new();
@@ -48,7 +48,7 @@ fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
     contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
 }
 
-/// Rows of how far all others are from the first. A pixel is as far off as its channel that differs most.
+/// A row for each other method with its differences from the first. A pixel shows its channel that differs most.
 fn errors(demo: &Demo, runs: &[Run], bound: f64) -> Image {
     let truth = shown(&runs[0], demo.size);
     let mut rows = Vec::new();
@@ -65,7 +65,7 @@ fn named(image: &Image, name: &str) -> Image {
     titled(image, &[name], INK, PAPER)
 }
 
-/// The shown frames out of all pictures.
+/// The shown frames of all pictures.
 fn shown(run: &Run, [width, height]: [usize; 2]) -> Vec<f32> {
     let numbers = width * height * CHANNELS.len();
     SHOWN.iter().flat_map(|f| &run.pictures[f * numbers..(f + 1) * numbers]).copied().collect()

@@ -1,8 +1,8 @@
 //! The demo: the experiment of [Dobashi](wavesplat::bibliography), sections 4.1 and 4.2, in small, from a solver's frames to
 //! figure 5 and table 1.
 //!
-//! As in the paper, every sample is turned into red, green and blue before anything else, and all methods splat three
-//! channels. What the same methods take for one channel, which is coloured after it was projected, is printed below.
+//! As in the paper, every sample is first turned into red, green and blue, and all methods splat three channels. The
+//! costs of the same methods for one channel, coloured after projection, are printed below.
 
 mod figure;
 mod table;
@@ -30,27 +30,27 @@ use wavesplat::wavelet::Basis;
 pub const FRAMES: usize = 32;
 /// The tolerance of the paper, about 5/256.
 const TOLERANCE: f64 = 0.02;
-/// What splatting may add, for all methods alike.
+/// The splat error that all methods may add.
 const SPLAT_ERROR: f64 = TOLERANCE / 10.0;
 /// The paper's colours: small values blue, large ones red.
 const COLOURS: &str = "rainbow";
-/// The share of the plate's thickness over which attenuation comes to a factor of e: currents keep near the face that the
-/// magnet passes, and through the whole plate their mean would leave nothing but the first colours.
+/// The share of the plate's thickness over which attenuation reaches a factor of e. Currents stay near the face that
+/// the magnet passes; a mean through the whole plate would show only the first colours.
 const ATTENUATION: f64 = 0.1;
 
-/// Where the demo's files are, and how much of everything there is.
+/// The folder of the demo's files, and the size of the experiment.
 #[derive(Debug, Clone)]
 pub struct Demo {
     /// The folder of all files.
     pub folder: PathBuf,
-    /// What carries the currents.
+    /// The plate that carries the currents.
     pub plate: Plate,
     /// Pixels of a picture.
     pub size: [usize; 2],
 }
 
 impl Demo {
-    /// As large as the paper's, in a folder.
+    /// The size of the paper's experiment, in a folder.
     pub fn new(folder: PathBuf) -> Self {
         Self { folder, plate: Plate::default(), size: [240, 240] }
     }
@@ -65,7 +65,7 @@ impl Demo {
     }
 }
 
-/// What all methods do alike.
+/// The settings that all methods share.
 #[derive(Debug, Clone, Copy)]
 enum Method {
     Conventional,
@@ -79,18 +79,18 @@ const METHODS: [(&str, Method); 3] = [
     ("Multi", Method::Wavelets(Basis::Multi, 33)),
 ];
 
-/// One method's pictures and what they cost.
+/// One method's pictures and costs.
 struct Run {
     name: &'static str,
     /// All frames, one after another.
     pictures: Vec<f32>,
     render: RenderReport,
-    /// Of a method with coefficients: the conversion, and the comparison with the frames.
+    /// For methods with coefficients: the conversion, and the comparison with the frames.
     converted: Option<(ConvertReport, Comparison)>,
 }
 
 impl Run {
-    /// Seconds to transform, to splat and to invert; with reading, as far as it is not part of the transform.
+    /// Seconds to transform, splat and invert; and with reading, as far as it is not part of the transform.
     fn seconds(&self) -> [f64; 3] {
         let RenderReport { decode_seconds, splat_seconds, inverse_seconds, .. } = &self.render;
         let transform = self.converted.as_ref().map_or(0.0, |(report, _)| report.seconds);
@@ -112,10 +112,10 @@ impl Run {
     }
 }
 
-/// Solves, converts, renders and compares; draws figure 5 and returns table 1 as text. `say` hears what is going on.
+/// Solves, converts, renders and compares. Draws figure 5 and returns table 1 as text. Reports progress through `say`.
 ///
 /// # Errors
-/// Files that cannot be written or read again.
+/// Files cannot be written or read again.
 pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
     let [coloured, plain] = demo.experiment(say)?;
     Ok(table::text(demo, &coloured, &plain))
@@ -124,7 +124,7 @@ pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
 /// Writes the solver's frames of |J| (A/m^2) as `frame_0000.npy` and so on.
 ///
 /// # Errors
-/// A folder or files that cannot be written.
+/// The folder or its files cannot be written.
 pub fn write_frames(folder: &Path, plate: Plate, frames: usize) -> Result<()> {
     let shape = Shape { dims: plate.dims, frames, ty: SampleType::F32 };
     let mut solution = eddy_currents(plate, Magnet::default(), frames);
@@ -141,7 +141,7 @@ impl Demo {
         source::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
     }
 
-    /// All methods with three channels, of which figure 5 is drawn, and with one.
+    /// All methods with three channels, which figure 5 shows, and with one.
     fn experiment(&self, say: &mut dyn FnMut(&str)) -> Result<[Vec<Run>; 2]> {
         let [x, y, z] = self.plate.dims;
         say(&format!("solving for eddy currents in a plate under a passing magnet ({x}x{y}x{z}, {FRAMES} frames)"));
@@ -152,14 +152,14 @@ impl Demo {
         Ok([coloured, self.all_methods(None, say)?])
     }
 
-    /// The paper's colours over the range of all samples.
+    /// The colours of the paper over the range of all samples.
     fn colours(&self) -> Result<TransferFunction> {
         let range = source::value_range(self.source()?.as_mut(), None, &Silent)?;
         let colours = TransferFunction::open(COLOURS)?;
         colours.over(colours.suitable(range.unwrap_or((0.0, 1.0))))
     }
 
-    /// In colours three channels, else one.
+    /// Three channels if in colour, otherwise one.
     fn all_methods(&self, colours: Option<&TransferFunction>, say: &mut dyn FnMut(&str)) -> Result<Vec<Run>> {
         let channels = colours.map_or("one channel", |_| "three channels");
         let run = |(name, method): (&'static str, Method)| {

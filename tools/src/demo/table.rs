@@ -1,12 +1,12 @@
-//! Table 1 beside that of [Dobashi](wavesplat::bibliography), with what the paper could not say: sizes and errors.
+//! Table 1 compared with that of [Dobashi](wavesplat::bibliography), with file sizes and errors, which the paper does not give.
 
 use super::{Demo, FRAMES, Run, TOLERANCE};
 use std::fmt::Write as _;
 
-/// What the paper measured of a method.
+/// The paper's measurements of a method.
 struct Paper {
     name: &'static str,
-    /// To transform, to splat and to invert, where it tells them apart.
+    /// Seconds to transform, splat and invert, where the paper distinguishes these.
     seconds: Option<[f64; 3]>,
     total: f64,
 }
@@ -17,7 +17,7 @@ const PAPER: [Paper; 3] = [
     Paper { name: "conventional", seconds: None, total: 1643.0 },
 ];
 
-/// The tables of runs with three channels and with one, of each of which the first is the conventional method.
+/// The tables of runs with three channels and with one. The first run of each is the conventional method.
 pub(super) fn text(demo: &Demo, coloured: &[Run], plain: &[Run]) -> String {
     let [width, height] = demo.size;
     let mut text = format!(
@@ -37,14 +37,14 @@ pub(super) fn text(demo: &Demo, coloured: &[Run], plain: &[Run]) -> String {
     text + &sizes(coloured, plain) + NOTES
 }
 
-/// Seconds, and how often they fit into those of the conventional method.
+/// Seconds, and the speed-up over the conventional method.
 fn cells(seconds: Option<[f64; 3]>, total: f64, conventional: f64, places: usize) -> String {
     let cell = |n: usize| seconds.filter(|s| s[n] > 0.0).map_or("-".into(), |s| format!("{:.places$}", s[n]));
     let ratio = format!("{:.1}", conventional / total);
     format!("{:>9}{:>11}{:>9}{total:>9.places$}{ratio:>8}", cell(0), cell(1), cell(2))
 }
 
-/// What the files hold and how far off they are; and the same for one channel, with what that takes.
+/// The content of the files and their errors; and the same for one channel, with its times.
 fn sizes(coloured: &[Run], plain: &[Run]) -> String {
     let mut text = format!(
         "\n{:22}{:>12}{:>10}{:>20}\n{:22}{:>12}{:>10}{:>10}{:>10}{:>10}{:>8}\n",

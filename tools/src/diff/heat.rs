@@ -8,9 +8,9 @@ use std::path::Path;
 use wavesplat::base::error::Result;
 use wavesplat::base::output::Output;
 
-/// At most so many frames are shown.
+/// The largest number of frames shown.
 const SHOWN: usize = 16;
-/// At most so many pixels all shown frames have; larger ones are shrunk.
+/// The largest number of pixels of all shown frames; larger pictures are shrunk.
 const PIXELS: usize = 1 << 26;
 const PAPER: Rgb = [40; 3];
 const INK: Rgb = [255; 3];
@@ -18,7 +18,7 @@ const INK: Rgb = [255; 3];
 /// Draws |A - B| of up to 16 frames evenly spread, red where it is `scale` or more, as one PNG.
 ///
 /// # Errors
-/// Frames that cannot be read, a file that cannot be written.
+/// Frames cannot be read, or the file cannot be written.
 pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, (path, force): (&Path, bool)) -> Result<()> {
     let frames = shown(a.shape.frames);
     let step = shrinking(frames.len() * a.shape.width * a.shape.height);
@@ -45,12 +45,12 @@ fn columns(pictures: usize) -> usize {
     (1..).find(|n| n * n >= pictures).unwrap_or(1)
 }
 
-/// So many pixels along both axes become one.
+/// The factor by which pictures are shrunk along both axes.
 fn shrinking(pixels: usize) -> usize {
     (1..).find(|step| pixels / (step * step) <= PIXELS).unwrap_or(1)
 }
 
-/// Of `step` times `step` pixels the largest difference is shown, so that none gets lost.
+/// A block of `step` times `step` pixels shows its largest difference, so that none disappears.
 fn map(pixels: &[Option<f64>], width: usize, step: usize, scale: f64) -> Image {
     let height = pixels.len() / width;
     let near = |at: usize, end: usize| at * step..((at + 1) * step).min(end);

@@ -1,4 +1,4 @@
-//! Frames of what is compared: PNGs and `.npy` arrays, one frame in memory at a time.
+//! Reads the frames to compare: PNGs and `.npy` arrays, one frame in memory at a time.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -10,10 +10,10 @@ use wavesplat::source;
 
 const PNG_MAGIC: &[u8] = b"\x89PNG";
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
-const DEFLATE: u64 = 1032; // deflate makes no data smaller by more than this
+const DEFLATE: u64 = 1032; // deflate never compresses by a larger factor
 const EXPECTED: &str = "expected a PNG, or an .npy of (H,W), (F,H,W) or (F,H,W,C)";
 
-/// What a stack's frames are.
+/// The shape of a stack's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
     /// Number of frames.
@@ -34,14 +34,14 @@ impl Shape {
         self.height * self.width * self.channels
     }
 
-    /// In words.
+    /// A description in words.
     pub(super) fn text(&self) -> String {
         let Self { frames, height, width, channels, sample } = self;
         format!("{frames} frame(s) of {width}x{height} pixels with {channels} channel(s) of {sample}")
     }
 }
 
-/// Pictures of one size and type, read when they are asked for.
+/// Pictures of one size and type, read on demand.
 #[derive(Debug)]
 pub(super) struct Stack {
     /// What its frames are.
@@ -51,9 +51,9 @@ pub(super) struct Stack {
 
 #[derive(Debug)]
 enum Frames {
-    /// A file for each.
+    /// One file per frame.
     Pngs(Vec<PathBuf>),
-    /// All in one array.
+    /// All frames in one array.
     Array { file: FileBytes, start: u64, big_endian: bool },
 }
 
@@ -61,7 +61,7 @@ impl Stack {
     /// Opens a PNG, an `.npy`, the PNGs of a folder, or the PNGs that match a pattern.
     ///
     /// # Errors
-    /// Files that are absent, damaged or neither of these; arrays of other dimensions; PNGs unlike the first.
+    /// Files are absent, damaged or neither of these; arrays have other dimensions; PNGs differ from the first.
     pub(super) fn open(name: &Path) -> Result<Self> {
         let paths = source::files(name, "png")?;
         match &paths[..] {
@@ -82,7 +82,7 @@ impl Stack {
 
     fn open_array(path: &Path) -> Result<Self> {
         let header = source::array_header(path)?;
-        let file = FileBytes::open(path, Access::Read)?; // a map's lost pages would end the program
+        let file = FileBytes::open(path, Access::Read)?; // truncating a mapped file would end the program
         let refused = |what: String| Error::input(path, what);
         let shape = array_shape(&header.lengths, header.sample).map_err(refused)?;
         let bytes = header.lengths.iter().try_fold(header.sample.size() as u64, |all, n| all.checked_mul(*n));
@@ -159,7 +159,7 @@ fn array_shape(lengths: &[u64], sample: SampleType) -> std::result::Result<Shape
 
 type PngReader = png::Reader<BufReader<File>>;
 
-/// Opens a PNG, palettes and fewer than 8 bits as the colours they stand for, and counts the bytes of its pixels.
+/// Opens a PNG, expands palettes and fewer than 8 bits to colours, and counts the bytes of its pixels.
 fn open_png(path: &Path) -> Result<(PngReader, usize)> {
     if !begins(path)?.starts_with(PNG_MAGIC) {
         return Err(Error::input(path, EXPECTED));
@@ -169,7 +169,7 @@ fn open_png(path: &Path) -> Result<(PngReader, usize)> {
     let mut decoder = png::Decoder::new(BufReader::new(opened));
     decoder.set_transformations(png::Transformations::EXPAND);
     let reader = decoder.read_info().map_err(|e| damaged(path, e))?;
-    // What is claimed is allocated at once; so it must be possible. An expanded palette has 32 times as many bytes.
+    // The claimed size is allocated at once, so it must be possible. An expanded palette has 32 times as many bytes.
     let possible = |bytes: &usize| *bytes as u64 / (32 * DEFLATE) <= file;
     let bytes = reader.output_buffer_size().filter(possible);
     let (width, height) = (reader.info().width, reader.info().height);

@@ -1,6 +1,6 @@
-//! How far two pictures are apart, number by number.
+//! Differences of two pictures, number by number.
 
-/// |a - b|; none where both are background (NaN), infinite where one is. Equal infinities do not differ.
+/// |a - b|; none if both are background (NaN), infinite if only one is. Equal infinities do not differ.
 pub fn difference(a: impl Into<f64>, b: impl Into<f64>) -> Option<f64> {
     let (a, b): (f64, f64) = (a.into(), b.into());
     match (a.is_nan(), b.is_nan()) {
@@ -11,7 +11,7 @@ pub fn difference(a: impl Into<f64>, b: impl Into<f64>) -> Option<f64> {
     }
 }
 
-/// The largest difference of the numbers of each pixel, which has `channels`; none where all are background in both.
+/// The largest difference in each pixel of `channels` numbers; none if all are background in both.
 pub fn of_pixels<T: Copy + Into<f64>>(a: &[T], b: &[T], channels: usize) -> Vec<Option<f64>> {
     let of_pixel = |(a, b): (&[T], &[T])| largest(a.iter().zip(b).map(|(a, b)| difference(*a, *b)));
     a.chunks_exact(channels).zip(b.chunks_exact(channels)).map(of_pixel).collect()
@@ -22,7 +22,7 @@ pub fn largest(differences: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     differences.flatten().reduce(f64::max)
 }
 
-/// Sums over the numbers of two pictures, or of several pairs of them.
+/// Sums over the numbers of two pictures, or of several pairs of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Differences {
     /// Numbers that neither has as background.
@@ -37,7 +37,8 @@ pub struct Differences {
     pub sum: f64,
     /// Sum of their squares.
     pub squares: f64,
-    /// Where the largest difference is found first, background in one alone before all others; none if nothing differs.
+    /// Position of the first largest difference. Background in only one picture counts as larger than all others. None
+    /// if nothing differs.
     pub at: Option<u64>,
 }
 

@@ -1,4 +1,4 @@
-//! `diff`: how far two pictures or two stacks of pictures are apart. Two frames are in memory at a time.
+//! `diff`: compares two pictures or two stacks of pictures. Two frames are in memory at a time.
 
 mod heat;
 mod load;
@@ -6,7 +6,7 @@ pub mod measure;
 mod report;
 mod ssim;
 
-pub use report::{Figures, HeatMap, Place, Report, Worst};
+pub use report::{HeatMap, PixelPosition, Report, Statistics, WorstFrame};
 
 use load::{Shape, Stack};
 use measure::Differences;
@@ -40,13 +40,13 @@ With --json, null stands for what is infinite or not defined; \"identical\" and 
 Exit codes: 0 done, 1 reading or writing failed, 2 usage, also two that cannot be compared, 3 a damaged file or one of \
 another kind, 4 above --fail-above, or a file changed while it was being read.";
 
-/// What `diff` is asked.
+/// The arguments of `diff`.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_long_help = HELP)]
 pub struct Args {
     /// A PNG, an .npy, or a folder or pattern of PNGs: the reference
     pub a: PathBuf,
-    /// What is compared with it
+    /// The pictures to compare with it
     pub b: PathBuf,
     /// Draw |A - B| as a picture, blue to red
     #[arg(short, long, value_name = "HEAT.png")]
@@ -73,7 +73,7 @@ fn finite(text: &str, is_right: impl Fn(f64) -> bool, words: &str) -> std::resul
 /// Reads a finite number above 0.
 ///
 /// # Errors
-/// Anything else, in words that quote it.
+/// Anything else; the message quotes it.
 pub fn above_zero(text: &str) -> std::result::Result<f64, String> {
     finite(text, |n| n > 0.0, "above 0")
 }
@@ -82,7 +82,7 @@ fn not_negative(text: &str) -> std::result::Result<f64, String> {
     finite(text, |n| n >= 0.0, "of 0 or more")
 }
 
-/// Compares, draws if asked, and prints what was found.
+/// Compares, draws if requested, and prints the result.
 ///
 /// # Errors
 /// Those of [`compare`]; a largest difference above `fail_above`, after everything is printed.
@@ -100,11 +100,11 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// Compares two stacks, and draws the heat map if one is asked for.
+/// Compares two stacks, and draws the heat map if requested.
 ///
 /// # Errors
-/// Files that are absent, damaged, of another kind or unlike each other; an output that cannot be written, is no PNG by
-/// its name or would replace what is read.
+/// Files are absent, damaged, of another kind or do not match; the output cannot be written, has no extension of a PNG
+/// or would replace an input.
 pub fn compare(args: &Args) -> Result<Report> {
     let (a, b) = (Stack::open(&args.a)?, Stack::open(&args.b)?);
     check_alike(args, &a.shape, &b.shape)?;
@@ -141,7 +141,7 @@ fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<()> {
     spare_inputs(inputs, path)
 }
 
-/// The largest finite difference; 1 where there is none, so that the bar has a scale.
+/// The largest finite difference; 1 if there is none, so that the bar has a scale.
 fn usual_scale(report: &Report) -> f64 {
     let largest = report.all.largest_compared;
     if largest > 0.0 && largest.is_finite() { largest } else { 1.0 }
@@ -157,10 +157,11 @@ fn measure_all(args: &Args, a: &Stack, b: &Stack) -> Result<Report> {
         worst = worst.filter(|(_, before, _)| !is_worse(&found, before)).or(Some((frame, found, ssim)));
     }
     let ssim = (similar.1 > 0).then(|| similar.0 / similar.1 as f64);
-    let worst = worst
-        .filter(|_| shape.frames > 1)
-        .map(|(frame, found, ssim)| Worst { frame, figures: Figures::of(&found, frame, &shape, scope.peak, ssim) });
-    let figures = Figures::of(&all, 0, &shape, scope.peak, ssim);
+    let worst = worst.filter(|_| shape.frames > 1).map(|(frame, found, ssim)| WorstFrame {
+        frame,
+        figures: Statistics::of(&found, frame, &shape, scope.peak, ssim),
+    });
+    let figures = Statistics::of(&all, 0, &shape, scope.peak, ssim);
     Ok(report_of(args, &shape, scope.peak, figures, worst))
 }
 
@@ -174,7 +175,7 @@ fn is_worse(found: &Differences, before: &Differences) -> bool {
     key(found) > key(before)
 }
 
-fn report_of(args: &Args, shape: &Shape, peak: f64, all: Figures, worst: Option<Worst>) -> Report {
+fn report_of(args: &Args, shape: &Shape, peak: f64, all: Statistics, worst: Option<WorstFrame>) -> Report {
     Report {
         schema: 1,
         a: args.a.clone(),

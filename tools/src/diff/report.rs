@@ -1,4 +1,4 @@
-//! What is said of two stacks.
+//! The report about two stacks.
 
 use super::load::Shape;
 use super::measure::Differences;
@@ -7,14 +7,14 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Everything that was found; what `--json` prints. A change of a key's meaning changes `schema`.
+/// The whole report, as printed by `--json`. `schema` changes if the meaning of a key changes.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     /// 1.
     pub schema: u32,
-    /// What is compared.
+    /// The reference.
     pub a: PathBuf,
-    /// What it is compared with.
+    /// The pictures compared with it.
     pub b: PathBuf,
     /// The type of A's numbers.
     pub samples: &'static str,
@@ -26,26 +26,26 @@ pub struct Report {
     pub height: usize,
     /// Numbers a pixel.
     pub channels: usize,
-    /// What PSNR and SSIM take for the range of values: A's for floats, else that of the type.
+    /// The value range used for PSNR and SSIM: that of A's values for floats, otherwise that of the type.
     pub peak: f64,
-    /// Of all frames.
-    pub all: Figures,
-    /// Of the frame with the largest difference, the one with the larger sum of squares if several have it; none if there
-    /// is one frame only.
-    pub worst: Option<Worst>,
-    /// The picture that was drawn.
+    /// Statistics of all frames.
+    pub all: Statistics,
+    /// The frame with the largest difference, and of several the one with the largest sum of squares; none if there is
+    /// only one frame.
+    pub worst: Option<WorstFrame>,
+    /// The heat map, if one was drawn.
     pub heat_map: Option<HeatMap>,
 }
 
-/// Numbers of one frame, or of all. Units are those of the files.
+/// Statistics of one frame, or of all, in the units of the files.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figures {
+pub struct Statistics {
     /// Whether nothing differs.
     pub identical: bool,
     /// The largest absolute difference; infinite (null in JSON) where one alone has background.
     pub largest: f64,
     /// Where it is; none if nothing differs.
-    pub at: Option<Place>,
+    pub at: Option<PixelPosition>,
     /// The largest where neither has background.
     pub largest_compared: f64,
     /// The mean absolute difference where neither has background.
@@ -66,17 +66,17 @@ pub struct Figures {
 
 /// The frame that differs most.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Worst {
+pub struct WorstFrame {
     /// Its number, from 0.
     pub frame: usize,
-    /// What was found in it.
+    /// Its statistics.
     #[serde(flatten)]
-    pub figures: Figures,
+    pub figures: Statistics,
 }
 
-/// Where a number is; all count from 0, rows from the top.
+/// Position of a number. All indices count from 0, rows from the top.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Place {
+pub struct PixelPosition {
     /// Frame.
     pub frame: usize,
     /// Column.
@@ -87,7 +87,7 @@ pub struct Place {
     pub channel: usize,
 }
 
-impl Place {
+impl PixelPosition {
     /// The place of a number in a stack, counted from its first.
     pub(super) fn of(at: u64, shape: &Shape) -> Self {
         let at = at as usize;
@@ -110,14 +110,14 @@ pub struct HeatMap {
     pub scale: f64,
 }
 
-impl Figures {
+impl Statistics {
     /// Of numbers that begin with frame `first` of a stack.
     pub(super) fn of(found: &Differences, first: usize, shape: &Shape, peak: f64, ssim: Option<f64>) -> Self {
         let before = first as u64 * shape.numbers() as u64;
         Self {
             identical: found.is_identical(),
             largest: found.largest(),
-            at: found.at.map(|at| Place::of(before + at, shape)),
+            at: found.at.map(|at| PixelPosition::of(before + at, shape)),
             largest_compared: found.largest_compared,
             mean: found.mean(),
             rms: found.rms(),
@@ -158,7 +158,7 @@ impl Figures {
 }
 
 impl Report {
-    /// For people.
+    /// The report as text.
     pub fn text(&self) -> String {
         let Self { frames, width, height, channels, samples, .. } = self;
         let mut text = format!("{frames} frame(s) of {width}x{height} pixels, {channels} channel(s) of {samples}\n");
@@ -184,7 +184,7 @@ impl Report {
     }
 }
 
-/// A number with six digits, as short as can be.
+/// A number with at most six digits.
 pub(super) fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !value.is_finite() || (1e-4..1e6).contains(&size) && value.fract() == 0.0 {
@@ -213,6 +213,6 @@ mod tests {
     fn places_are_found_from_their_count() {
         let shape = Shape { frames: 3, height: 4, width: 5, channels: 2, sample: SampleType::U8 };
         let at = 2 * 40 + 3 * 10 + 4 * 2 + 1;
-        assert_eq!(Place::of(at, &shape), Place { frame: 2, x: 4, y: 3, channel: 1 });
+        assert_eq!(PixelPosition::of(at, &shape), PixelPosition { frame: 2, x: 4, y: 3, channel: 1 });
     }
 }

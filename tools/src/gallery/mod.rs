@@ -1,4 +1,4 @@
-//! The gallery: what each mode makes of an archive, a row of pictures for each.
+//! The gallery: pictures of archives in every mode, a row for each archive.
 
 mod tiles;
 
@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tiles::{Look, Tile, short};
+use tiles::{SampleStyle, Tile, short};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::Access;
 use wavesplat::base::output::Output;
@@ -26,21 +26,21 @@ use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, SplatSource
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 
-/// What is shown unless archives are given.
+/// The default archives.
 pub const USUAL: [&str; 2] = ["demo", "smooth"];
 /// Pixels a side of a picture.
 pub const SIDE: usize = 216;
-/// Of all conversions.
+/// Tolerance of all conversions.
 const TOLERANCE: f64 = 1e-3;
 const WINDOW: usize = 32;
-/// Of synthetic archives.
+/// Size of synthetic archives.
 const SHAPE: Shape = Shape { dims: [64; 3], frames: 32, ty: SampleType::F32 };
-/// Of pictures: azimuth and elevation.
+/// Azimuth and elevation of pictures.
 const VIEW: [f64; 2] = [300.0, 35.0];
 const PAPER: Rgb = [40; 3];
 const INK: Rgb = [255; 3];
 
-/// What is shown, and where it goes.
+/// The archives to show, and the output.
 #[derive(Debug, Clone)]
 pub struct Gallery {
     /// `demo`, kinds of synthetic archives, or inputs as `wavesplat convert` takes them.
@@ -59,10 +59,10 @@ impl Gallery {
         self.folder.join("gallery.png")
     }
 
-    /// Makes, converts and renders all archives. `say` hears what is going on.
+    /// Makes, converts and renders all archives. Reports progress through `say`.
     ///
     /// # Errors
-    /// Archives that cannot be read, two of one name, or files that cannot be written.
+    /// Archives cannot be read, two have the same name, or files cannot be written.
     pub fn draw(&self, say: &mut dyn FnMut(&str)) -> Result<()> {
         let names = self.names()?;
         fs::create_dir_all(&self.folder).map_err(|e| Error::io(&self.folder, "creating", e))?;
@@ -73,7 +73,7 @@ impl Gallery {
         out.commit()
     }
 
-    /// What the files of each archive are called.
+    /// The base name of each archive's files.
     fn names(&self) -> Result<Vec<String>> {
         let names: Vec<String> = self.archives.iter().map(|archive| name(archive)).collect();
         let mut seen = HashSet::new();
@@ -83,7 +83,7 @@ impl Gallery {
         }
     }
 
-    /// The pictures of an archive, with what it is above them.
+    /// The pictures of an archive, with a label above each.
     fn row(&self, archive: &str, name: &str, say: &mut dyn FnMut(&str)) -> Result<Image> {
         let input = self.made(archive, name, say)?;
         say(&format!("converting {archive}"));
@@ -113,7 +113,7 @@ impl Gallery {
         format!(" {name}: {x}x{y}x{z} voxels, {frames} frames; {seen}; samples in colours: --range {lo},{hi}")
     }
 
-    /// Makes an archive that is not given; says where it is, and how it is read.
+    /// Makes an archive that is not given; returns its path and how to read it.
     fn made(&self, archive: &str, name: &str, say: &mut dyn FnMut(&str)) -> Result<(PathBuf, InputArgs)> {
         let plain =
             InputArgs { spacing: None, origin: None, dims: None, dtype: None, variable: None, ..self.input.clone() };
@@ -154,11 +154,11 @@ impl Gallery {
         projection(scene.grid(), view, 0.0, vec![scene.frames().unwrap_or(0) / 2], TOLERANCE / 2.0)
     }
 
-    /// What suits the samples, by the largest ones that rays meet.
-    fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<Look> {
+    /// Chooses settings that suit the samples, by the largest ones that rays meet.
+    fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<SampleStyle> {
         let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
         let (largest, _) = pictures(scene, &mip)?;
-        Ok(Look::new(file.metadata().range(), &largest, scene.grid()))
+        Ok(SampleStyle::new(file.metadata().range(), &largest, scene.grid()))
     }
 
     fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {
@@ -170,7 +170,7 @@ impl Gallery {
     }
 }
 
-/// What the files of an archive are called.
+/// The base name of an archive's files.
 fn name(archive: &str) -> String {
     let path = Path::new(archive.trim_end_matches('/'));
     path.file_stem().map_or_else(|| "archive".into(), |stem| stem.to_string_lossy().replace(['*', '?'], ""))
@@ -179,7 +179,7 @@ fn name(archive: &str) -> String {
 /// Lines that every label has room for.
 const LINES: usize = 5;
 
-/// A text in lines of at most so many letters, cut behind spaces and commas where that goes.
+/// Breaks a text into lines of limited length, after spaces and commas if possible.
 fn lines(text: &str, letters: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_inclusive([' ', ',']) {

@@ -1,4 +1,4 @@
-//! The pictures of a row: which options suit an archive, and how its pixels are coloured.
+//! The pictures of a row: the options that suit an archive, and the colours of its pixels.
 
 use crate::sheet::{Image, Rgb};
 use wavesplat::base::error::{Error, Result};
@@ -8,32 +8,33 @@ use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::render::Mode;
 
 const BACKGROUND: Rgb = [0; 3];
-/// Paths through such shares of the volume's least extent have the opacities that are asked for: haze, and shells, which
-/// rays are through sooner.
+/// Rays reach the stated opacities over these shares of the volume's smallest extent: for haze, and for shells, which
+/// rays leave sooner.
 const HAZE: f64 = 1.0 / 8.0;
 const SHELL: f64 = 1.0 / 32.0;
-/// The share of rays whose largest sample the colours of samples tell apart, and of pixels that those of pixels do: a few
-/// may be far brighter.
+/// The share of rays whose largest sample, and of pixels whose value, lies within the range of colours. A few may be
+/// far brighter.
 const OF_RAYS: f64 = 0.95;
 const OF_PIXELS: f64 = 0.99;
-/// A logarithm shows no share of the largest value that is much nearer to what conversions leave undecided.
+/// A logarithmic norm starts at this share of the largest value: smaller values are too close to the error of
+/// conversion.
 const LEAST: f64 = 10.0 * super::TOLERANCE;
 /// Opacities of values of one sign, as they are by default.
 const RAMP: &str = "0:0,1:1";
 /// Opacities of values of one sign: two shells.
 const SHELLS: &str = "0.05:0,0.2:0.5,0.35:0,0.5:0,0.7:0.9,0.9:0";
-/// Of values of both signs: a shell on each side of 0 around what is far from it.
+/// Opacities of values of both signs: a shell on each side of 0 around values far from it.
 const SHELLS_OF_BOTH: &str = "0:0.9,0.2:0,0.3:0.5,0.4:0,0.6:0,0.7:0.5,0.8:0,1:0.9";
-/// Of values of both signs: what is far from 0 hides what is behind.
+/// Opacities of values of both signs: values far from 0 hide everything behind.
 const BOTH_ENDS: &str = "0:1,0.5:0,1:1";
 
-/// What suits the samples of an archive.
-pub(super) struct Look {
+/// Settings that suit the samples of an archive.
+pub(super) struct SampleStyle {
     /// Whether there are values on both sides of 0.
     both_signs: bool,
     /// The values of the first and the last colour of samples.
     pub(super) range: (f64, f64),
-    /// World units: the volume's least extent.
+    /// The volume's smallest extent in world units.
     thickness: f64,
 }
 
@@ -42,12 +43,12 @@ pub(super) struct Tile {
     /// The options that give it.
     pub(super) label: String,
     pub(super) mode: Mode,
-    /// Of pixels that are values; where samples are coloured, what gives them their colours.
+    /// Colours for pixels that are values; if samples are coloured, the map of their colours.
     pub(super) map: TransferFunction,
     norm: Norm,
 }
 
-impl Look {
+impl SampleStyle {
     /// For samples of a range, of which rays meet the `largest`.
     pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
@@ -155,8 +156,8 @@ fn spread(values: &[f32], share: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    fn look(range: (f64, f64), largest: &[f32]) -> Look {
-        Look::new(range, largest, &Grid::unit([9, 8, 4]))
+    fn look(range: (f64, f64), largest: &[f32]) -> SampleStyle {
+        SampleStyle::new(range, largest, &Grid::unit([9, 8, 4]))
     }
 
     #[test]

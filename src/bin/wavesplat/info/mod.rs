@@ -2,6 +2,7 @@
 
 mod archive;
 mod coefficients;
+mod variables;
 
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
-  wavesplat info frames/ --estimate=0.001")]
+  wavesplat info frames/ --estimate 0.001")]
 pub(crate) struct InfoArgs {
     /// A coefficient file; or frames, as convert takes them
     #[arg(required = true)]
@@ -35,9 +36,12 @@ pub(crate) struct InfoArgs {
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {
     args.common.start()?;
-    match args.coefficients()? {
-        Some(file) => coefficients::run(&file, &args.common),
-        None => archive::run(args),
+    if let Some(file) = args.coefficients()? {
+        return coefficients::run(&file, &args.common);
+    }
+    match args.input.undecided(&args.inputs, args.common.stream_memory())?.as_slice() {
+        [] => archive::run(args),
+        several => variables::run(several, &args.common),
     }
 }
 

@@ -1,6 +1,6 @@
-//! Processor time of this process on one core, all its threads together: what a busy neighbour disturbs least.
+//! Processor time of this process on one core, over all its threads. Busy neighbours disturb this time least.
 
-/// Keeps this process, and the workers of the library, to one core. To be called before any thread is started.
+/// Keeps this process and the library's workers on one core. Call before any thread starts.
 pub(in crate::bench) fn stay_on_one_core() {
     work_with(1);
     #[cfg(target_os = "linux")]
@@ -13,9 +13,9 @@ pub(in crate::bench) fn stay_on_one_core() {
     }
 }
 
-/// Gives the library so many workers. To be called before any thread is started.
+/// Gives the library this many workers. Call before any thread starts.
 pub(in crate::bench) fn work_with(threads: usize) {
-    // A pool that exists already is one of the tests'; times are not judged there.
+    // If a pool exists, this runs in a test, which does not judge times.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
 }
 
@@ -26,14 +26,14 @@ pub(in crate::bench) fn seconds() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// Seconds of the clock: elsewhere the processor's are not asked for.
+/// Seconds of wall time, on systems where processor time is not implemented here.
 #[cfg(not(target_os = "linux"))]
 pub(in crate::bench) fn seconds() -> f64 {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }
 
-/// What `work` returns, and the least seconds that it took of `repeats` times after one that is not counted.
+/// Runs `work` once without timing and then `repeats` times. Returns its result and the least time in seconds.
 pub(super) fn least<T, E>(repeats: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<(T, f64), E> {
     let (mut result, mut least) = (work()?, f64::INFINITY);
     for _ in 0..repeats {

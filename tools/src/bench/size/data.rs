@@ -1,4 +1,4 @@
-//! What is measured: archives of the user, and those that are made here or by the peers' script.
+//! The measured archives: those of the user, and those made here or by the peers' script.
 
 use super::peers::Peers;
 use crate::eddy::{Magnet, Plate, eddy_currents};
@@ -38,13 +38,13 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// What is measured unless the user says: beside peers what the targets are about, else what needs no script.
+    /// The default archives: with peers, those of the targets; otherwise those that need no script.
     pub(super) fn usual(peers: bool) -> Vec<Self> {
         let wanted = |s: &Self| *s == Self::Demo || s.synth().is_some() != peers;
         Self::value_variants().iter().copied().filter(wanted).collect()
     }
 
-    /// The name as the command line has it.
+    /// The name on the command line.
     pub fn name(self) -> String {
         self.to_possible_value().map_or(String::new(), |v| v.get_name().into())
     }
@@ -91,10 +91,10 @@ fn synthetic(kind: Kind, small: bool, path: &Path) -> Result<()> {
     Target::File(path.into(), Format::Npy).write(&synth.shape, |frame, bytes| synth.fill(frame, bytes))
 }
 
-/// An archive as it is measured.
+/// An archive and its size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Data {
-    /// Its name: that of its kind, or of its file without the ending.
+    /// The name of its kind, or of its file without the extension.
     pub name: String,
     /// The file.
     #[serde(skip)]
@@ -112,18 +112,18 @@ pub struct Data {
 }
 
 impl Data {
-    /// The name of what is in a file.
+    /// The name of a file's archive.
     pub(in crate::bench) fn name_of(path: &Path) -> String {
         path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Its name and its size, for people.
+    /// Its name and size in words.
     pub(in crate::bench) fn in_words(&self) -> String {
         let [x, y, z] = self.dims;
         format!("*{}*: {x}x{y}x{z} voxels, {} frames, {}", self.name, self.frames, self.samples)
     }
 
-    /// Of a file; every sample is read.
+    /// Describes a file; reads every sample.
     pub(in crate::bench) fn of(path: PathBuf) -> Result<Self> {
         let mut source = source::open(std::slice::from_ref(&path), &OpenOptions::default())?;
         let archive = source.archive().clone();

@@ -1,51 +1,57 @@
-//! The benchmark of sizes: how small a file is under a hard bound, and how fast it is made and read, beside other coders.
+//! The benchmark of sizes: the size of files under a hard bound and the times to write and read them, compared with other coders.
 //!
 //! ```text
-//! schemes   the ways of converting that are measured
-//! data      on what: given archives, the demo's, those of `synth`, those of the peers' script
-//! own       one conversion, decoded and compared, in a process of its own;  clock: its times
-//! peers     the same of other coders, by `tools/peers/peers.py`
-//! row       what is recorded;  targets: what of it is to be how good
-//! tables    size.md for people
+//! clock     processor time of one core
+//! schemes   the measured ways of converting
+//! own       one conversion, decoded and compared, in its own process
+//! row       the measurements of one coder
+//! peers     the same measurements of other coders, by `tools/peers/peers.py`
+//! data      the archives: given ones, the demo's, those of `synth`, those of the peers' script
+//! targets   the targets, and whether they are met
+//! results   the results of a run
+//! tables    size.md
 //! ```
 
 pub(super) mod clock;
-mod data;
-pub(super) mod own;
-pub(super) mod peers;
-mod row;
 mod schemes;
-mod tables;
+pub(super) mod own;
+mod row;
+pub(super) mod peers;
+mod data;
 mod targets;
+mod results;
+mod tables;
 
 pub use data::{Data, Subject};
 pub use peers::Peers;
-pub use row::{Own, Results, Row};
+pub use results::Results;
+pub use row::{Own, Row};
 pub use schemes::{BASELINE, SCHEMES, Scheme};
 pub use targets::Verdict;
 
-use super::machine::Made;
-use super::step::{Outcome, Step, in_process};
-use own::{Measured, Task};
+use super::json::bad_json;
+use super::machine::Provenance;
+use super::process::in_process;
+use own::Task;
 use peers::PeersTask;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 
-/// The number of the layout of `size.json`; a change of a key's meaning changes it.
+/// The layout version of `size.json`; changes if the meaning of a key changes.
 pub const SCHEMA: u32 = 1;
-/// How often every time is taken in a round, one after the other, after once that is not counted.
+/// Number of timed repetitions in a row in each round, after one that is not counted.
 pub const IN_A_ROW: usize = 2;
 
-/// What to measure, with what, and where results go.
+/// The settings of a run.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Archives of the user.
     pub inputs: Vec<PathBuf>,
-    /// Archives to make; by default the usual ones where there are no inputs.
+    /// Archives to make; by default the usual ones if there are no inputs.
     pub subjects: Option<Vec<Subject>>,
-    /// Make them small: whether everything works, in seconds.
+    /// Makes them small, to check in seconds that everything works.
     pub small: bool,
     /// Shares of the value range.
     pub tolerances: Vec<f64>,
@@ -61,8 +67,8 @@ pub struct Config {
     pub date: Option<String>,
 }
 
-/// Measures everything and writes `size.json` and `size.md`; returns the results and the tables. `say` hears what is
-/// going on.
+/// Measures everything and writes `size.json` and `size.md`. Returns the results and the tables; reports progress
+/// through `say`.
 pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, String)> {
     if config.repeats == 0 || config.tolerances.is_empty() {
         return Err(Error::usage("--repeats, --tolerances: nothing is left to measure"));
@@ -76,7 +82,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
     }
     fs::remove_dir_all(&work).map_err(|e| Error::io(&work, "removing", e))?;
     let results = Results {
-        made: Made::here(SCHEMA, config.date.as_ref()),
+        made: Provenance::here(SCHEMA, config.date.as_ref()),
         rounds: config.repeats,
         data,
         verdicts: targets::judge(&rows),
@@ -87,7 +93,7 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<(Results, Strin
     Ok((results, text))
 }
 
-/// A sentence for every row whose bound is missed by a scheme of wavesplat.
+/// A sentence for every row in which a scheme of wavesplat exceeds its bound.
 pub fn complaints(results: &Results) -> Vec<String> {
     let missed = results.rows.iter().filter(|r| r.own.is_some() && !r.holds());
     let words = |r: &Row| {
@@ -113,7 +119,7 @@ fn gather(config: &Config, work: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec
     }
 }
 
-/// Every coder at every tolerance, round by round.
+/// Measures every coder at every tolerance, round by round.
 fn measure(config: &Config, data: &Data, file: &Path, say: &mut dyn FnMut(&str)) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for round in 0..config.repeats {
@@ -140,8 +146,8 @@ fn by_scheme(config: &Config, data: &Data, scheme: &Scheme, tolerance: f64, file
         repeats: IN_A_ROW,
         output: file.into(),
     };
-    let outcome: Outcome<Measured> = in_process(&config.program, &Step::Size(task))?;
-    Ok(Row::of_own(data, tolerance, scheme.name, &outcome.did))
+    let outcome = in_process(&config.program, &task)?;
+    Ok(Row::of_scheme((&data.name, data.bytes), tolerance, scheme.name, &outcome.measured))
 }
 
 fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a> {
@@ -152,7 +158,7 @@ fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a
 
 fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {
     let json = folder.join("size.json");
-    let text = serde_json::to_string_pretty(results).map_err(|e| super::bad_json(&json, &e))?;
+    let text = serde_json::to_string_pretty(results).map_err(|e| bad_json(&json, &e))?;
     for (path, text) in [(json, text.as_str()), (folder.join("size.md"), tables)] {
         fs::write(&path, text).map_err(|e| Error::io(&path, "writing", e))?;
     }

@@ -1,7 +1,8 @@
-//! One archive by one scheme at one tolerance, measured in this process.
+//! Measures one archive with one scheme at one tolerance, in this process.
 
 use super::clock::{least, stay_on_one_core};
 use super::schemes;
+use crate::bench::process::ProcessTask;
 use crate::bench::stages::MEMORY;
 use memmap2::MmapMut;
 use serde::{Deserialize, Serialize};
@@ -20,7 +21,7 @@ use wavesplat::convert::{ConvertReport, convert};
 use wavesplat::file::CoefficientFile;
 use wavesplat::source::{self, OpenOptions, read_frames};
 
-/// What a process is to measure.
+/// The settings of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::bench) struct Task {
     /// The archive.
@@ -30,37 +31,46 @@ pub(in crate::bench) struct Task {
     pub(super) tolerance: f64,
     /// Lowest and highest sample of the archive.
     pub(super) range: (f64, f64),
-    /// How often every time is taken.
+    /// Number of repetitions of every time.
     pub(super) repeats: usize,
-    /// Where the coefficient file goes.
+    /// Path of the coefficient file.
     pub(super) output: PathBuf,
 }
 
-/// What was measured.
+/// The result of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::bench) struct Measured {
-    /// Of the file.
+    /// Bytes of the file.
     pub(super) bytes: u64,
-    /// Nonzero.
+    /// Number of nonzero codes.
     pub(super) codes_per_sample: f64,
-    /// Samples stored exactly because codes missed the bound.
+    /// Samples stored exactly because their codes exceed the bound.
     pub(super) outliers: u64,
     /// Samples of blocks that are stored exactly and so have no codes.
     pub(super) exact_samples: u64,
-    /// What no sample may be off, in the units of the samples.
+    /// The largest error that a sample may have, in the units of the samples.
     pub(super) bound: f64,
-    /// What some sample is off, after decoding; infinite where a value is lost.
+    /// The largest error of any decoded sample; infinite if a value is lost.
     pub(super) largest_error: f64,
-    /// From opening the archive to the last byte, in memory.
+    /// Seconds from opening the archive to the last byte, in memory.
     pub(super) encode_seconds: f64,
-    /// From opening the file to all samples in one array, as the peers have them.
+    /// Seconds from opening the file to all samples in one array, like the peers.
     pub(super) decode_seconds: f64,
-    /// From opening the file to the codes of all blocks, one after another, as the renderer takes them.
+    /// Seconds from opening the file to the codes of all blocks, one after another, like the renderer.
     pub(super) codes_seconds: f64,
 }
 
-/// Measures, and compares every sample.
-pub(in crate::bench) fn measure(task: &Task) -> Result<Measured> {
+impl ProcessTask for Task {
+    const NAME: &'static str = "size";
+    type Measured = Measured;
+
+    fn measure(&self) -> Result<Measured> {
+        measure(self)
+    }
+}
+
+/// Measures all times, and compares every sample.
+fn measure(task: &Task) -> Result<Measured> {
     stay_on_one_core();
     let ((report, bytes), encode_seconds) = least(task.repeats, || encode(task))?;
     fs::write(&task.output, &bytes).map_err(|e| Error::io(&task.output, "writing", e))?;
@@ -115,7 +125,7 @@ fn decode(path: &Path) -> Result<MmapMut> {
     Ok(out)
 }
 
-/// Memory as the peers' arrays have it: NumPy asks for large pages, which come in a fraction of the time.
+/// Memory like that of the peers' arrays: NumPy requests large pages, which take a fraction of the time.
 fn array(len: usize) -> std::io::Result<MmapMut> {
     let array = MmapMut::map_anon(len)?;
     #[cfg(target_os = "linux")]
@@ -123,15 +133,15 @@ fn array(len: usize) -> std::io::Result<MmapMut> {
     Ok(array)
 }
 
-/// Where a block belongs.
-struct Place<'a> {
+/// The position of a block in the archive.
+struct BlockPosition<'a> {
     codec: &'a WindowCodec,
     first_frame: usize,
     region: Region,
 }
 
 /// Reads every block with all its codes, one after another.
-fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&Place<'_>, &Block)) -> Result<()> {
+fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&BlockPosition<'_>, &Block)) -> Result<()> {
     let whole = file.grid.whole();
     for window in 0..file.metadata().windows.len() as u32 {
         let codec = &file.codec(window)?;
@@ -140,7 +150,7 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&Place<'_>, &Blo
         for entries in file.entries(window, 0, &whole) {
             for entry in entries? {
                 let region = file.blocks.region(entry.id.block as usize);
-                visit(&Place { codec, first_frame, region }, &file.block(codec, &entry, &wanted)?);
+                visit(&BlockPosition { codec, first_frame, region }, &file.block(codec, &entry, &wanted)?);
             }
         }
     }
@@ -156,7 +166,7 @@ fn put(block: &[u8], region: &Region, frame: &mut [u8], whole: &Region, size: us
     }
 }
 
-/// Of any sample against the archive, rounded up; infinite where a value is lost.
+/// The largest error of any sample compared with the archive, rounded up; infinite if a value is lost.
 fn largest_error(source: &Path, samples: &[u8]) -> Result<f64> {
     let mut archive = source::open(&[source.into()], &OpenOptions::default())?;
     let (whole, ty) = (archive.archive().grid.whole(), archive.archive().sample);

@@ -1,4 +1,4 @@
-//! Other programs' coders, by the script in `tools/peers`.
+//! Coders of other programs, run by the script in `tools/peers`.
 
 use super::row::Row;
 use serde::Deserialize;
@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use wavesplat::base::error::{Error, Result};
 
-/// The peer whose times the targets are about; of the others times are taken once.
+/// The peer whose times the targets refer to. The other peers are timed once.
 pub(super) const TIMED: &str = "sz3-4d";
 
-/// The script and what runs it.
+/// The script and its interpreter.
 #[derive(Debug, Clone)]
 pub struct Peers {
-    /// Python, with what `tools/peers/requirements.txt` names.
+    /// Python with the packages of `tools/peers/requirements.txt`.
     pub python: PathBuf,
     /// `peers.py`.
     pub script: PathBuf,
@@ -32,7 +32,7 @@ impl Peers {
         self.run(&self.script, fixed.into_iter().chain(size.iter().map(OsStr::new))).map(|_| ())
     }
 
-    /// Measures peers on a file: all of them, or the timed one alone.
+    /// Measures all peers on a file, or only the timed one.
     pub(in crate::bench) fn measure(&self, task: &PeersTask) -> Result<Vec<Row>> {
         let tolerances: Vec<String> = task.tolerances.iter().map(|t| format!("{t:e}")).collect();
         let (tolerances, repeats) = (tolerances.join(","), task.repeats.to_string());
@@ -46,17 +46,17 @@ impl Peers {
         lines.lines().map(|line| self.line(line)?.row(task)).collect()
     }
 
-    /// What the script `views.py` beside the other prints of an archive, a line for each renderer.
+    /// The output of the script `views.py` for an archive: a line for each renderer.
     pub(in crate::bench) fn views(&self, archive: &Path, args: &[String]) -> Result<Vec<u8>> {
         let (script, fixed) = (self.script.with_file_name("views.py"), [archive.as_os_str()]);
         self.run(&script, fixed.into_iter().chain(args.iter().map(OsStr::new)))
     }
 
     fn line(&self, text: &str) -> Result<Line> {
-        serde_json::from_str(text).map_err(|e| crate::bench::bad_json(&self.script, &e))
+        serde_json::from_str(text).map_err(|e| crate::bench::json::bad_json(&self.script, &e))
     }
 
-    /// What a script prints.
+    /// The output of a script.
     fn run<'a>(&self, script: &Path, args: impl IntoIterator<Item = &'a OsStr>) -> Result<Vec<u8>> {
         let mut command = Command::new(&self.python);
         command.arg(script).args(args).stderr(Stdio::inherit());
@@ -68,7 +68,7 @@ impl Peers {
     }
 }
 
-/// What the script is to measure.
+/// The settings of a measurement by the script.
 pub(in crate::bench) struct PeersTask<'a> {
     /// The name of the data.
     pub(in crate::bench) data: &'a str,
@@ -81,7 +81,7 @@ pub(in crate::bench) struct PeersTask<'a> {
     pub(in crate::bench) only: Option<&'a str>,
 }
 
-/// A line of the script; `peers.py --help` says what it means.
+/// A line of the script's output; see `peers.py --help`.
 #[derive(Deserialize)]
 struct Line {
     tolerance: f64,
@@ -95,7 +95,7 @@ struct Line {
 
 impl Line {
     fn row(self, task: &PeersTask<'_>) -> Result<Row> {
-        // The very number that was asked for, not what became of it on its way.
+        // Restores the exact tolerance, without its conversion to text.
         let asked = task.tolerances.iter().find(|t| (*t / self.tolerance - 1.0).abs() < 1e-12);
         let unasked = || Error::input(task.path, format!("the peers' script measured {:e}", self.tolerance));
         Ok(Row {

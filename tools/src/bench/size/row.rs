@@ -1,26 +1,7 @@
-//! What is recorded.
+//! The measurements of one coder.
 
-use super::data::Data;
 use super::own::Measured;
-use super::targets::Verdict;
-use crate::bench::machine::Made;
 use serde::{Deserialize, Serialize};
-
-/// All results of a run: `size.json`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Results {
-    /// By what, where and when.
-    #[serde(flatten)]
-    pub made: Made,
-    /// How many rounds were run, in each of which every time is taken [`super::IN_A_ROW`] times.
-    pub rounds: usize,
-    /// What was measured.
-    pub data: Vec<Data>,
-    /// Every coder on everything at every tolerance.
-    pub rows: Vec<Row>,
-    /// Which targets are met.
-    pub verdicts: Vec<Verdict>,
-}
 
 /// A coder on one archive at one tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -31,50 +12,50 @@ pub struct Row {
     pub tolerance: f64,
     /// A scheme of wavesplat, or a peer.
     pub coder: String,
-    /// Of the whole file.
+    /// Bytes of the whole file.
     pub bytes: u64,
-    /// Bytes of samples by bytes of the file.
+    /// Bytes of samples divided by bytes of the file.
     pub ratio: f64,
-    /// What no sample may be off, in the units of the samples.
+    /// The largest error that a sample may have, in the units of the samples.
     pub bound: f64,
-    /// What some sample is off, in the units of the samples; nothing (infinite) where a value is lost.
+    /// The largest error of any sample, in the units of the samples; infinite (null in JSON) if a value is lost.
     #[serde(deserialize_with = "infinite_if_null")]
     pub largest_error: f64,
     /// Samples to bytes, seconds of one core.
     pub encode_seconds: f64,
     /// Bytes to samples in one array, seconds of one core.
     pub decode_seconds: f64,
-    /// Of wavesplat alone.
+    /// Additional measurements of wavesplat's rows.
     pub own: Option<Own>,
 }
 
-/// What only wavesplat's rows have.
+/// The measurements that only wavesplat's rows have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Own {
     /// Bytes to codes, ready to be splatted, seconds of one core.
     pub codes_seconds: f64,
     /// Nonzero codes for each sample.
     pub codes_per_sample: f64,
-    /// Samples stored exactly because codes missed the bound.
+    /// Samples stored exactly because their codes exceed the bound.
     pub outliers: u64,
     /// Samples of blocks that are stored exactly and so have no codes.
     pub exact_samples: u64,
 }
 
-/// JSON has no infinity: serde writes nothing for it.
+/// JSON has no infinity: serde writes null.
 fn infinite_if_null<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
 impl Row {
-    /// Of wavesplat.
-    pub(super) fn of_own(data: &Data, tolerance: f64, scheme: &str, measured: &Measured) -> Self {
+    /// A row of wavesplat, for data of this name and number of bytes.
+    pub(super) fn of_scheme(data: (&str, u64), tolerance: f64, scheme: &str, measured: &Measured) -> Self {
         Self {
-            data: data.name.clone(),
+            data: data.0.into(),
             tolerance,
             coder: scheme.into(),
             bytes: measured.bytes,
-            ratio: data.bytes as f64 / measured.bytes as f64,
+            ratio: data.1 as f64 / measured.bytes as f64,
             bound: measured.bound,
             largest_error: measured.largest_error,
             encode_seconds: measured.encode_seconds,
@@ -88,7 +69,7 @@ impl Row {
         }
     }
 
-    /// Whether no sample is further off than the bound allows.
+    /// Whether every sample's error is within the bound.
     pub fn holds(&self) -> bool {
         self.largest_error <= self.bound
     }

@@ -1,4 +1,4 @@
-//! The ways of converting that are measured: all that this benchmark knows of them is a name and a configuration.
+//! The measured ways of converting. This benchmark knows only their names and configurations.
 
 use wavesplat::base::error::{Error, Result};
 use wavesplat::convert::{ConvertConfig, SchemeConstraint};
@@ -9,17 +9,17 @@ use wavesplat::wavelet::Basis;
 pub struct Scheme {
     /// Its name.
     pub name: &'static str,
-    /// The configuration for a tolerance and so many bytes of memory.
+    /// The configuration for a tolerance and a memory budget in bytes.
     config: fn(f64, usize) -> ConvertConfig,
 }
 
-/// The scheme that nonzero codes are counted against: Haar along time and nothing else.
+/// The scheme with which nonzero codes are compared: Haar along time, nothing in space.
 pub const BASELINE: &str = "haar";
 
-/// All schemes; a further one is a further line.
+/// All schemes. Add a line to add a scheme.
 pub const SCHEMES: [Scheme; 2] = [
     Scheme { name: BASELINE, config: |tolerance, memory| ConvertConfig::new(Basis::Haar, 32, tolerance, memory) },
-    // What `wavesplat convert` does unless told otherwise.
+    // The default of `wavesplat convert`.
     Scheme {
         name: "default",
         config: |tolerance, memory| ConvertConfig::new(SchemeConstraint::AUTO, 32, tolerance, memory),

@@ -1,17 +1,18 @@
 //! The tables for people, in Markdown.
 
-use super::row::{Results, Row};
+use super::results::Results;
+use super::row::Row;
 use super::schemes::{BASELINE, SCHEMES};
 use super::targets::{TARGETS, Verdict};
-use crate::bench::machine::Made;
+use crate::bench::machine::Provenance;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
 Every coder keeps every sample within tolerance x value range; every sample was compared. Sizes are those of whole
-files. *3d*: each frame by itself; *4d*: the whole series as one array. Times are seconds of one core, the least of all
-rounds, every conversion and decoding of wavesplat in a process of its own, in turns with the peers: *convert* from
-samples to bytes in memory, *values* back to samples in one array, *codes* to codes that are ready to be splatted.
-✗ marks a target that is missed, or a bound, be it by rounding alone.
+files. *3d*: each frame separately; *4d*: the whole series as one array. Times are seconds of one core, the least of all
+rounds. Every conversion and decoding of wavesplat ran in its own process, in turns with the peers: *convert* from
+samples to bytes in memory, *values* back to samples in one array, *codes* to codes that are ready for splatting.
+✗ marks a missed target, or a missed bound, even if only by rounding.
 ";
 
 /// The mark of what is missed.
@@ -19,7 +20,7 @@ const MISSED: &str = " ✗";
 
 pub(super) fn markdown(results: &Results) -> String {
     let coders = coders(&results.rows);
-    let mut text = format!("# Sizes and times beside other coders\n\n{}\n\n{HEAD}", made(results));
+    let mut text = format!("# Sizes and times compared with other coders\n\n{}\n\n{HEAD}", made(results));
     text += &targets(results);
     text += &section("Compression ratio", results, &coders, |row| format!("{:.1}", row.ratio));
     let of_bound = |row: &Row| format!("{:.4}{}", share(row), if row.holds() { "" } else { MISSED });
@@ -29,7 +30,7 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { made: Made { machine, version, date, .. }, rounds, .. } = results;
+    let Results { made: Provenance { machine, version, date, .. }, rounds, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let mut text =
         format!("wavesplat {version} on one core of {cpu}, {}, {date}; {rounds} round(s).\n", machine.system);

@@ -1,30 +1,30 @@
-//! What wavesplat is to reach beside its peers, and whether it does.
+//! The targets for wavesplat compared with its peers, and whether it meets them.
 
 use super::peers::TIMED;
 use super::row::Row;
 use super::schemes::BASELINE;
 use serde::{Deserialize, Serialize};
 
-/// A number of a scheme beside another coder's, and what it is to be.
+/// A number of a scheme compared with another coder's, and its target.
 pub(super) struct Target {
     /// What is compared.
     pub(super) name: &'static str,
     /// The other coder.
     against: &'static str,
-    /// From this coder's row and the other's.
+    /// Computes the number from this coder's row and the other's.
     value: fn(&Row, &Row) -> Option<f64>,
-    /// Which values are good.
-    wanted: Wanted,
+    /// The values that meet the target.
+    wanted: Threshold,
 }
 
 #[derive(Clone, Copy)]
-enum Wanted {
+enum Threshold {
     Below(f64),
     AtMost(f64),
     AtLeast(f64),
 }
 
-impl Wanted {
+impl Threshold {
     fn met(self, value: f64) -> bool {
         match self {
             Self::Below(limit) => value < limit,
@@ -42,51 +42,52 @@ impl Wanted {
     }
 }
 
-const fn size(name: &'static str, against: &'static str, wanted: Wanted) -> Target {
+const fn size(name: &'static str, against: &'static str, wanted: Threshold) -> Target {
     let value = |own: &Row, other: &Row| Some(own.bytes as f64 / other.bytes as f64);
     Target { name, against, value, wanted }
 }
 
-/// All targets. Sizes are shares of the other's; codes and times are how many times fewer or shorter.
+/// All targets. Sizes are shares of the other coder's; codes and times are factors by which there are fewer or they
+/// are shorter.
 pub(super) const TARGETS: [Target; 8] = [
-    size("bytes / sz3-3d", "sz3-3d", Wanted::Below(1.0)),
-    size("bytes / sz3-4d", "sz3-4d", Wanted::AtMost(1.0)),
-    size("bytes / zfp-4d", "zfp-4d", Wanted::Below(1.0)),
-    size("bytes / sperr-3d", "sperr-3d", Wanted::Below(1.0)),
+    size("bytes / sz3-3d", "sz3-3d", Threshold::Below(1.0)),
+    size("bytes / sz3-4d", "sz3-4d", Threshold::AtMost(1.0)),
+    size("bytes / zfp-4d", "zfp-4d", Threshold::Below(1.0)),
+    size("bytes / sperr-3d", "sperr-3d", Threshold::Below(1.0)),
     Target {
         name: "fewer codes than haar",
         against: BASELINE,
         value: |own, haar| Some(haar.own.as_ref()?.codes_per_sample / own.own.as_ref()?.codes_per_sample),
-        wanted: Wanted::AtLeast(3.0),
+        wanted: Threshold::AtLeast(3.0),
     },
     Target {
         name: "faster conversion than sz3-4d",
         against: TIMED,
         value: |own, peer| Some(peer.encode_seconds / own.encode_seconds),
-        wanted: Wanted::AtLeast(1.0),
+        wanted: Threshold::AtLeast(1.0),
     },
     Target {
         name: "faster to values than sz3-4d",
         against: TIMED,
         value: |own, peer| Some(peer.decode_seconds / own.decode_seconds),
-        wanted: Wanted::AtLeast(1.5),
+        wanted: Threshold::AtLeast(1.5),
     },
     Target {
         name: "faster to codes than sz3-4d",
         against: TIMED,
         value: |own, peer| Some(peer.decode_seconds / own.own.as_ref()?.codes_seconds),
-        wanted: Wanted::AtLeast(3.0),
+        wanted: Threshold::AtLeast(3.0),
     },
 ];
 
 impl Target {
-    /// What is wanted, as "<= 1".
+    /// The threshold in words, such as "<= 1".
     pub(super) fn wanted(&self) -> String {
         self.wanted.words()
     }
 }
 
-/// A target and what became of it.
+/// A target and its result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// The name of the archive.
@@ -105,7 +106,7 @@ pub struct Verdict {
     pub met: bool,
 }
 
-/// Judges every scheme but the baseline wherever there is something to compare it with.
+/// Compares every scheme except the baseline with the coders that were measured.
 pub(super) fn judge(rows: &[Row]) -> Vec<Verdict> {
     let schemes = rows.iter().filter(|r| r.own.is_some() && r.coder != BASELINE);
     schemes.flat_map(|row| TARGETS.iter().filter_map(|target| verdict(row, target, rows))).collect()
@@ -113,7 +114,7 @@ pub(super) fn judge(rows: &[Row]) -> Vec<Verdict> {
 
 fn verdict(row: &Row, target: &Target, rows: &[Row]) -> Option<Verdict> {
     let beside = |r: &&Row| r.coder == target.against && r.data == row.data && r.tolerance == row.tolerance;
-    // Nothing by nothing is no number, where neither has codes: nothing to compare.
+    // If neither has codes, the ratio is not a number: there is nothing to compare.
     let value = (target.value)(row, rows.iter().find(beside)?).filter(|v| v.is_finite())?;
     Some(Verdict {
         data: row.data.clone(),

@@ -1,4 +1,4 @@
-//! What the system knows of a process and of files: the cache, the storage, memory.
+//! What the system reports about a process and its files: cache, storage and memory.
 
 use super::measured::Measured;
 use std::fs::{self, File};
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use wavesplat::base::error::{Error, Result};
 
-/// Asks the system to drop what it has cached of a file; whether it did, [`from_storage`] tells.
+/// Asks the system to drop its cache of a file. [`from_storage`] shows whether it did.
 #[cfg(target_os = "linux")]
 pub(super) fn forget(path: &Path) -> Result<()> {
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
@@ -16,18 +16,18 @@ pub(super) fn forget(path: &Path) -> Result<()> {
     asked.map_err(|e| Error::io(path, "emptying the cache", e.into()))
 }
 
-/// Elsewhere nobody is asked, and nothing will come from the storage.
+/// On other systems nothing is dropped, and no bytes are reported as read from storage.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn forget(path: &Path) -> Result<()> {
     File::open(path).map(drop).map_err(|e| Error::io(path, "opening", e))
 }
 
-/// Bytes that this process had to have read from the storage, where the system tells.
+/// Bytes that were read from storage for this process, if the system reports it.
 pub(super) fn from_storage() -> Option<u64> {
     number(&fs::read_to_string("/proc/self/io").ok()?, "read_bytes:")
 }
 
-/// Bytes of memory that belong to this process alone, mapped files left out.
+/// Bytes of memory that belong to this process alone, without mapped files.
 fn heap() -> Option<u64> {
     number(&fs::read_to_string("/proc/self/status").ok()?, "RssAnon:").map(|kib| kib << 10)
 }
@@ -36,10 +36,10 @@ fn number(text: &str, name: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }
 
-/// How often memory is looked at.
+/// Interval between two samples of memory.
 const INTERVAL: Duration = Duration::from_millis(2);
 
-/// Adds the most memory that was seen while `work` ran.
+/// Adds the peak memory observed while `work` ran.
 pub(super) fn with_peak_heap(work: impl FnOnce() -> Result<Measured>) -> Result<Measured> {
     let (done, peak) = (AtomicBool::new(false), AtomicU64::new(0));
     let measured = std::thread::scope(|scope| {

@@ -1,4 +1,4 @@
-//! Conversion, as it is measured.
+//! The measured conversion.
 
 use super::measured::{Measured, Stopwatch};
 use crate::bench::stages::MEMORY;
@@ -12,7 +12,7 @@ use wavesplat::convert::{ConvertConfig, SchemeConstraint, convert};
 use wavesplat::source::{self, OpenOptions};
 use wavesplat::wavelet::Basis;
 
-/// What to convert, and how.
+/// The settings of a conversion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Conversion {
     pub(super) source: PathBuf,
@@ -25,10 +25,10 @@ pub(super) struct Conversion {
     pub(super) output: PathBuf,
 }
 
-/// The ways of converting that are measured.
+/// The measured ways of converting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Scheme {
-    /// What the program does unless told otherwise.
+    /// The program's default.
     Auto,
     Haar,
     Multi,
@@ -52,7 +52,7 @@ impl Scheme {
     }
 }
 
-/// Converts to a file, which need not have reached the disk.
+/// Converts to a file, without waiting for the disk.
 pub(super) fn run(conversion: &Conversion) -> Result<Measured> {
     let Conversion { source, scheme, window, tolerance, range, output } = conversion;
     let plain = ConvertConfig::new(scheme.coding(), *window, *tolerance, MEMORY);

@@ -1,4 +1,4 @@
-//! Bare decoding: what no picture can do without.
+//! Bare decoding, which every picture needs.
 
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -8,7 +8,7 @@ use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::file::CoefficientFile;
 use wavesplat_format::{BlockEntry, Reader};
 
-/// From opening a file to the codes of all of its blocks, which are not kept; returns the bytes that were read of blocks.
+/// Decodes the codes of all blocks of a file, from opening it, without keeping them. Returns the bytes read of blocks.
 pub(super) fn codes(path: &Path) -> Result<u64> {
     let file = CoefficientFile::open(path, Access::Map)?;
     let whole = file.grid.whole();
@@ -27,8 +27,7 @@ pub(super) fn codes(path: &Path) -> Result<u64> {
     Ok(bytes)
 }
 
-/// From opening a file to all of its parts as zstd gives them, copied out and checked before, and not kept; returns
-/// their bytes.
+/// Reads, checks and decompresses all parts of a file, from opening it, without keeping them. Returns their bytes.
 pub(super) fn payloads(path: &Path) -> Result<u64> {
     let failed = |source| Error::CoefficientFile { path: path.into(), source };
     let reader = Reader::open(FileBytes::open(path, Access::Map)?).map_err(failed)?;

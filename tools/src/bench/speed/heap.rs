@@ -1,17 +1,17 @@
-//! Memory: what conversion takes of archives of different sizes.
+//! Peak memory of converting archives of different sizes.
 
+use super::archives::{Bench, Subject};
 use super::convert::{Conversion, Scheme};
-use super::rows::{Row, Value, Wanted};
+use super::results::{Row, Threshold, Value};
 use super::work::{Task, Work};
-use super::{Bench, Subject};
 use crate::bench::stages::MEMORY;
 use crate::synth::Kind;
 use wavesplat::base::error::Result;
 
-/// How much the peaks may differ where they are to be equal: what the allocator and the looks make of it.
+/// Largest ratio of peaks that count as equal, because of the allocator and the sampling.
 const EQUAL: f64 = 1.05;
 
-/// What is compared.
+/// The names of the targets.
 const WITHIN: &str = "peak heap of conversion / --memory";
 const ALIKE: &str = "peak heap of conversion, largest archive / smallest";
 
@@ -21,25 +21,26 @@ impl Bench<'_> {
         let why = || Err("not measured: needs --large".to_string());
         let large = &self.config.large;
         if large.is_empty() {
-            let row =
-                |target, limit| Row::new(target, "4 GiB and 20 GiB", String::new(), why(), Some(Wanted::AtMost(limit)));
+            let row = |target, limit| {
+                Row::new(target, "4 GiB and 20 GiB", String::new(), why(), Some(Threshold::AtMost(limit)))
+            };
             return Ok(vec![row(WITHIN, 1.0), row(ALIKE, EQUAL)]);
         }
         let (mut rows, mut peaks) = (Vec::new(), Vec::new());
         for dims in large {
             let (name, peak) = self.peak(*dims, say)?;
             let share = peak.clone().map(|p| (p / MEMORY as f64, format!("{:.0} MiB", p / 1024.0 / 1024.0)));
-            rows.push(Row::new(WITHIN, &name, "default settings".into(), share, Some(Wanted::AtMost(1.0))));
+            rows.push(Row::new(WITHIN, &name, "default settings".into(), share, Some(Threshold::AtMost(1.0))));
             peaks.push(peak);
         }
         let all = peaks.into_iter().collect::<std::result::Result<Vec<f64>, String>>();
         let alike: Value = all.map(|p| (p[p.len() - 1] / p[0], String::new()));
-        rows.push(Row::new(ALIKE, "both", "default settings".into(), alike, Some(Wanted::AtMost(EQUAL))));
+        rows.push(Row::new(ALIKE, "both", "default settings".into(), alike, Some(Threshold::AtMost(EQUAL))));
         Ok(rows)
     }
 
     fn peak(&self, dims: [usize; 4], say: &mut dyn FnMut(&str)) -> Result<(String, std::result::Result<f64, String>)> {
-        let subject = Subject::Made(Kind::Moving, dims);
+        let subject = Subject::Synthetic(Kind::Moving, dims);
         let data = subject.data(self.work, say)?;
         say(&format!("looking at the memory of converting {}", data.name));
         let conversion = Conversion {

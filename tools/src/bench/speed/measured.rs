@@ -1,15 +1,15 @@
-//! What a process measured, and the least of several.
+//! The measurements of a process, and the least of several.
 
 use crate::bench::size::clock;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Seconds of the processor, all threads together, and of the clock on the wall.
+/// Seconds of processor time, over all threads, and of wall time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Time {
     /// All threads together.
     pub processor: f64,
-    /// From beginning to end.
+    /// From start to end.
     pub wall: f64,
 }
 
@@ -19,7 +19,7 @@ impl Time {
         Self { processor: self.processor.min(other.processor), wall: self.wall.min(other.wall) }
     }
 
-    /// What counts: the processor's where there is one thread, since neighbours disturb it least, else the wall's.
+    /// The time that counts: processor time with one thread, because neighbours disturb it least; otherwise wall time.
     pub(super) fn of(&self, threads: usize) -> f64 {
         if threads == 1 { self.processor } else { self.wall }
     }
@@ -40,7 +40,7 @@ impl Stopwatch {
         Time { processor: clock::seconds() - self.processor, wall: self.wall.elapsed().as_secs_f64() }
     }
 
-    /// What `work` returns, and how long it took.
+    /// The result of `work`, and its time.
     pub(super) fn time<T, E>(work: impl FnOnce() -> Result<T, E>) -> Result<(T, Time), E> {
         let watch = Self::start();
         let result = work()?;
@@ -48,33 +48,33 @@ impl Stopwatch {
     }
 }
 
-/// What a process measured.
+/// The measurements of a process.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// Of the whole; of a view from opening its input to its last picture.
+    /// Time of the whole; for a view, from opening its input to its last picture.
     pub time: Time,
-    /// Of a view: the least that all pictures took, with the input open.
+    /// For a view: the least time of all pictures with the input open.
     pub further: Option<Time>,
-    /// Share of a view's time that went into decoding and splatting, as the library reports it.
+    /// Share of a view's time for decoding and splatting, as the library reports it.
     pub splatting: Option<f64>,
-    /// How a view was splatted.
+    /// The splat method of a view.
     pub method: Option<String>,
-    /// Bytes that were made or read: of a coefficient file; of its blocks in a view or a bare decoding.
+    /// Bytes written or read: of a coefficient file, or of its blocks in a view or bare decoding.
     pub bytes: u64,
-    /// Nonzero codes for each sample of a file.
+    /// Nonzero codes per sample of a file.
     pub codes_per_sample: Option<f64>,
-    /// Share of the volume's voxels in the picture and the region, of a close-up.
+    /// For a close-up: share of the volume's voxels in the picture and the region.
     pub seen: Option<f64>,
-    /// Of a cold view: bytes that came from the storage.
+    /// For a cold view: bytes that came from storage.
     pub from_storage: Option<u64>,
-    /// The most memory of its own that the process was seen to have.
+    /// Peak memory observed for this process alone.
     pub peak_heap: Option<u64>,
-    /// Of compared pictures: the largest error and the root mean square, as shares of the largest absolute pixel.
+    /// For compared pictures: the largest error and the root mean square, as shares of the largest absolute pixel.
     pub errors: Vec<(f64, f64)>,
 }
 
 impl Measured {
-    /// Joins what another round measured of the same.
+    /// Joins the measurements of another round.
     pub(super) fn join(&mut self, other: &Self) {
         if let (Some(mine), Some(others)) = (self.further, other.further) {
             // The share belongs to the faster view.
@@ -85,6 +85,11 @@ impl Measured {
         self.from_storage = self.from_storage.min(other.from_storage);
         self.peak_heap = self.peak_heap.max(other.peak_heap);
     }
+}
+
+/// The time of a view with its input open.
+pub(super) fn further(view: &Measured) -> Time {
+    view.further.unwrap_or(view.time)
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! The case of [Dobashi](wavesplat::bibliography), table 1: eddy currents in a plate, Haar and multiwavelet, beside both conventional forms.
 
+use super::archives::Bench;
 use super::convert::{Conversion, Scheme};
-use super::measured::Measured;
-use super::rows::{Row, further};
+use super::measured::{Measured, further};
+use super::results::Row;
 use super::view::{Method, View};
 use super::work::{Task, Work};
-use super::{Bench, Data};
-use crate::bench::look::Look;
-use crate::bench::size::Subject;
+use crate::bench::camera::CameraSettings;
+use crate::bench::size::{Data, Subject};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use wavesplat::base::error::Result;
@@ -65,7 +65,7 @@ impl Bench<'_> {
         View {
             input,
             method,
-            look: Look::first(data.dims, self.config.size),
+            camera: CameraSettings::first(data.dims, self.config.size),
             splat_error: TOLERANCE / 10.0,
             frames: (0..data.frames).collect(),
             region: None,

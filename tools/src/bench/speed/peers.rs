@@ -2,7 +2,8 @@
 
 use super::measured::{Measured, Time};
 use super::plan::{Plan, key};
-use super::{Archive, Bench};
+use super::results::Archive;
+use super::settings::Config;
 use crate::bench::size::Peers;
 use crate::bench::size::peers::PeersTask;
 use serde::Deserialize;
@@ -23,56 +24,54 @@ struct Line {
     why: String,
 }
 
-impl Bench<'_> {
-    /// Adds what other programs take, or why that is not known.
-    pub(super) fn peers(&self, plan: &Plan<'_>, found: &mut Archive, say: &mut dyn FnMut(&str)) -> Result<()> {
-        let Some(peers) = &self.config.peers else {
-            found.missing.extend(all_keys(plan).into_iter().map(|key| (key, "not measured: needs --peers".into())));
-            return Ok(());
-        };
-        say(&format!("measuring other programs on {}", found.data.name));
-        self.sz3(peers, plan, found)?;
-        for (threads, spacing) in plan.threads.iter().flat_map(|t| plan.spacings.iter().map(|s| (*t, *s))) {
-            self.views(peers, (threads, spacing), found)?;
-        }
-        Ok(())
+/// Adds what other programs take, or why that is not known.
+pub(super) fn add(config: &Config, plan: &Plan<'_>, found: &mut Archive, say: &mut dyn FnMut(&str)) -> Result<()> {
+    let Some(peers) = &config.peers else {
+        found.missing.extend(all_keys(plan).into_iter().map(|key| (key, "not measured: needs --peers".into())));
+        return Ok(());
+    };
+    say(&format!("measuring other programs on {}", found.data.name));
+    sz3(config, peers, plan, found)?;
+    for (threads, spacing) in plan.threads.iter().flat_map(|t| plan.spacings.iter().map(|s| (*t, *s))) {
+        views(config, peers, (threads, spacing), found)?;
     }
+    Ok(())
+}
 
-    fn sz3(&self, peers: &Peers, plan: &Plan<'_>, found: &mut Archive) -> Result<()> {
-        let task = PeersTask {
-            data: &found.data.name,
-            data_bytes: found.data.bytes,
-            path: plan.data.path.as_path(),
-            tolerances: &self.config.tolerances,
-            repeats: self.config.repeats,
-            only: Some(SZ3),
-        };
-        for row in peers.measure(&task)? {
-            let time = Time { processor: row.decode_seconds, wall: row.decode_seconds };
-            let measured = Measured { time, bytes: row.bytes, ..Measured::default() };
-            found.measured.insert(format!("{SZ3} {:e}", row.tolerance), measured);
-        }
-        Ok(())
+fn sz3(config: &Config, peers: &Peers, plan: &Plan<'_>, found: &mut Archive) -> Result<()> {
+    let task = PeersTask {
+        data: &found.data.name,
+        data_bytes: found.data.bytes,
+        path: plan.data.path.as_path(),
+        tolerances: &config.tolerances,
+        repeats: config.repeats,
+        only: Some(SZ3),
+    };
+    for row in peers.measure(&task)? {
+        let time = Time { processor: row.decode_seconds, wall: row.decode_seconds };
+        let measured = Measured { time, bytes: row.bytes, ..Measured::default() };
+        found.measured.insert(format!("{SZ3} {:e}", row.tolerance), measured);
     }
+    Ok(())
+}
 
-    fn views(&self, peers: &Peers, (threads, spacing): (usize, f64), found: &mut Archive) -> Result<()> {
-        let numbers = [("--spacing", spacing), ("--size", self.config.size as f64), ("--threads", threads as f64)];
-        let mut args: Vec<String> = numbers.iter().flat_map(|(name, n)| [(*name).into(), n.to_string()]).collect();
-        args.extend(["--repeats".into(), self.config.repeats.to_string()]);
-        let text = peers.views(&found.data.path, &args)?;
-        for line in String::from_utf8_lossy(&text).lines() {
-            let line: Line = serde_json::from_str(line).map_err(|e| crate::bench::bad_json(&peers.script, &e))?;
-            let key = key(&line.renderer, None, Some(spacing), threads);
-            match line.seconds {
-                None => drop(found.missing.insert(key, format!("not measured: {}", line.why))),
-                Some((processor, wall)) => {
-                    let time = Time { processor, wall };
-                    found.measured.insert(key, Measured { time, ..Measured::default() });
-                }
+fn views(config: &Config, peers: &Peers, (threads, spacing): (usize, f64), found: &mut Archive) -> Result<()> {
+    let numbers = [("--spacing", spacing), ("--size", config.size as f64), ("--threads", threads as f64)];
+    let mut args: Vec<String> = numbers.iter().flat_map(|(name, n)| [(*name).into(), n.to_string()]).collect();
+    args.extend(["--repeats".into(), config.repeats.to_string()]);
+    let text = peers.views(&found.data.path, &args)?;
+    for line in String::from_utf8_lossy(&text).lines() {
+        let line: Line = serde_json::from_str(line).map_err(|e| crate::bench::json::bad_json(&peers.script, &e))?;
+        let key = key(&line.renderer, None, Some(spacing), threads);
+        match line.seconds {
+            None => drop(found.missing.insert(key, format!("not measured: {}", line.why))),
+            Some((processor, wall)) => {
+                let time = Time { processor, wall };
+                found.measured.insert(key, Measured { time, ..Measured::default() });
             }
         }
-        Ok(())
     }
+    Ok(())
 }
 
 fn all_keys(plan: &Plan<'_>) -> Vec<String> {

@@ -3,7 +3,7 @@
 use super::convert::{Conversion, Scheme};
 use super::view::{Method, View};
 use super::work::{Task, Work};
-use crate::bench::look::{Look, compared_frames};
+use crate::bench::camera::{CameraSettings, compared_frames};
 use crate::bench::size::Data;
 use std::path::{Path, PathBuf};
 use wavesplat::render::default_splat_error;
@@ -79,11 +79,11 @@ impl Plan<'_> {
     }
 
     fn view(&self, method: Method, file: Option<&Coded>, spacing: f64) -> View {
-        let look = Look { azimuth: 30.0, elevation: 30.0, size: self.size, scale: spacing };
+        let camera = CameraSettings { azimuth: 30.0, elevation: 30.0, size: self.size, scale: spacing };
         View {
             input: file.map_or(self.data.path.clone(), |f| self.path(f)),
             method,
-            look,
+            camera,
             // The conventional forms may add as much as the loosest file's.
             splat_error: file.unwrap_or(&self.files[0]).splat_error(),
             frames: (0..self.data.frames).collect(),
@@ -178,8 +178,8 @@ impl Plan<'_> {
             ));
         }
         for zoom in ZOOMS {
-            let look = Look { scale: spacing * zoom, ..whole.look };
-            views.push((format!("close-up {zoom}"), View { look, ..whole.clone() }));
+            let camera = CameraSettings { scale: spacing * zoom, ..whole.camera };
+            views.push((format!("close-up {zoom}"), View { camera, ..whole.clone() }));
         }
         views.extend(LOOSER.map(|limit| (format!("looser {limit:e}"), self.looser(limit))));
         views.push((WHOLE.into(), whole));

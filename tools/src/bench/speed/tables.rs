@@ -1,21 +1,20 @@
 //! The tables for people, in Markdown.
 
-use super::measured::Measured;
+use super::measured::{Measured, Time, further};
 use super::plan::{FINEST, LOOSER, WHOLE};
-use super::rows::{Row, further};
-use super::{Archive, Results};
-use crate::bench::machine::Made;
+use super::results::{Archive, Results, Row};
+use crate::bench::machine::Provenance;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
 All pictures of a view: the weighted mean, 32-bit, seen from 30 degrees about z and 30 above the horizon, kernel of 0.75
 voxels, no attenuation. Coefficient files keep every sample within the tolerance x value range; splatting may add half
-of the tolerance, at most 1e-3. With one thread, times are seconds of the processor on one core, else of the clock; each the least of
-all rounds, every measurement in a process of its own, in turns. *Textbook*: a table of footprints, frame by frame.
-*Best conventional*: that, or the library's own method for frames (*direct*), whichever is faster; frames are in the
-system's cache. *View of decoded codes*: a view less bare decoding of what it read. *Splat stage*: what the library reports
-as decoding and splatting, less bare decoding; of the textbook form, all but what precedes the first frame. Targets are
-about files of the default scheme at the first tolerance. ✗ marks what is missed.
+of the tolerance, at most 1e-3. With one thread, times are processor seconds on one core, otherwise wall seconds. Each is the
+least of all rounds; every measurement ran in its own process, in turns. *Textbook*: a table of footprints, frame by frame.
+*Best conventional*: the textbook form or the library's own method for frames (*direct*), whichever is faster; frames are in
+the system's cache. *View of decoded codes*: a view minus bare decoding of the bytes it read. *Splat stage*: decoding and
+splatting as reported by the library, minus bare decoding; for the textbook form, everything after its set-up. Targets
+refer to files of the default scheme at the first tolerance. ✗ marks missed targets.
 ";
 
 pub(super) fn markdown(results: &Results) -> String {
@@ -33,7 +32,7 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { made: Made { machine, version, date, .. }, rounds, size, .. } = results;
+    let Results { made: Provenance { machine, version, date, .. }, rounds, size, .. } = results;
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let mut text =
         format!("wavesplat {version} on {cpu}, {}, {date}; {rounds} round(s), {size}x{size} pixels.\n", machine.system);
@@ -76,7 +75,7 @@ fn targets<'a>(rows: &[&'a Row]) -> Vec<&'a str> {
 fn summary(rows: &[&Row]) -> String {
     let met = rows.iter().filter(|r| r.met == Some(true)).count();
     let (known, all) = (rows.iter().filter(|r| r.met.is_some()).count(), rows.len());
-    let mut text = format!("\n## Targets\n\n{met} of {known} are met; {} more are not measured.\n\n", all - known);
+    let mut text = format!("\n## Targets\n\n{met} of {known} are met; {} more were not measured.\n\n", all - known);
     text += "| target | wanted | measured | met | not measured |\n|---|---|--:|--:|--:|\n";
     for target in targets(rows) {
         let of_target: Vec<&&Row> = rows.iter().filter(|r| r.target == target).collect();
@@ -148,9 +147,8 @@ fn number(value: f64) -> String {
 fn parts(archive: &Archive) -> String {
     let Archive { data, measured, .. } = archive;
     let mut text = format!("\n## Parts of a view: {}\n\n", data.name);
-    text += "Of the first file, with the input open: *frames* of a window, a *region* with a share of the voxels, a *close-up*\n";
-    text +=
-        "so many times larger in a picture of the same size. *Seen*: the voxels in the region and in the picture.\n\n";
+    text += "For the first file, with the input open: *frames* of a window, a *region* with a share of the voxels, a *close-up*\n";
+    text += "this many times larger in a picture of the same size. *Seen*: the voxels in the region and in the picture.\n\n";
     text += "| part | seen | bytes read | seconds | of the whole |\n|---|--:|--:|--:|--:|\n";
     let whole = measured.get(WHOLE);
     let all = whole.map_or(f64::NAN, |m| further(m).processor);
@@ -183,9 +181,8 @@ fn looser(archive: &Archive) -> String {
     let errors = measured.get("true errors").map_or(&empty, |m| &m.errors);
     let mut text = format!("\n## Looser views: {}\n\n", data.name);
     text +=
-        "Of the finest file, limited by the expected error (share of the value range); then the conventional forms.\n";
-    text +=
-        "Errors are true, of a few frames against exact pictures of the archive, as shares of the largest pixel.\n\n";
+        "For the finest file, limited by the expected error (share of the value range); then the conventional forms.\n";
+    text += "Errors are true errors of a few frames, relative to exact pictures of the archive, as shares of the largest pixel.\n\n";
     text += "| limit | seconds | bytes read | largest | rms |\n|---|--:|--:|--:|--:|\n";
     let names = LOOSER.iter().map(|limit| format!("looser {limit:e}"));
     let names = std::iter::once(FINEST.to_string()).chain(names).chain(CONVENTIONAL.map(Into::into));
@@ -203,7 +200,7 @@ fn times(results: &Results) -> String {
     text += "|---|---|--:|--:|--:|--:|--:|---|--:|\n";
     for (data, key, m) in results.archives.iter().flat_map(|a| a.measured.iter().map(|(k, m)| (&a.data.name, k, m))) {
         if m.time.wall > 0.0 {
-            let two = |t: super::Time| format!("{:.4} | {:.4}", t.processor, t.wall);
+            let two = |t: Time| format!("{:.4} | {:.4}", t.processor, t.wall);
             let further = m.further.map_or(" | ".into(), two);
             let share = m.splatting.map_or(String::new(), |s| format!("{:.0} %", 100.0 * s));
             let method = m.method.as_deref().unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use super::cold;
 use super::measured::{Measured, Stopwatch, Time};
-use crate::bench::look::{Look, SIGMA};
+use crate::bench::camera::{CameraSettings, SIGMA};
 use crate::bench::plan::TEXTBOOK_CUT;
 use crate::bench::stages::MEMORY;
 use crate::bench::textbook;
@@ -25,7 +25,7 @@ pub(super) struct View {
     /// A coefficient file, or an archive.
     pub(super) input: PathBuf,
     pub(super) method: Method,
-    pub(super) look: Look,
+    pub(super) camera: CameraSettings,
     /// What splatting may add.
     pub(super) splat_error: f64,
     pub(super) frames: Vec<usize>,
@@ -146,7 +146,7 @@ impl Opened {
             Self::Textbook(source) => {
                 let last = view.frames.last().map_or(0, |f| f + 1);
                 let frames = if view.method == Method::TextbookSetUp { 0 } else { last };
-                textbook::render(source.as_mut(), frames, &view.look, TEXTBOOK_CUT, sink)?;
+                textbook::render(source.as_mut(), frames, &view.camera, TEXTBOOK_CUT, sink)?;
                 Ok(Shown { splatting: None, method: format!("table-{TEXTBOOK_CUT}"), bytes: 0 })
             }
         }
@@ -158,10 +158,10 @@ impl Opened {
             Self::Library(scene) => *scene.grid(),
             Self::Textbook(source) => source.archive().grid,
         };
-        let camera = Camera::new(&view.look.view(), &grid)?;
+        let camera = Camera::new(&view.camera.view(), &grid)?;
         let inside = |voxel: &[usize; 3]| {
             let [x, y, _] = camera.project(grid.position(*voxel));
-            [x, y].iter().all(|c| (0.0..view.look.size as f64).contains(c))
+            [x, y].iter().all(|c| (0.0..view.camera.size as f64).contains(c))
         };
         let region = region(view, &grid);
         Ok(region.iter().filter(inside).count() as f64 / grid.whole().voxels() as f64)
@@ -174,7 +174,7 @@ fn region(view: &View, grid: &Grid) -> Region {
 
 fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[f32])) -> Result<Shown> {
     let config = RenderConfig {
-        views: vec![view.look.view()],
+        views: vec![view.camera.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         quantity: Quantity::Mean,
         frames: view.frames.clone(),

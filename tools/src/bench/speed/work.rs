@@ -5,6 +5,7 @@ use super::convert::{self, Conversion};
 use super::decode;
 use super::measured::{Measured, Stopwatch};
 use super::view::{self, View};
+use crate::bench::process::ProcessTask;
 use crate::bench::size::clock::{stay_on_one_core, work_with};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -22,7 +23,7 @@ pub(in crate::bench) struct Task {
 pub(super) enum Work {
     /// Frames to a file.
     Convert(Conversion),
-    /// The same, with a look at memory every few milliseconds.
+    /// The same, with memory sampled every few milliseconds.
     Heap(Conversion),
     /// A file from its first byte to its last.
     Read(PathBuf),
@@ -36,8 +37,17 @@ pub(super) enum Work {
     Compare(View, Vec<View>),
 }
 
-/// Does it in this process.
-pub(in crate::bench) fn measure(task: &Task) -> Result<Measured> {
+impl ProcessTask for Task {
+    const NAME: &'static str = "speed";
+    type Measured = Measured;
+
+    fn measure(&self) -> Result<Measured> {
+        measure(self)
+    }
+}
+
+/// Measures in this process.
+fn measure(task: &Task) -> Result<Measured> {
     match task.threads {
         1 => stay_on_one_core(),
         more => work_with(more),

@@ -1,47 +1,47 @@
-//! The truth by brute force: every pixel times every voxel, in f64, the Gaussian never cut.
+//! The reference by brute force: every pixel times every voxel, in f64, with an uncut Gaussian.
 //!
-//! Written from the image model alone (the weighted mean along a ray, eq 12): nothing of the library's camera or
-//! splatting is used, and no trick that could be wrong.
+//! It is written from the image model alone (the weighted mean along a ray, eq 12). It uses neither the library's
+//! camera nor its splatting, and no optimisations that could be wrong.
 
-use super::look::{Look, SIGMA};
+use super::camera::{CameraSettings, SIGMA};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A pixel is compared where its weights sum to more than this share of the largest sum: surely more than the 1 %
-/// below which it is background, although the largest of the whole picture is not known here.
+/// A pixel is compared if its weights sum to more than this share of the largest sum. That is safely more than the 1 %
+/// below which it is background, although the largest sum of the whole picture is not known here.
 const SURELY_INSIDE: f64 = 0.011;
 
-/// What some pixels of some frames should be.
+/// The reference values of some pixels of some frames.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Truth {
+pub(super) struct ReferencePixels {
     /// The frames.
     frames: Vec<usize>,
-    /// Places in a picture, row by row.
+    /// Positions in a picture, row by row.
     pixels: Vec<usize>,
     /// Frame by frame, pixel by pixel.
     means: Vec<f64>,
-    /// Highest less lowest value of the archive.
+    /// Highest minus lowest value of the archive.
     range: f64,
 }
 
 /// Errors of pictures as shares of the value range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ImageError {
-    /// The largest of any pixel.
+    /// The largest error of any pixel.
     pub largest: f64,
     /// The root of the mean square.
     pub rms: f64,
 }
 
-impl Truth {
-    /// The means of `values` (frame number, samples of the volume) as seen by a look.
-    pub(super) fn new(dims: [usize; 3], look: &Look, values: &[(usize, Vec<f64>)], range: f64) -> Self {
-        let places = places(dims, look);
-        let pixels = look.compared_pixels();
-        let sums: Vec<Sums> = pixels.par_iter().map(|pixel| sums(&places, look, *pixel, values)).collect();
+impl ReferencePixels {
+    /// The means of `values` (frame number, samples of the volume) as seen by a camera.
+    pub(super) fn new(dims: [usize; 3], camera: &CameraSettings, values: &[(usize, Vec<f64>)], range: f64) -> Self {
+        let places = places(dims, camera);
+        let pixels = camera.compared_pixels();
+        let sums: Vec<Sums> = pixels.par_iter().map(|pixel| sums(&places, camera, *pixel, values)).collect();
         let largest = sums.iter().map(|s| s.weight).fold(0.0, f64::max);
-        let inside: Vec<(usize, &Sums)> = (pixels.iter().map(|[x, y]| y * look.size + x).zip(&sums))
+        let inside: Vec<(usize, &Sums)> = (pixels.iter().map(|[x, y]| y * camera.size + x).zip(&sums))
             .filter(|(_, sums)| sums.weight > SURELY_INSIDE * largest)
             .collect();
         let frame = |f: usize| inside.iter().map(move |(_, sums)| sums.values[f] / sums.weight);
@@ -53,8 +53,8 @@ impl Truth {
         }
     }
 
-    /// The differences of a picture from the truth; none where the frame is not compared. A pixel that is background
-    /// although it should not be is infinitely wrong.
+    /// The differences between a picture and the reference; none if the frame is not compared. A pixel that is wrongly
+    /// background has an infinite error.
     pub(super) fn differences(&self, frame: usize, picture: &[f32]) -> Vec<f64> {
         let Some(number) = self.frames.iter().position(|f| *f == frame) else { return Vec::new() };
         let means = &self.means[number * self.pixels.len()..][..self.pixels.len()];
@@ -63,7 +63,7 @@ impl Truth {
         self.pixels.iter().zip(means).map(difference).map(finite).collect()
     }
 
-    /// What a picture of errors says of the compared pixels; none where the frame is not compared.
+    /// The values of a picture of errors at the compared pixels; none if the frame is not compared.
     pub(super) fn at_pixels(&self, frame: usize, errors: &[f32]) -> Vec<f64> {
         let compared = self.frames.contains(&frame);
         let at = |pixel: &usize| f64::from(errors[*pixel]) / self.range;
@@ -84,10 +84,10 @@ struct Sums {
     values: Vec<f64>,
 }
 
-fn sums(places: &[[f64; 2]], look: &Look, [x, y]: [usize; 2], frames: &[(usize, Vec<f64>)]) -> Sums {
+fn sums(places: &[[f64; 2]], camera: &CameraSettings, [x, y]: [usize; 2], frames: &[(usize, Vec<f64>)]) -> Sums {
     let mut sums = Sums { weight: 0.0, values: vec![0.0; frames.len()] };
     for (voxel, place) in places.iter().enumerate() {
-        let w = weight(*place, [x as f64 + 0.5, y as f64 + 0.5], look.scale);
+        let w = weight(*place, [x as f64 + 0.5, y as f64 + 0.5], camera.scale);
         sums.weight += w;
         for (sum, (_, values)) in sums.values.iter_mut().zip(frames) {
             *sum += w * values[voxel];
@@ -102,45 +102,45 @@ fn weight(place: [f64; 2], at: [f64; 2], scale: f64) -> f64 {
     (-(dx * dx + dy * dy) / (2.0 * SIGMA * SIGMA)).exp() / (2.0 * PI * SIGMA * SIGMA)
 }
 
-/// Where every voxel is in the picture, x fastest, then y, z.
-fn places(dims: [usize; 3], look: &Look) -> Vec<[f64; 2]> {
+/// The position of every voxel in the picture, x fastest, then y, z.
+fn places(dims: [usize; 3], camera: &CameraSettings) -> Vec<[f64; 2]> {
     let mut places = Vec::new();
     for z in 0..dims[2] {
         for y in 0..dims[1] {
             for x in 0..dims[0] {
-                places.push(project(dims, look, [x, y, z]));
+                places.push(project(dims, camera, [x, y, z]));
             }
         }
     }
     places
 }
 
-/// Parallel projection: the picture's middle shows the volume's; z is up, and azimuth 0 looks along -y.
-fn project(dims: [usize; 3], look: &Look, voxel: [usize; 3]) -> [f64; 2] {
+/// Parallel projection. The picture's centre shows the volume's centre; z is up, and azimuth 0 looks along -y.
+fn project(dims: [usize; 3], camera: &CameraSettings, voxel: [usize; 3]) -> [f64; 2] {
     let q: [f64; 3] = std::array::from_fn(|a| voxel[a] as f64 - (dims[a] - 1) as f64 / 2.0);
-    let (sin_a, cos_a) = look.azimuth.to_radians().sin_cos();
-    let (sin_e, cos_e) = look.elevation.to_radians().sin_cos();
+    let (sin_a, cos_a) = camera.azimuth.to_radians().sin_cos();
+    let (sin_e, cos_e) = camera.elevation.to_radians().sin_cos();
     let right = -cos_a * q[0] - sin_a * q[1];
     let up = sin_a * sin_e * q[0] - cos_a * sin_e * q[1] + cos_e * q[2];
-    let middle = look.size as f64 / 2.0;
-    [middle + look.scale * right, middle - look.scale * up]
+    let middle = camera.size as f64 / 2.0;
+    [middle + camera.scale * right, middle - camera.scale * up]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const LOOK: Look = Look { azimuth: 0.0, elevation: 0.0, size: 11, scale: 2.0 };
+    const LOOK: CameraSettings = CameraSettings { azimuth: 0.0, elevation: 0.0, size: 11, scale: 2.0 };
 
     #[test]
     fn places_worked_out_by_hand() {
         // Two voxels along x: +x is on the left, half a voxel is one pixel.
         assert_eq!(places([2, 1, 1], &LOOK), [[6.5, 5.5], [4.5, 5.5]]);
         assert_eq!(places([1, 1, 2], &LOOK), [[5.5, 6.5], [5.5, 4.5]], "z is up");
-        let from_the_side = Look { azimuth: 90.0, ..LOOK };
+        let from_the_side = CameraSettings { azimuth: 90.0, ..LOOK };
         let [near, far] = [project([1, 2, 1], &from_the_side, [0; 3]), project([1, 2, 1], &from_the_side, [0, 1, 0])];
         assert!((near[0] - 6.5).abs() < 1e-12 && (far[0] - 4.5).abs() < 1e-12, "+y is on the left: {near:?} {far:?}");
-        let from_above = project([1, 2, 1], &Look { elevation: 90.0, ..LOOK }, [0; 3]);
+        let from_above = project([1, 2, 1], &CameraSettings { elevation: 90.0, ..LOOK }, [0; 3]);
         assert!((from_above[1] - 4.5).abs() < 1e-12, "-y is up: {from_above:?}");
     }
 
@@ -165,8 +165,8 @@ mod tests {
 
     #[test]
     fn one_voxel_shows_its_value_wherever_it_is_seen() {
-        let look = Look { scale: 1.5, ..LOOK };
-        let truth = Truth::new([1; 3], &look, &[(3, vec![2.5])], 10.0);
+        let camera = CameraSettings { scale: 1.5, ..LOOK };
+        let truth = ReferencePixels::new([1; 3], &camera, &[(3, vec![2.5])], 10.0);
         assert_eq!(truth.pixels, [60], "of the pixels 0, 5 and 10 along each axis only (5, 5) is inside");
         assert!((truth.means[0] - 2.5).abs() < 1e-12);
         let mut picture = vec![f32::NAN; 121];
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn errors_are_the_largest_and_the_root_of_the_mean_square() {
-        let error = Truth::error(&[3.0, 4.0]);
+        let error = ReferencePixels::error(&[3.0, 4.0]);
         assert_eq!(error, ImageError { largest: 4.0, rms: 12.5_f64.sqrt() });
     }
 }

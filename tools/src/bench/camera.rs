@@ -14,7 +14,7 @@ const COMPARED: usize = 4;
 
 /// A view of a volume of voxels one unit apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Look {
+pub(super) struct CameraSettings {
     /// Degrees about z.
     pub(super) azimuth: f64,
     /// Degrees above the horizon.
@@ -25,7 +25,7 @@ pub(super) struct Look {
     pub(super) scale: f64,
 }
 
-impl Look {
+impl CameraSettings {
     /// The view whose pictures are compared with the truth. The volume fits into the picture from everywhere.
     pub(super) fn first(dims: [usize; 3], size: usize) -> Self {
         let diagonal = dims.map(|n| (n * n) as f64).iter().sum::<f64>().sqrt();

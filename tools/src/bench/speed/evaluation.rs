@@ -1,72 +1,12 @@
-//! What is to be how fast, and what was measured.
+//! Compares the measurements of an archive with the targets.
 
-use super::Archive;
 use super::convert::Scheme;
-use super::measured::{Measured, Time};
+use super::measured::{Measured, further};
 use super::plan::{Coded, Plan, key};
-use serde::{Deserialize, Serialize};
+use super::results::{Archive, Row, Threshold, Value};
 
-/// A number that is to be reached, and what was.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Row {
-    /// What is compared.
-    pub target: String,
-    /// The name of the archive.
-    pub data: String,
-    /// The file, the spacing and the number of threads.
-    pub case: String,
-    /// What was reached; none: not measured.
-    pub value: Option<f64>,
-    /// What is wanted, in words; none: nothing, it stands beside what is.
-    pub wanted: Option<String>,
-    /// Whether it was reached, where both are there.
-    pub met: Option<bool>,
-    /// Which method it was, or why nothing was measured.
-    pub note: String,
-}
-
-/// Which values are good.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Wanted {
-    AtLeast(f64),
-    AtMost(f64),
-}
-
-impl Wanted {
-    fn met(self, value: f64) -> bool {
-        match self {
-            Self::AtLeast(limit) => value >= limit,
-            Self::AtMost(limit) => value <= limit,
-        }
-    }
-
-    fn words(self) -> String {
-        match self {
-            Self::AtLeast(limit) => format!(">= {limit}"),
-            Self::AtMost(limit) if limit < 0.01 => format!("<= {limit:e}"),
-            Self::AtMost(limit) => format!("<= {limit}"),
-        }
-    }
-}
-
-/// A value, with a word on it; or why there is none.
-pub(super) type Value = Result<(f64, String), String>;
-
-impl Row {
-    pub(super) fn new(target: &str, data: &str, case: String, value: Value, wanted: Option<Wanted>) -> Self {
-        let finite = value.and_then(|(v, note)| if v.is_finite() { Ok((v, note)) } else { Err(format!("{v}")) });
-        let (value, note) = match finite {
-            Ok((value, note)) => (Some(value), note),
-            Err(why) => (None, why),
-        };
-        let met = value.zip(wanted).map(|(v, w)| w.met(v));
-        let wanted = wanted.map(Wanted::words);
-        Self { target: target.into(), data: data.into(), case, value, wanted, met, note }
-    }
-}
-
-/// The files, spacings and numbers of threads of an archive, and what was found of them.
-pub(super) struct Judge<'a> {
+/// The files, spacings and numbers of threads of an archive, and its measurements.
+pub(super) struct Evaluation<'a> {
     pub(super) plan: &'a Plan<'a>,
     pub(super) found: &'a Archive,
 }
@@ -79,16 +19,16 @@ struct Case<'a> {
     threads: usize,
 }
 
-/// From so many voxels on a volume counts as one of 256^3, which has a target of its own.
+/// Volumes of at least this many voxels have the targets of 256^3.
 const LARGE: usize = 192 * 192 * 192;
-/// From so many pixels between voxels on a view counts as one of 2.3 pixels, else as one of 1.
+/// Views with at least this many pixels between voxels have the targets of 2.3 pixels, others those of 1 pixel.
 const WIDE: f64 = 1.65;
-/// A file of at most so many nonzero codes for each sample has a target of its own.
+/// Files with at most this share of nonzero codes per sample have a target of their own.
 const FEW_CODES: f64 = 0.02;
-/// The target of the method that is chosen by default: this project's own, to see when the choice is wrong.
+/// The target for the default choice of method. It is this project's own, to show when the choice is wrong.
 const CHOICE: f64 = 1.1;
 
-impl Judge<'_> {
+impl Evaluation<'_> {
     /// All rows of the archive.
     pub(super) fn rows(&self) -> Vec<Row> {
         let Plan { files, spacings, threads, .. } = self.plan;
@@ -100,18 +40,18 @@ impl Judge<'_> {
         rows
     }
 
-    /// Targets are about the first file, which is the default scheme's at the first tolerance.
-    fn wanted(&self, file: &Coded, wanted: Wanted) -> Option<Wanted> {
+    /// The targets apply to the first file: the default scheme at the first tolerance.
+    fn wanted(&self, file: &Coded, wanted: Threshold) -> Option<Threshold> {
         (*file == self.plan.files[0]).then_some(wanted)
     }
 
     fn of_view(&self, case: Case<'_>) -> Vec<Row> {
         let Case { file, spacing, threads } = case;
         let name = format!("{}, {spacing} px, {threads} thread(s)", file.name());
-        let row = |target: &str, value: Value, wanted: Wanted| {
+        let row = |target: &str, value: Value, wanted: Threshold| {
             Row::new(target, &self.found.data.name, name.clone(), value, self.wanted(file, wanted))
         };
-        let at_least = Wanted::AtLeast;
+        let at_least = Threshold::AtLeast;
         let mut rows = vec![
             row(
                 "view of decoded codes, times faster than the textbook form",
@@ -145,34 +85,38 @@ impl Judge<'_> {
             rows.push(row(&target, self.beside_vtk(case, renderer), at_least(50.0)));
         }
         let bare = "view from the file / (zstd of its parts + view of decoded codes)";
-        rows.push(row(bare, self.beside_zstd(case), Wanted::AtMost(1.2)));
+        rows.push(row(bare, self.beside_zstd(case), Threshold::AtMost(1.2)));
         if file.scheme == Scheme::Auto {
-            rows.push(row("default method / faster of codes and values", self.choice(case), Wanted::AtMost(CHOICE)));
+            rows.push(row("default method / faster of codes and values", self.choice(case), Threshold::AtMost(CHOICE)));
         }
         if file.scheme == Scheme::Auto && threads == self.plan.threads[0] {
             let error = |i| self.image_error(case, i);
-            rows.push(row("largest image error of the default method / maximum", error(0), Wanted::AtMost(1.5e-3)));
-            rows.push(row("rms image error of the default method / maximum", error(1), Wanted::AtMost(6e-4)));
+            rows.push(row("largest image error of the default method / maximum", error(0), Threshold::AtMost(1.5e-3)));
+            rows.push(row("rms image error of the default method / maximum", error(1), Threshold::AtMost(6e-4)));
         }
         rows
     }
 
     fn of_conversion(&self, file: &Coded, threads: usize) -> Vec<Row> {
         let name = format!("{}, {threads} thread(s)", file.name());
-        let row = |target: &str, value: Value, wanted: Wanted| {
+        let row = |target: &str, value: Value, wanted: Threshold| {
             Row::new(target, &self.found.data.name, name.clone(), value, self.wanted(file, wanted))
         };
         let read = "conversion throughput / plain read of the same map";
-        let mut rows = vec![row(read, self.beside_read(file, threads), Wanted::AtLeast(0.08))];
+        let mut rows = vec![row(read, self.beside_read(file, threads), Threshold::AtLeast(0.08))];
         if threads == self.plan.threads[0] {
-            rows.push(row("conversion, times faster with two threads", self.two_threads(file), Wanted::AtLeast(1.7)));
+            rows.push(row(
+                "conversion, times faster with two threads",
+                self.two_threads(file),
+                Threshold::AtLeast(1.7),
+            ));
         }
         rows
     }
 
-    fn best_wanted(&self, spacing: f64) -> Wanted {
+    fn best_wanted(&self, spacing: f64) -> Threshold {
         let large = self.found.data.dims.iter().product::<usize>() >= LARGE;
-        Wanted::AtLeast(if large {
+        Threshold::AtLeast(if large {
             4.0
         } else if spacing >= WIDE {
             2.0
@@ -181,10 +125,10 @@ impl Judge<'_> {
         })
     }
 
-    fn stage_wanted(&self, file: &Coded, threads: usize) -> Wanted {
+    fn stage_wanted(&self, file: &Coded, threads: usize) -> Threshold {
         let converted = self.found.measured.get(&key("convert", Some(file), None, threads));
         let few = converted.and_then(|m| m.codes_per_sample).is_some_and(|share| share <= FEW_CODES);
-        Wanted::AtLeast(if few { 15.0 } else { 4.0 })
+        Threshold::AtLeast(if few { 15.0 } else { 4.0 })
     }
 
     fn at(&self, key: &str) -> Result<&Measured, String> {
@@ -197,7 +141,8 @@ impl Judge<'_> {
         Ok((view, further(view).of(case.threads)))
     }
 
-    /// Seconds that bare decoding of what a view read takes; none where it read nothing, since all was decoded before.
+    /// Seconds for bare decoding of the bytes that a view read; 0 if it read nothing because all blocks were decoded
+    /// before.
     fn codes(&self, view: &Measured, case: Case<'_>) -> Result<f64, String> {
         let codes = self.at(&key("codes", Some(case.file), None, case.threads))?;
         let share = if codes.bytes == 0 { 0.0 } else { view.bytes as f64 / codes.bytes as f64 };
@@ -252,7 +197,7 @@ impl Judge<'_> {
         if own.min(best) > 0.0 { Ok((best / own, note)) } else { Err("lost in the noise".into()) }
     }
 
-    /// Wall time with nothing cached of the input, if most of it did come from the storage.
+    /// Wall time with an empty cache, if most of the input came from storage.
     fn cold(&self, what: &str, file: Option<&Coded>, case: Case<'_>) -> Result<f64, String> {
         let found = self.at(&key(what, file, Some(case.spacing), case.threads))?;
         let all = if file.is_some() { found.bytes } else { self.found.data.bytes };
@@ -270,7 +215,7 @@ impl Judge<'_> {
         Ok((self.cold("cold frames", None, case)? / own, "wall time".into()))
     }
 
-    /// Frames that are never cached beside a file that is.
+    /// Compares uncached frames with a cached file.
     fn larger(&self, case: Case<'_>) -> Value {
         let own = further(self.view(case)?.0).wall;
         let note = "wall time; the cache of the frames emptied before the view";
@@ -321,9 +266,4 @@ impl Judge<'_> {
         let wall = |threads| self.at(&key("convert", Some(file), None, threads)).map(|m| m.time.wall).map_err(why);
         Ok((wall(1)? / wall(2)?, "wall time".into()))
     }
-}
-
-/// The time of a view with its input open.
-pub(super) fn further(view: &Measured) -> Time {
-    view.further.unwrap_or(view.time)
 }

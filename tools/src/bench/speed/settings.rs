@@ -1,0 +1,63 @@
+//! The settings of a run, and their defaults.
+
+use crate::bench::size::Peers;
+use crate::synth::Kind;
+use std::path::PathBuf;
+
+/// What archives show unless the user says.
+pub const KINDS: [Kind; 3] = [Kind::Smooth, Kind::Moving, Kind::Sparse];
+
+/// How large all is.
+#[derive(Debug)]
+pub struct Sizes {
+    /// Archives.
+    pub dims: &'static [[usize; 4]],
+    /// Archives whose conversion's memory is looked at.
+    pub large: [[usize; 4]; 2],
+    /// Pixels a side of a picture.
+    pub size: usize,
+    /// Rounds.
+    pub repeats: usize,
+}
+
+/// What targets are about: large archives have 4 and 20 GiB.
+pub const USUAL: Sizes = Sizes {
+    dims: &[[128, 128, 128, 32], [256, 256, 256, 32], [128, 128, 128, 64]],
+    large: [[256, 256, 256, 64], [256, 256, 256, 320]],
+    size: 512,
+    repeats: 3,
+};
+/// Whether everything works, in seconds.
+pub const SMALL: Sizes =
+    Sizes { dims: &[[20, 18, 16, 8]], large: [[48, 48, 48, 32], [48, 48, 48, 64]], size: 64, repeats: 1 };
+
+/// What to measure, with what, and where results go.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Archives of the user.
+    pub inputs: Vec<PathBuf>,
+    /// What the archives that are made show.
+    pub kinds: Vec<Kind>,
+    /// Their sizes.
+    pub dims: Vec<[usize; 4]>,
+    /// Pixels from a voxel to the next.
+    pub spacings: Vec<f64>,
+    /// Pixels a side of a picture.
+    pub size: usize,
+    /// Shares of the value range; the first is what the targets are about.
+    pub tolerances: Vec<f64>,
+    /// Numbers of threads.
+    pub threads: Vec<usize>,
+    /// Rounds through all measurements.
+    pub repeats: usize,
+    /// Sizes of the archives whose conversion's memory is looked at; none: it is not.
+    pub large: Vec<[usize; 4]>,
+    /// Other programs.
+    pub peers: Option<Peers>,
+    /// The folder of results.
+    pub output: PathBuf,
+    /// `wavesplat-tools` itself, whose `bench-step` measures.
+    pub program: PathBuf,
+    /// The day to write into the results; by default that of the clock.
+    pub date: Option<String>,
+}
