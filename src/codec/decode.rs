@@ -57,6 +57,18 @@ impl Block {
         Ok(block)
     }
 
+    /// The parts that [`Self::read`] reads.
+    pub(crate) fn parts<'a>(
+        codec: &'a WindowCodec,
+        entry: &'a BlockEntry,
+        wanted: &'a [bool],
+    ) -> impl Iterator<Item = &'a PartEntry> {
+        entry.parts.iter().filter(|part| match part.kind {
+            PartKind::Level(level) => codec.needs_part(level.into(), wanted),
+            _ => true,
+        })
+    }
+
     /// Of which every sample is missing: not a number where the type has that, or the declared value, or 0.
     pub fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
         let voxels: usize = size.iter().product();

@@ -29,6 +29,14 @@ pub struct Scale {
 const SHARES: u16 = 1 << 13;
 
 impl Scale {
+    /// A scale of a named map (see [`super::NAMES`]), spread linearly over a range of values, on a black background.
+    ///
+    /// # Errors
+    /// The same as for [`TransferFunction::open`] and [`Self::new`].
+    pub fn named(name: &str, range: (f64, f64)) -> Result<Self> {
+        Self::new(&TransferFunction::open(name)?, range, Norm::Linear, [0; 3])
+    }
+
     /// A scale from the first to the last colour over `range`.
     ///
     /// # Errors

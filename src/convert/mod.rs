@@ -23,14 +23,16 @@ mod record;
 pub mod sampled;
 mod settings;
 mod task;
+mod to_file;
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
-use crate::codec::bound::Bound;
+pub use crate::codec::bound::Bound;
 use crate::codec::encode::{Encoded, Encoder};
+pub use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
@@ -47,7 +49,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
-use wavesplat_format::{Basis, BlockId, CompletePrefix, FileId, Metadata, Window};
+pub use to_file::convert_to_file;
+pub use wavesplat_format::Basis;
+use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,42 +62,49 @@ pub enum MissingPolicy {
     Mask,
 }
 
-/// How to convert.
+/// How to convert. [`ConvertConfig::new`] has the defaults; change others by struct update:
+///
+/// ```
+/// use wavesplat::convert::{Bound, ConvertConfig};
+///
+/// let config = ConvertConfig { bound: Bound::Rms, window: 16, ..ConvertConfig::new(0.001) };
+/// ```
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
-    /// The scheme, or what of it is fixed.
+    /// The scheme, or what of it is fixed. Default: the smallest is found for every window.
     pub coding: SchemeConstraint,
-    /// Frames in a window.
+    /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
     pub window: usize,
-    /// The error allowed, as a share of what the bound refers to; 0 keeps every bit.
+    /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
     pub tolerance: f64,
-    /// What is promised.
+    /// What is promised. Default: no sample is off by more than the tolerance times the value range.
     pub bound: Bound,
-    /// The value range that a pointwise or rms tolerance refers to; by default that of the frames so far.
+    /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
     pub range: Option<(f64, f64)>,
-    /// What to do with missing samples.
+    /// What to do with missing samples. Default: refuse them.
     pub missing: MissingPolicy,
-    /// A value that means "missing", besides NaN and infinities.
+    /// A value that means "missing", besides NaN and infinities. Default: none.
     pub missing_value: Option<f64>,
-    /// Colours that samples are turned into before all else: three channels, 0 to 1, of which the bound then is. The value range
-    /// is by default just that.
+    /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
+    /// value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
-    /// Voxels a side of a block; by default as many as suit the window.
+    /// Voxels a side of a block. Default: as many as suit the window.
     pub block: Option<usize>,
-    /// zstd level.
+    /// zstd level, 1 to 19. Default: 3.
     pub level: i32,
-    /// Bytes that may be allocated.
+    /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
-    /// What was asked of the input (frames, region, variable), to find the same samples again.
+    /// What was asked of the input (frames, region, variable), to find the same samples again. Default: nothing.
     pub settings: Vec<(String, String)>,
 }
 
 impl ConvertConfig {
-    /// Pointwise within a share of the range; missing samples refused, and all else as the program has it by default.
-    pub fn new(coding: impl Into<SchemeConstraint>, window: usize, tolerance: f64, memory: usize) -> Self {
+    /// The defaults, which are those of `wavesplat convert`, with a tolerance: 0.01 allows every sample to be off by 1 % of
+    /// the value range.
+    pub fn new(tolerance: f64) -> Self {
         Self {
-            coding: coding.into(),
-            window,
+            coding: SchemeConstraint::AUTO,
+            window: 32,
             tolerance,
             bound: Bound::Pointwise,
             range: None,
@@ -102,7 +113,7 @@ impl ConvertConfig {
             colours: None,
             block: None,
             level: 3,
-            memory,
+            memory: memory::DEFAULT,
             settings: Vec::new(),
         }
     }

@@ -5,11 +5,13 @@ mod encoding;
 mod format;
 mod netcdf;
 mod nrrd;
+mod read;
 mod sink;
 mod vti;
 
 pub use contents::Contents;
 pub use format::SampleFormat;
+pub use read::read_region;
 pub use sink::{Files, Sink};
 
 use crate::base::error::{Error, Result};
@@ -23,17 +25,39 @@ use serde::Serialize;
 use std::io::Write;
 use wavesplat_format::BlockEntry;
 
-/// What to extract.
+/// What to extract. [`ExtractConfig::new`] asks for everything; narrow it by struct update.
 #[derive(Debug, Clone)]
 pub struct ExtractConfig {
-    /// Which frames, ascending.
+    /// Which frames, ascending. Default: all.
     pub frames: Vec<usize>,
-    /// Which voxels.
+    /// Which voxels. Default: all.
     pub region: Region,
-    /// Which channel, from 0.
+    /// Which channel, from 0. Default: the first.
     pub channel: usize,
-    /// Bytes that may be allocated.
+    /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
+}
+
+impl ExtractConfig {
+    /// All frames and voxels of the first channel of `file`.
+    pub fn new(file: &CoefficientFile) -> Self {
+        Self { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel: 0, memory: memory::DEFAULT }
+    }
+
+    /// An error unless the file has these frames and voxels and this channel.
+    fn check(&self, file: &CoefficientFile) -> Result<()> {
+        let (frames, [x, y, z], channels) = (file.frames(), file.grid.dims, file.channels());
+        if !self.frames.is_sorted() || self.frames.last().is_some_and(|last| *last >= frames) {
+            return Err(Error::setting("frames", format!("takes numbers below {frames}, ascending")));
+        }
+        if !file.grid.whole().contains(&self.region) || self.region.is_empty() {
+            return Err(Error::setting("region", format!("takes voxels of {x} x {y} x {z}, at least one")));
+        }
+        if self.channel >= channels {
+            return Err(Error::setting("channel", format!("takes a number below {channels}")));
+        }
+        Ok(())
+    }
 }
 
 /// What an extraction did.
@@ -113,6 +137,7 @@ struct Piece {
 
 impl Pieces {
     fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
+        config.check(file)?;
         let plane = config.region.dims()[0] * config.region.dims()[1] * file.sample().size();
         let frame = plane * config.region.dims()[2];
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
@@ -163,8 +188,9 @@ fn read_piece(
     out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
     for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
+            let batch = file.batch(&codec, entries, &wanted)?;
             let decode =
-                |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+                |entry: &BlockEntry| batch.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);

@@ -26,7 +26,7 @@
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
 //! project, composite   the pictures of each batch
-//! annotate/, sink/  text in pictures, and output files
+//! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!
 //! ```text
@@ -63,11 +63,18 @@ mod project;
 mod composite;
 pub mod annotate;
 pub mod sink;
+mod pictures;
 
+pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
+pub use layout::{Layout, Order};
+pub use pictures::render_png;
+pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
 pub use report::{Picture, RenderReport, Rendered, ViewReport};
-pub use scene::{LeftOut, Scene};
+pub use scene::{
+    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
+};
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
 use crate::base::error::{Error, Note, Remedy, Result};

@@ -10,7 +10,7 @@ use crate::codec::real::Real;
 pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
-    /// One value for each voxel, x fastest.
+    /// One value for each voxel: x fastest, then y, z.
     Single(&'a [f32]),
     /// The same as [`Self::Single`], in f64.
     Double(&'a [f64]),
@@ -58,20 +58,28 @@ impl<'a> From<Plane<'a>> for PlaneValues<'a> {
     }
 }
 
-/// A block that has been read.
+/// A block that is ready to be splatted.
 pub trait BlockPlanes: Send + Sync {
     /// Number of voxels in the block.
     fn voxels(&self) -> usize;
 
-    /// The values of a plane. They may be stored in `scratch`.
+    /// The values of a plane, 0 to [`Layout::planes`](super::Layout::planes). They may be stored in `scratch`.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
     fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
-    /// Number of nonzero coefficients, and stored bytes that were read.
+    /// Number of nonzero coefficients, and stored bytes that were read; for the report.
     fn held(&self) -> [u64; 2];
 }
 
 /// A source of blocks.
 pub(super) trait BlockSource: Sync {
+    /// Prepares to read these blocks next.
+    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
+        Ok(())
+    }
+
     /// Reads a block.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
@@ -85,6 +93,12 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// A buffer for one value of each voxel. It holds values of an earlier plane.
+    pub fn values(&mut self, voxels: usize) -> &mut [f64] {
+        self.double.resize(voxels, 0.0);
+        &mut self.double
+    }
+
     /// The samples in `bytes`; none of them is missing.
     pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();

@@ -40,6 +40,13 @@ pub struct View {
     pub center: Option<[f64; 3]>,
 }
 
+impl View {
+    /// The whole volume in a picture of 512 x 512 pixels, seen from an azimuth and elevation in degrees.
+    pub fn new(azimuth: f64, elevation: f64) -> Self {
+        Self { azimuth, elevation, roll: 0.0, size: [512, 512], scale: None, center: None }
+    }
+}
+
 /// A view of one grid: an affine map from world positions to pixels and depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {

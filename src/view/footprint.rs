@@ -35,12 +35,17 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// A kernel; the default sigma is 0.75 of the largest spacing.
+    /// The default kernel of a grid: sigma is 0.75 of the largest spacing, without attenuation.
+    pub fn of_grid(grid: &Grid) -> Self {
+        Self { sigma: 0.75 * grid.largest_spacing(), tau: 0.0 }
+    }
+
+    /// A kernel with the default sigma unless one is given.
     ///
     /// # Errors
-    /// A sigma that is not finite or not above 0, or a tau that is not finite or below 0.
+    /// A sigma that is not above 0, a tau below 0, or either not finite.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
-        let sigma = sigma.unwrap_or(0.75 * grid.largest_spacing());
+        let sigma = sigma.unwrap_or(Self::of_grid(grid).sigma);
         if !(sigma.is_finite() && sigma > 0.0) {
             return Err(Error::setting("sigma", "takes a number above 0"));
         }

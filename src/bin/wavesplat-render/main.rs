@@ -209,7 +209,7 @@ impl Cli {
         let metadata = file.as_ref().map(|file| file.metadata());
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
-        config.reserved = self.reserved(&targets, &config)?;
+        config.memory = self.memory_besides_sinks(&targets, &config)?;
         let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
@@ -261,10 +261,17 @@ impl Cli {
         self.common.report(reported, self.output == Path::new(STANDARD))
     }
 
-    /// Bytes that the sinks take for themselves.
-    fn reserved(&self, (pictures, errors): &(Targets, Option<Targets>), config: &RenderConfig) -> Result<usize> {
+    /// Bytes that are left for rendering.
+    fn memory_besides_sinks(
+        &self,
+        (pictures, errors): &(Targets, Option<Targets>),
+        config: &RenderConfig,
+    ) -> Result<usize> {
         let errors = errors.as_ref().map_or(Ok(0), |errors| errors.memory(self.depth, config))?;
-        Ok(pictures.memory(self.depth, config)? + errors)
+        let taken = pictures.memory(self.depth, config)? + errors;
+        config.memory.checked_sub(taken).ok_or_else(|| {
+            Error::usage(format!("--memory: writing these pictures takes {}MiB", taken.div_ceil(1 << 20)))
+        })
     }
 
     /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
@@ -320,7 +327,7 @@ impl Cli {
             }
             self.input.refuse_for_coefficients()?;
             self.along.check(false, self.colour.is_asked())?;
-            let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
+            let file = CoefficientFile::open_with(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
             let unit = setting(file.metadata(), "time-units").map(String::from);
@@ -393,7 +400,6 @@ impl Cli {
             certify: self.error_image.is_some(),
             mode: self.along.mode(colours)?,
             memory: self.common.memory.0,
-            reserved: 0,
         })
     }
 

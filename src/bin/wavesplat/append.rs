@@ -51,7 +51,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let linked = args.file.is_symlink().then(|| args.file.canonicalize()).transpose();
     let linked = linked.map_err(|e| Error::io(&args.file, "opening", e))?;
     let path = linked.unwrap_or(args.file.clone()); // what is replaced is not the link
-    let file = CoefficientFile::open(&path, args.input.access())?;
+    let file = CoefficientFile::open_with(&path, args.input.access())?;
     let config = args.config(&file)?;
     let source = args.input.open_again(&file, &args.inputs, None, &args.common)?;
     if let (Some(asked), Some(all)) = (args.frames, source.archive().frames)

@@ -78,7 +78,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
     let access = Access::unless(args.no_mmap);
-    let mut file = CoefficientFile::open(&args.file, access)?;
+    let mut file = CoefficientFile::open_with(&args.file, access)?;
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }

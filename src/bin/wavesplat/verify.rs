@@ -39,7 +39,7 @@ pub(crate) struct VerifyArgs {
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
-    let file = CoefficientFile::open(&args.file, args.input.access())?;
+    let file = CoefficientFile::open_with(&args.file, args.input.access())?;
     let mut source = args.source(&file)?;
     let source: Option<&mut dyn FrameSource> = match &mut source {
         Some(source) => Some(source.as_mut()),

@@ -9,7 +9,7 @@ use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
-use crate::file::CoefficientFile;
+use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
 use crate::render::layout::Layout;
@@ -34,6 +34,13 @@ impl CoefficientScene {
     }
 }
 
+impl From<CoefficientFile> for CoefficientScene {
+    /// Splats the file's coefficients.
+    fn from(file: CoefficientFile) -> Self {
+        Self::new(file, SplatSource::Coefficients)
+    }
+}
+
 impl Scene for CoefficientScene {
     fn grid(&self) -> &Grid {
         &self.file.grid
@@ -49,6 +56,10 @@ impl Scene for CoefficientScene {
 
     fn frames(&self) -> Option<usize> {
         Some(self.file.frames())
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        Some(self.file.metadata().tolerance)
     }
 
     fn batch_end(&self, frame: usize) -> usize {
@@ -87,6 +98,8 @@ pub(super) struct CoefficientBatch<'a> {
     errors: SampleErrors,
     /// The last leaf of the directory that was read. Blocks come in order, so most reads hit it.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
+    /// The last blocks that were read together, if the storage prefers that.
+    fetched: Mutex<Option<Arc<BlockBatch<'a>>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
@@ -103,6 +116,7 @@ impl<'a> CoefficientBatch<'a> {
             selection: Selection::default(),
             errors: SampleErrors::default(),
             leaf: Mutex::default(),
+            fetched: Mutex::default(),
         };
         batch.select(request.config)?;
         Ok(batch)
@@ -237,11 +251,22 @@ impl<'a> CoefficientBatch<'a> {
         Ok(last.clone())
     }
 
+    /// Looks up a block in the directory, and selects its parts to read.
+    fn kept(&self, block: usize) -> Result<KeptParts> {
+        let leaf = self.leaf_of(block as u32)?;
+        Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
+    }
+
     /// Reads a block, and returns it with the errors of its samples.
     fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
-        let leaf = self.leaf_of(block as u32)?;
-        let KeptParts { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        Ok((self.file.block(&self.plan.codec, &entry, &self.plan.wanted)?, errors))
+        let KeptParts { entry, errors, .. } = self.kept(block)?;
+        let fetched = self.fetched.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        let block = match fetched {
+            Some(fetched) => fetched.block(codec, &entry, wanted)?,
+            None => self.file.block(codec, &entry, wanted)?,
+        };
+        Ok((block, errors))
     }
 }
 
@@ -252,6 +277,16 @@ impl FrameBatch for CoefficientBatch<'_> {
 
     fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        if self.file.prefers_batches() {
+            let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
+            let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
+            let batch = Arc::new(self.file.batch(&self.plan.codec, &entries, &self.plan.wanted)?);
+            *self.fetched.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+        }
+        Ok(())
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

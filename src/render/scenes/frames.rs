@@ -5,7 +5,7 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
 use crate::render::config::RenderConfig;
-use crate::render::layout::{Layout, Order};
+use crate::render::layout::Layout;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 use crate::render::scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
@@ -81,7 +81,7 @@ impl Scene for FrameScene {
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
-        let BatchRequest { frames, channel, config, views } = *request;
+        let BatchRequest { frames, channel, config, .. } = *request;
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
         let window: Box<dyn FrameWindow + 'a> = match &self.colour_transform {
@@ -97,20 +97,12 @@ impl Scene for FrameScene {
         let scanned = if scan_first || config.certify { frames } else { &[] };
         let scans = scanned.iter().map(scan).collect::<Result<Vec<Scan>>>()?;
         let absent = scans.iter().any(|s| s.missing > 0);
-        let layout = Layout {
-            coefficients: 0,
-            frames: frames.len(),
-            values: true,
-            absent,
-            error_planes: 0,
-            lengths: false,
-            order: Order::Pixels,
-        };
+        let layout = Layout { absent, ..Layout::of_values(frames.len()) };
         let errors = scans.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
         let (blocks, found_missing) = (self.blocks(), &self.found_missing);
-        let selection = select(blocks, config, views.len());
+        let selection = Selection::of_all(blocks, request);
         let unexpected = (can_miss && scanned.is_empty()).then_some(found_missing);
         Ok(Box::new(SampleBatch {
             archive,
@@ -123,21 +115,6 @@ impl Scene for FrameScene {
             selection,
             errors,
         }))
-    }
-}
-
-/// All blocks that touch the region. The ranges of their values are unknown before they are read.
-fn select(blocks: BlockGrid, config: &RenderConfig, views: usize) -> Selection {
-    let region = config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
-    let touching: Vec<usize> = blocks.touching(&region).collect();
-    let any = (f64::NEG_INFINITY, f64::INFINITY);
-    let ranged = if config.mode.is_projection() { &[][..] } else { &touching };
-    Selection {
-        ranges: ranged.iter().map(|block| (*block, any)).collect(),
-        empty: (blocks.len() - touching.len()) as u64,
-        blocks: touching,
-        expected: vec![0.0; views],
-        ..Selection::default()
     }
 }
 

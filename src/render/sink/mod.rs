@@ -10,6 +10,8 @@ mod stream;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::Annotation;
+use super::config::RenderConfig;
+use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
@@ -105,34 +107,54 @@ pub enum Depth {
     Sixteen,
 }
 
-/// The settings of an output, shared by all pictures.
+/// The settings of an output, shared by all pictures. [`SinkConfig::new`] gives the defaults; change them by struct
+/// update.
 #[derive(Debug, Clone)]
 pub struct SinkConfig {
-    /// The file format.
+    /// The file format. Default: PNG.
     pub format: PictureFormat,
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// View and frame of each picture.
+    /// View and frame of each picture. Default: all frames of the first view.
     pub shown: Vec<(usize, usize)>,
-    /// How the pictures were made.
+    /// How the pictures were made. Default: by this library.
     pub provenance: Arc<Provenance>,
-    /// Frames per second, for formats that store it.
+    /// Frames per second, for formats that store it. Default: 25.
     pub fps: u32,
-    /// The kind of numbers in each pixel.
+    /// The kind of numbers in each pixel. Default: the kind of the scene and mode.
     pub pixel: Pixel,
     /// The map from values to colours.
     pub colours: Scale,
-    /// Bits per colour channel in a PNG.
+    /// Bits per colour channel in a PNG. Default: 8.
     pub depth: Depth,
-    /// Whether an array holds colours instead of values.
+    /// Whether an array holds colours instead of values. Default: no.
     pub coloured_array: bool,
-    /// Annotations drawn into coloured pictures.
+    /// Annotations drawn into coloured pictures. Default: none.
     pub annotation: Option<Annotation>,
-    /// Whether to replace existing files.
+    /// Whether to replace existing files. Default: no.
     pub force: bool,
 }
 
 impl SinkConfig {
+    /// The default settings for the pictures that [`render`](crate::render::render) makes of a scene.
+    pub fn new(scene: &dyn Scene, config: &RenderConfig, colours: Scale) -> Self {
+        let software = format!("wavesplat {}", env!("CARGO_PKG_VERSION"));
+        let size = config.size();
+        Self {
+            format: PictureFormat::Png,
+            size,
+            shown: config.frames.iter().map(|frame| (0, *frame)).collect(),
+            provenance: Arc::new(Provenance { software, size, ..Provenance::default() }),
+            fps: 25,
+            pixel: if scene.channels() > 1 { Pixel::Channels } else { config.mode.pixel() },
+            colours,
+            depth: Depth::Eight,
+            coloured_array: false,
+            annotation: None,
+            force: false,
+        }
+    }
+
     /// The picture or the error bounds of a rendering, whichever this sink shows.
     fn shown_of<'a>(&self, rendered: &Rendered<'a>) -> Option<Picture<'a>> {
         match self.provenance.shows {

@@ -74,6 +74,11 @@ fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
 }
 
 impl BlockSource for WithLengths<'_> {
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        let with_terms: Vec<usize> = blocks.iter().copied().filter(|block| self.with_terms.contains(block)).collect();
+        self.batch.fetch(&with_terms)
+    }
+
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         let planes = self.with_terms.contains(&block).then(|| self.batch.planes(block)).transpose()?;
         let ones = UnitValues(self.blocks.region(block).voxels());

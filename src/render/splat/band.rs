@@ -73,6 +73,7 @@ pub(super) fn splat_in_batches(
     let mut stats = SplatStats { blocks: visible.len() as u64, ..SplatStats::default() };
     for blocks in visible.chunks(batch) {
         let clock = Instant::now();
+        source.fetch(blocks)?;
         let read = |block: &usize| {
             let planes = source.planes(*block)?;
             Ok((planes.held(), group.prepare(*block, planes)?))

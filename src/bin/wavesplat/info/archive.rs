@@ -8,11 +8,8 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{note_text, print};
 use wavesplat::convert::estimate::{Estimate, estimate};
-use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint};
+use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::source::Archive;
-
-/// The window of a conversion that says nothing of it.
-const WINDOW: usize = 32;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]
@@ -58,8 +55,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
 
 /// How `convert` goes about it by default.
 fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
-    let plain = ConvertConfig::new(SchemeConstraint::AUTO, WINDOW, tolerance, memory);
-    ConvertConfig { missing: MissingPolicy::Mask, missing_value: archive.missing_value(None), ..plain }
+    let (missing, missing_value) = (MissingPolicy::Mask, archive.missing_value(None));
+    ConvertConfig { missing, missing_value, memory, ..ConvertConfig::new(tolerance) }
 }
 
 impl<'a> Info<'a> {

@@ -55,7 +55,7 @@ impl InfoArgs {
         }
         let foreign =
             |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-        match CoefficientFile::open(only, self.input.access()) {
+        match CoefficientFile::open_with(only, self.input.access()) {
             Err(e) if !named_so && foreign(&e) => Ok(None),
             file => {
                 let file = file?;
