@@ -6,8 +6,8 @@
 
 pub use wavesplat_format::Bound;
 
+use crate::base::half::Half;
 use crate::base::sample::SampleType;
-use half::f16;
 
 /// x - y and what rounding took from it: the exact difference is their sum. Not numbers if x - y overflows.
 fn difference(x: f64, y: f64) -> (f64, f64) {
@@ -190,7 +190,7 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),
-        SampleType::F16 => delta - magnitude * f64::from(f16::EPSILON) - f64::from(f16::MIN_POSITIVE_SUBNORMAL),
+        SampleType::F16 => delta - magnitude * Half::EPSILON - Half::LEAST,
         _ => delta.min(delta.floor() + 0.499),
     }
 }
