@@ -214,9 +214,22 @@ fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
 
 #[test]
 fn damaged_files_are_read_or_refused() {
-    for format in ["metaimage", "vtk", "vti", "vtkhdf", "nifti", "nrrd", "hdf5", "netcdf"] {
+    for format in ["npy", "metaimage", "vtk", "vti", "nifti", "nrrd"] {
         check_damaged(format);
     }
+}
+
+#[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
+fn damaged_files_of_arrays_are_read_or_refused() {
+    for format in ["vtkhdf", "hdf5", "netcdf"] {
+        check_damaged(format);
+    }
+}
+
+#[test]
+fn npy_is_read() {
+    check_all("npy");
 }
 
 #[test]
@@ -235,6 +248,7 @@ fn vti_is_read() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "hdf5"), ignore = "needs the feature hdf5")]
 fn vtkhdf_is_read() {
     check_all("vtkhdf");
 }
@@ -250,17 +264,19 @@ fn nrrd_is_read() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "hdf5"), ignore = "needs the feature hdf5")]
 fn hdf5_is_read() {
     check_all("hdf5");
 }
 
 #[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn netcdf_is_read() {
     check_all("netcdf");
 }
 
-#[cfg(feature = "zarr")]
 #[test]
+#[cfg_attr(not(feature = "zarr"), ignore = "needs the feature zarr")]
 fn zarr_is_read() {
     check_all("zarr");
 }

@@ -8,6 +8,7 @@ mod remedy;
 pub mod error;
 pub mod progress;
 pub(crate) mod memory;
+pub(crate) mod half;
 pub mod sample;
 pub mod grid;
 pub mod mapped;

@@ -4,7 +4,7 @@
 
 pub use wavesplat_format::SampleType;
 
-use half::f16;
+use crate::base::half::Half;
 
 macro_rules! for_type {
     ($ty:expr, $run:ident, $($arg:expr),*) => {
@@ -15,7 +15,7 @@ macro_rules! for_type {
             SampleType::I16 => $run!(i16, $($arg),*),
             SampleType::U32 => $run!(u32, $($arg),*),
             SampleType::I32 => $run!(i32, $($arg),*),
-            SampleType::F16 => $run!(f16, $($arg),*),
+            SampleType::F16 => $run!(Half, $($arg),*),
             SampleType::F32 => $run!(f32, $($arg),*),
             SampleType::F64 => $run!(f64, $($arg),*),
         }
@@ -68,21 +68,10 @@ pub fn round_to(ty: SampleType, value: f64) -> f64 {
         SampleType::I16 => as_int!(i16),
         SampleType::U32 => as_int!(u32),
         SampleType::I32 => as_int!(i32),
-        SampleType::F16 => f64::from(nearest_f16(value)),
+        SampleType::F16 => f64::from(Half::nearest(value)),
         SampleType::F32 => f64::from(value as f32),
         SampleType::F64 => value,
     }
-}
-
-/// The nearest half-precision number, ties to even. Through `f32`, rounded to odd: that keeps on which side of a tie the
-/// value was, and a second rounding then does no harm; a conversion straight from `f64` differs between machines.
-fn nearest_f16(value: f64) -> f16 {
-    let near = value as f32;
-    if f64::from(near) == value || value.is_nan() {
-        return f16::from_f32(near);
-    }
-    let beyond = f64::from(near).abs() > value.abs();
-    f16::from_f32(f32::from_bits((near.to_bits() - u32::from(beyond)) | 1))
 }
 
 /// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
@@ -103,8 +92,8 @@ pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
         (f32, $v:expr) => {
             $v as f32
         };
-        (f16, $v:expr) => {
-            nearest_f16($v)
+        (Half, $v:expr) => {
+            Half::nearest($v)
         };
         ($t:ident, $v:expr) => {
             $v.round() as $t // which clamps, too

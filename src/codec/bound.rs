@@ -32,8 +32,8 @@
 
 pub use wavesplat_format::Bound;
 
+use crate::base::half::Half;
 use crate::base::sample::SampleType;
-use half::f16;
 
 /// x - y, and its rounding error: the exact difference is their sum ([Knuth](crate::bibliography)). NaN if x - y
 /// overflows.
@@ -220,7 +220,7 @@ pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),
-        SampleType::F16 => delta - magnitude * f64::from(f16::EPSILON) - f64::from(f16::MIN_POSITIVE_SUBNORMAL),
+        SampleType::F16 => delta - magnitude * Half::EPSILON - Half::LEAST,
         _ => delta.min(delta.floor() + 0.499),
     }
 }

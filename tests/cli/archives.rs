@@ -10,6 +10,7 @@ fn input(name: &str) -> String {
 }
 
 #[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn every_kind_of_archive_becomes_a_picture_by_two_commands() {
     for name in
         ["netcdf/era5.nc", "netcdf/maps.nc", "vti/series", "nifti/4d.nii.gz", "metaimage/itk_4d.mha", "hdf5/gzip.h5"]
@@ -24,6 +25,7 @@ fn every_kind_of_archive_becomes_a_picture_by_two_commands() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn places_times_and_units_go_from_file_to_file() {
     let work = Work::new();
     let told = |name: &str| {
@@ -49,6 +51,7 @@ fn places_times_and_units_go_from_file_to_file() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn declared_missing_values_are_missing_by_default() {
     for name in ["fill_1e20", "fill_nan", "packed_i16", "missing_value"] {
         let (work, source) = (Work::new(), input(&format!("netcdf/{name}.nc")));
@@ -61,6 +64,7 @@ fn declared_missing_values_are_missing_by_default() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn ambiguous_variables_are_listed_and_chosen() {
     let (work, source) = (Work::new(), input("netcdf/several.nc"));
     let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
@@ -152,9 +156,16 @@ fn coefficients_go_through_a_pipe_as_they_are() {
     assert_eq!((early.text().trim(), early.err.as_str()), ("100", ""));
 }
 
-#[cfg(not(feature = "zarr"))]
 #[test]
-fn zarr_without_its_feature_explains_how_to_get_it() {
-    let source = input("zarr/v3_zstd.zarr");
-    Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["cargo build --release --features zarr"]);
+fn formats_that_are_not_built_in_explain_how_to_get_them() {
+    let formats = [
+        (cfg!(feature = "hdf5"), "hdf5/gzip.h5", "hdf5"),
+        (cfg!(feature = "netcdf"), "netcdf/cdf1.nc", "netcdf"),
+        (cfg!(feature = "zarr"), "zarr/v3_zstd.zarr", "zarr"),
+    ];
+    for (_, source, feature) in formats.into_iter().filter(|(is_built_in, ..)| !is_built_in) {
+        let advice = format!("cargo build --release --features {feature}");
+        let source = input(source);
+        Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["not built in", &advice]);
+    }
 }

@@ -34,13 +34,18 @@ mod usage;
 
 use std::ffi::OsStr;
 use std::fs;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 use tempfile::TempDir;
+use wait_timeout::ChildExt;
 
 const CONVERT: &str = env!("CARGO_BIN_EXE_wavesplat");
 const RENDER: &str = env!("CARGO_BIN_EXE_wavesplat-render");
+
+/// A program that runs for longer hangs, and is killed.
+const LONGEST_RUN: Duration = Duration::from_secs(120);
 
 /// A fresh folder in which programs run.
 pub(crate) struct Work(TempDir);
@@ -88,10 +93,17 @@ impl Work {
     }
 
     fn run(&self, program: impl AsRef<OsStr>, args: &str, input: &[u8]) -> Run {
-        let mut command = assert_cmd::Command::new(program);
-        command.current_dir(self.0.path()).args(args.split_whitespace());
-        command.write_stdin(input).timeout(Duration::from_secs(120));
-        Run::of(args, command.output().unwrap())
+        let mut child = self.command(program).args(args.split_whitespace()).spawn().unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        let (mut stdout, mut stderr) = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+        std::thread::scope(|scope| {
+            scope.spawn(move || stdin.write_all(input)); // a program may end before it has read everything
+            let out = scope.spawn(move || read_all(&mut stdout));
+            let err = scope.spawn(move || read_all(&mut stderr));
+            let status = child.wait_timeout(LONGEST_RUN).unwrap();
+            let status = status.unwrap_or_else(|| child.kill().and_then(|()| child.wait()).unwrap());
+            Run::of(args, Output { status, stdout: out.join().unwrap(), stderr: err.join().unwrap() })
+        })
     }
 
     /// A shell that finds the programs as `$WAVESPLAT` and `$RENDER`.
@@ -100,7 +112,7 @@ impl Work {
     }
 
     /// A command that runs in the folder with all its streams piped.
-    fn command(&self, program: &str) -> Command {
+    fn command(&self, program: impl AsRef<OsStr>) -> Command {
         let mut command = Command::new(program);
         command.current_dir(self.0.path()).env("WAVESPLAT", CONVERT).env("RENDER", RENDER);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -135,6 +147,12 @@ pub(crate) fn assert_same_but_options(work: &Work, a: &str, b: &str) {
     assert!(work.read("same_a.raw") == work.read("same_b.raw"), "{a} and {b}");
 }
 
+fn read_all(stream: &mut impl Read) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    stream.read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
 /// The result of a program.
 #[derive(Debug)]
 pub(crate) struct Run {
@@ -145,7 +163,7 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    fn of(args: &str, output: std::process::Output) -> Self {
+    fn of(args: &str, output: Output) -> Self {
         let err = String::from_utf8(output.stderr).unwrap();
         assert!(!err.contains("panicked"), "{args}: {err}");
         Self { args: args.into(), code: output.status.code(), out: output.stdout, err }
