@@ -35,7 +35,7 @@ const HOMES: [(&str, &[&str]); 21] = [
             "extract/mod.rs",
             "file/coefficient_file.rs",
             "file/verify.rs",
-            "cli/mod.rs",
+            "cli/common.rs",
         ],
     ),
     ("clap::", &["cli/", "bin/"]),
