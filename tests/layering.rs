@@ -36,7 +36,7 @@ const HOMES: [(&str, &[&str]); 21] = [
             "file/batch.rs",
             "file/coefficient_file.rs",
             "file/verify.rs",
-            "cli/mod.rs",
+            "cli/common.rs",
         ],
     ),
     ("clap::", &["cli/", "bin/"]),

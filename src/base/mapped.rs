@@ -29,7 +29,7 @@ pub enum Access {
 }
 
 impl Access {
-    /// What `--no-mmap` asks for, or the default.
+    /// Maps unless `no_mmap`, which reads instead.
     pub fn unless(no_mmap: bool) -> Self {
         if no_mmap { Self::Read } else { Self::Map }
     }

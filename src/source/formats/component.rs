@@ -86,7 +86,7 @@ pub(in crate::source) fn choose(
     Ok(Chosen { array, component: chosen(name, components, index)? })
 }
 
-/// Whether [`choose`] finds neither which array nor which component of it is meant, unless `--variable` names them.
+/// Whether [`choose`] finds neither which array nor which component of it is meant, unless the option `variable` names them.
 pub(in crate::source) fn is_undecided(arrays: &[(&str, usize)], active: Option<usize>) -> bool {
     match (active, arrays) {
         (_, []) => false,
