@@ -83,7 +83,7 @@ pub fn range_bound(tolerance: f64, range: (f64, f64)) -> f64 {
 }
 
 /// `tolerance` times |`value`|, or times `floor` if that is more, rounded down: what [`Bound::Relative`] allows (eq 22).
-pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
+pub(crate) fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
     product_down(tolerance, value.abs().max(floor))
 }
 
@@ -205,14 +205,14 @@ impl ErrorBound {
 const UP: f64 = 1.0 + 1e-12;
 
 /// An error, rounded up, in units of what is allowed, rounded down; rounded up.
-pub fn share(error: f64, allowed: f64) -> f64 {
+pub(crate) fn share(error: f64, allowed: f64) -> f64 {
     if error > 0.0 { (error / allowed).next_up() } else { 0.0 }
 }
 
 /// The largest error before rounding to the sample type that still leaves `delta` after it; 0 or less if there is none.
 ///
 /// `magnitude` is the largest absolute sample nearby.
-pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
+pub(crate) fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),

@@ -4,19 +4,19 @@
 //! the one decoder that the encoder checks with, and that `extract`, `verify` and the renderer use. A scheme beyond a
 //! transform along time replaces this folder's use of [`crate::wavelet`] and nothing else.
 
-pub mod bound;
-pub mod buffer;
+pub(crate) mod bound;
+pub(crate) mod buffer;
 mod check;
-pub mod decode;
-pub mod encode;
-pub mod field;
+pub(crate) mod decode;
+pub(crate) mod encode;
+pub(crate) mod field;
 mod gain;
 mod load;
 pub(crate) mod pyramid;
 pub(crate) mod real;
 mod refine;
 mod rows;
-pub mod scheme;
+pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
 mod weigh;

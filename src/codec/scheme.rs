@@ -1,7 +1,7 @@
 //! Schemes: which transform and which pyramid the blocks of a window are coded with.
 
 use crate::wavelet::{self, TimeBasis};
-pub use wavesplat_format::{Axis, Basis, Pyramid, Stencil, Window};
+pub(crate) use wavesplat_format::{Axis, Basis, Pyramid, Stencil, Window};
 
 /// How the blocks of one window are coded.
 #[derive(Debug, Clone, PartialEq)]

@@ -30,9 +30,8 @@ use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
-pub use crate::codec::bound::Bound;
+pub use crate::codec::bound::{Bound, range_bound};
 use crate::codec::encode::{Encoded, Encoder};
-pub use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
@@ -50,7 +49,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
 pub use to_file::convert_to_file;
-pub use wavesplat_format::Basis;
+pub use wavesplat_format::{Basis, Stencil};
 use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.

@@ -13,11 +13,11 @@ mod learned;
 mod multi;
 mod samples;
 
-pub use haar::Haar;
-pub use learned::Learned;
-pub use multi::Multi;
-pub use samples::Samples;
-pub use wavesplat_format::Basis;
+pub(crate) use haar::Haar;
+pub(crate) use learned::Learned;
+pub(crate) use multi::Multi;
+pub(crate) use samples::Samples;
+pub(crate) use wavesplat_format::Basis;
 
 use crate::base::error::{Error, Result};
 use std::fmt::Debug;
@@ -63,7 +63,7 @@ pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis
 }
 
 /// An error if whole windows of `frames` frames don't suit the basis.
-pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
+pub(crate) fn check_window(kind: Basis, frames: usize) -> Result<()> {
     let (fits, rule) = match kind {
         Basis::Haar => (frames.is_power_of_two(), "a power of two, as 32"),
         Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, as 33"),
@@ -91,18 +91,18 @@ pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
 }
 
 /// The largest sum over k of |u_k(t)| (eq 25). A change of at most e in every coefficient moves a sample by at most gain * e.
-pub fn gain(synthesis: &[Vec<f64>]) -> f64 {
+pub(crate) fn gain(synthesis: &[Vec<f64>]) -> f64 {
     let frames = synthesis.first().map_or(0, Vec::len);
     (0..frames).map(|t| synthesis.iter().map(|u| u[t].abs()).sum()).fold(0.0, f64::max)
 }
 
 /// Which coefficients a reader needs who only wants `frames` of the window: those whose function is not zero there.
-pub fn needed(synthesis: &[Vec<f64>], frames: &[usize]) -> Vec<bool> {
+pub(crate) fn needed(synthesis: &[Vec<f64>], frames: &[usize]) -> Vec<bool> {
     synthesis.iter().map(|u| frames.iter().any(|t| u[*t] != 0.0)).collect()
 }
 
 /// Splits `0..K` into ranges as long as `lengths`.
-pub fn ranges(lengths: &[usize]) -> Vec<Range<usize>> {
+pub(crate) fn ranges(lengths: &[usize]) -> Vec<Range<usize>> {
     let mut start = 0;
     lengths
         .iter()
