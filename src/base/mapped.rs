@@ -51,7 +51,7 @@ impl State {
     }
 
     /// An error if a file that was in this state is `now` in another.
-    pub fn check(&self, path: &Path, now: &Self) -> Result<()> {
+    pub(crate) fn check(&self, path: &Path, now: &Self) -> Result<()> {
         let what = match now {
             now if now == self => return Ok(()),
             now if now.len != self.len => format!("{} bytes, now {}", self.len, now.len),
@@ -62,7 +62,7 @@ impl State {
     }
 
     /// An error if what has this name is no longer in this state.
-    pub fn check_path(&self, path: &Path) -> Result<()> {
+    pub(crate) fn check_path(&self, path: &Path) -> Result<()> {
         let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
         self.check(path, &Self::of(&now))
     }
@@ -110,12 +110,12 @@ impl FileBytes {
     }
 
     /// Its state at open.
-    pub fn state(&self) -> State {
+    pub(crate) fn state(&self) -> State {
         self.state
     }
 
     /// Whether the file was empty at open.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.state.len == 0
     }
 
@@ -139,17 +139,17 @@ impl FileBytes {
     }
 
     /// Bytes that were copied out so far.
-    pub fn bytes_read(&self) -> u64 {
+    pub(crate) fn bytes_read(&self) -> u64 {
         self.read.load(Ordering::Relaxed)
     }
 
     /// Whether small reads are cheap (mapped), or worth joining into larger ones.
-    pub fn is_mapped(&self) -> bool {
+    pub(crate) fn is_mapped(&self) -> bool {
         self.map.is_some()
     }
 
     /// An error if what has the file's name is no longer in the state that the file had at open.
-    pub fn check_unchanged(&self) -> Result<()> {
+    pub(crate) fn check_unchanged(&self) -> Result<()> {
         self.state.check_path(&self.path)
     }
 }

@@ -109,7 +109,7 @@ pub enum Measure {
 
 impl ErrorBound {
     /// How the shares of samples make up that of a series.
-    pub fn measure(&self) -> Measure {
+    pub(crate) fn measure(&self) -> Measure {
         match self.bound {
             Bound::Pointwise | Bound::Relative { .. } => Measure::Largest,
             Bound::Rms | Bound::Sampled { .. } => Measure::RootMeanSquare,
@@ -117,7 +117,7 @@ impl ErrorBound {
     }
 
     /// The error allowed to a sample that is `value`, rounded down; where means are bounded, that of the mean.
-    pub fn allowed(&self, value: f64) -> f64 {
+    pub(crate) fn allowed(&self, value: f64) -> f64 {
         match self.bound {
             Bound::Relative { floor } => relative_bound(self.tolerance, floor, value),
             _ => self.delta,
@@ -125,7 +125,7 @@ impl ErrorBound {
     }
 
     /// Whether the errors of one series keep the promise (eq 21-23): for each frame the error, rounded up, and what is allowed.
-    pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
+    pub(crate) fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
         match self.measure() {
             Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
             Measure::RootMeanSquare => {
@@ -141,7 +141,7 @@ impl ErrorBound {
     }
 
     /// The share of its bound that a series uses, rounded up; `errors` are as for [`Self::holds`].
-    pub fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
+    pub(crate) fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
         let frames = errors.len() as f64;
         let add = |(largest, squares): (f64, f64), (e, allowed)| {
             let share = share(e, allowed);
@@ -157,7 +157,7 @@ impl ErrorBound {
 
     /// Adds the errors of the next frame of `N` series, whose samples are `values`, to what [`Self::largest_share`] makes
     /// shares of. Vector code, and so without care for rounding.
-    pub fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
+    pub(crate) fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
         for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
             match self.bound {
                 Bound::Pointwise => *sum = if *e > *sum { *e } else { *sum },
@@ -174,7 +174,7 @@ impl ErrorBound {
     }
 
     /// No less than the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
-    pub fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
+    pub(crate) fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         match self.bound {
             Bound::Pointwise if largest > 0.0 => share(largest.next_up(), self.delta),
@@ -192,7 +192,7 @@ impl ErrorBound {
     /// The largest quantisation step with which rounding alone keeps the promise (eq 25), for samples that are allowed `error`.
     ///
     /// `gain` is the largest sum of |u_k(t)| over k ([`crate::wavelet::gain`]). Where means are bounded, it does not matter.
-    pub fn step(&self, error: f64, gain: f64) -> f64 {
+    pub(crate) fn step(&self, error: f64, gain: f64) -> f64 {
         match self.measure() {
             Measure::Largest => 2.0 * error / gain,
             // Rounding moves a sample by step / sqrt 12 rms; the rest of the budget is left for dropping coefficients.

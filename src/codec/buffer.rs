@@ -10,7 +10,7 @@ pub struct Buffer<T: Pooled>(Vec<T>);
 
 impl<T: Pooled> Buffer<T> {
     /// A slice of so many, each with any value.
-    pub fn of(len: usize) -> Self {
+    pub(crate) fn of(len: usize) -> Self {
         let mut values = spare::<T>().pop().unwrap_or_default();
         if values.capacity() < len {
             values = Vec::new(); // nothing of it is worth copying

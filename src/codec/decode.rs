@@ -70,7 +70,7 @@ impl Block {
     }
 
     /// Of which every sample is missing: not a number where the type has that, or the declared value, or 0.
-    pub fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
+    pub(crate) fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
         let voxels: usize = size.iter().product();
         let samples = codec.frames() * voxels;
         let number = if codec.sample.is_float() { f64::NAN } else { codec.missing_value.unwrap_or(0.0) };
@@ -113,19 +113,19 @@ impl Block {
 
     /// What the codes of a pyramid give, where it is needed at once: if one k says nothing without the others, or if any
     /// sample is overridden.
-    pub fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
+    pub(crate) fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
         at_once.then(|| Field::refined(codec, self.size, self.step, &self.codes))
     }
 
     /// Whether any sample is not what the coefficients give.
-    pub fn overrides(&self) -> bool {
+    pub(crate) fn overrides(&self) -> bool {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
     /// What the codes of one k give; `room` is for that.
-    pub fn plane<'a>(&'a self, codec: &WindowCodec, k: usize, room: (&'a mut Vec<f32>, &'a mut Vec<f64>)) -> Plane<'a> {
+    pub(crate) fn plane<'a>(&'a self, codec: &WindowCodec, k: usize, room: (&'a mut Vec<f32>, &'a mut Vec<f64>)) -> Plane<'a> {
         Plane::decode(codec, self.size, self.step, (&self.codes, k), room)
     }
 
@@ -142,7 +142,7 @@ impl Block {
     }
 
     /// Whether a sample is missing.
-    pub fn is_missing(&self, index: usize) -> bool {
+    pub(crate) fn is_missing(&self, index: usize) -> bool {
         self.missing.0.get(index).copied().unwrap_or(false)
     }
 
@@ -158,7 +158,7 @@ impl Block {
     }
 
     /// The series of one voxel as the coefficients give it.
-    pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
+    pub(crate) fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
         field.series(codec.basis.as_ref(), self.voxels, voxel)
     }
 
@@ -168,7 +168,7 @@ impl Block {
     }
 
     /// What [`Self::samples`] gives, and the numbers that are splatted, not rounded to the samples' type.
-    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
+    pub(crate) fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
         let mut values = Buffer::of(codec.frames() * self.voxels);
         let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
         if self.exact.is_some() {

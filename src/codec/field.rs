@@ -100,7 +100,7 @@ impl<'a> Field<'a> {
     }
 
     /// Whether all coefficients are zero.
-    pub fn is_zero(&self) -> bool {
+    pub(crate) fn is_zero(&self) -> bool {
         !self.marked.contains(&true)
     }
 
@@ -158,7 +158,7 @@ impl<'a> Field<'a> {
     }
 
     /// The coefficients of one k; `room` is for those.
-    pub fn plane<'p>(&'p self, k: usize, voxels: usize, room: &'p mut Vec<f64>) -> Plane<'p> {
+    pub(crate) fn plane<'p>(&'p self, k: usize, voxels: usize, room: &'p mut Vec<f64>) -> Plane<'p> {
         let range = k * voxels..(k + 1) * voxels;
         match &self.values {
             _ if !self.marked[k] => Plane::Zero,

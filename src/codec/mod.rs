@@ -87,7 +87,7 @@ impl WindowCodec {
     }
 
     /// The number of level parts that a block can have.
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         if self.scheme.pyramid.is_some() { usize::from(Pyramid::PARTS) } else { self.levels.len() }
     }
 
@@ -121,13 +121,13 @@ impl WindowCodec {
     }
 
     /// Whether a sample is missing: not finite, or the declared value.
-    pub fn is_missing(&self, value: f64) -> bool {
+    pub(crate) fn is_missing(&self, value: f64) -> bool {
         sample::is_missing(value, self.missing_value)
     }
 
     /// The larger error of a decoded value as it is splatted and as it is extracted; rounded up. Infinite if it would be
     /// taken for a missing one.
-    pub fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
+    pub(crate) fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
         let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
         if lost { f64::INFINITY } else { a.max(b) }

@@ -29,12 +29,12 @@ impl Scheme {
     }
 
     /// The transform along time of a window of `frames` frames.
-    pub fn time_basis(&self, frames: usize) -> Box<dyn TimeBasis> {
+    pub(crate) fn time_basis(&self, frames: usize) -> Box<dyn TimeBasis> {
         wavelet::basis(self.basis, &self.functions, frames)
     }
 
     /// Its name for reports: the transform, and what refines it along which axes.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let Some(pyramid) = &self.pyramid else { return self.basis.name().into() };
         let axes: String = pyramid.order.iter().map(|axis| format!("{axis:?}").to_lowercase()).collect();
         let stencil = format!("{:?}", pyramid.stencil).to_lowercase();

@@ -160,7 +160,7 @@ impl CoefficientFile {
 
     /// Bytes that the largest block takes as it is read and refined: payload, codes, coefficients, what is missing, and
     /// what is stored exactly.
-    pub fn block_bytes(&self) -> usize {
+    pub(crate) fn block_bytes(&self) -> usize {
         let payload = 5;
         self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
     }
@@ -187,7 +187,7 @@ impl CoefficientFile {
     }
 
     /// The directory's leaves of one channel of a window.
-    pub fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
+    pub(crate) fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
         let leaves = self.leaves(window);
         let each = leaves.len() / self.channels();
         leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
@@ -231,7 +231,7 @@ impl CoefficientFile {
     }
 
     /// Whether any sample of a window may be missing.
-    pub fn has_missing(&self, window: u32) -> bool {
+    pub(crate) fn has_missing(&self, window: u32) -> bool {
         let record = &self.metadata().windows[window as usize];
         record.missing > 0 || self.skipped().is_some_and(|damage| damage.of_window(window))
     }
@@ -282,12 +282,12 @@ impl CoefficientFile {
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
-    pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
+    pub(crate) fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
         self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of a leaf and its blocks, of these entries, that is in no part; `found` is told what is wrong.
-    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+    pub(crate) fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
         self.reader.check_leaf(leaf, blocks, &mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
@@ -306,7 +306,7 @@ impl CoefficientFile {
     }
 
     /// All of its windows, once every byte of them was seen to be whole.
-    pub fn whole_windows(&self) -> Result<CompletePrefix> {
+    pub(crate) fn whole_windows(&self) -> Result<CompletePrefix> {
         let whole = CompletePrefix::read(self.reader.storage()).map_err(|e| self.failed(e))?;
         match whole.metadata() == self.metadata() {
             true => Ok(whole),
@@ -327,7 +327,7 @@ impl CoefficientFile {
     }
 
     /// The error of a file whose parts contradict each other.
-    pub fn contradiction(&self, what: String) -> Error {
+    pub(crate) fn contradiction(&self, what: String) -> Error {
         self.failed(wavesplat_format::Error::Invalid(what))
     }
 
