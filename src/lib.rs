@@ -136,6 +136,7 @@ pub mod convert;
 pub mod view;
 pub mod render;
 pub mod extract;
+#[doc(hidden)]
 #[cfg(feature = "args")]
 pub mod cli;
 

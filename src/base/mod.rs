@@ -11,5 +11,7 @@ pub(crate) mod memory;
 pub mod sample;
 pub mod grid;
 pub mod mapped;
+#[doc(hidden)]
 pub mod output;
+#[doc(hidden)]
 pub mod npy;

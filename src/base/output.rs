@@ -2,7 +2,8 @@
 
 mod names;
 
-pub use names::{Numbered, names_of_views};
+pub(crate) use names::Numbered;
+pub use names::names_of_views;
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use std::ffi::OsString;

@@ -100,7 +100,7 @@ pub struct ErrorBound {
 
 /// How the shares of a series' samples make up its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
+pub(crate) enum Measure {
     /// The largest.
     Largest,
     /// The root of the mean of their squares.

@@ -125,7 +125,12 @@ impl Block {
     }
 
     /// What the codes of one k give; `room` is for that.
-    pub(crate) fn plane<'a>(&'a self, codec: &WindowCodec, k: usize, room: (&'a mut Vec<f32>, &'a mut Vec<f64>)) -> Plane<'a> {
+    pub(crate) fn plane<'a>(
+        &'a self,
+        codec: &WindowCodec,
+        k: usize,
+        room: (&'a mut Vec<f32>, &'a mut Vec<f64>),
+    ) -> Plane<'a> {
         Plane::decode(codec, self.size, self.step, (&self.codes, k), room)
     }
 

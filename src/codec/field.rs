@@ -99,11 +99,6 @@ impl<'a> Field<'a> {
         Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
     }
 
-    /// Whether all coefficients are zero.
-    pub(crate) fn is_zero(&self) -> bool {
-        !self.marked.contains(&true)
-    }
-
     /// A coefficient.
     pub fn at(&self, index: usize) -> f64 {
         match &self.values {

@@ -20,6 +20,7 @@ pub mod estimate;
 mod gather;
 mod learn;
 mod record;
+#[doc(hidden)]
 pub mod sampled;
 mod settings;
 mod task;
@@ -42,6 +43,7 @@ use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
 use serde::Serialize;
+#[doc(hidden)]
 pub use settings::{of_file, options};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -223,6 +225,7 @@ pub fn resume<W: Write>(
 }
 
 /// What a file of `archive` says before its first frame: all that is decided without looking at samples.
+#[doc(hidden)]
 pub fn open_partial(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
     let Task { config, archive, colour_transform } = &Task::new(config, archive);
     Plan::new(config, archive, colour_transform.as_ref()).map(|plan| plan.start)

@@ -126,6 +126,7 @@ impl CoefficientFile {
     }
 
     /// The type of the source's samples, and what stands for a missing one.
+    #[doc(hidden)]
     pub fn of_source(&self) -> (SampleType, Option<f64>) {
         let plain = (self.sample(), self.metadata().missing_value);
         self.colour_transform
@@ -146,12 +147,14 @@ impl CoefficientFile {
     }
 
     /// The same as far as the source's samples are known to lie within.
+    #[doc(hidden)]
     pub fn source_range(&self) -> (f64, f64) {
         let ((lo, hi), (least, most)) = (self.value_range(), self.metadata().range());
         if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
     }
 
     /// Samples or coefficients, whichever are more, of the largest block.
+    #[doc(hidden)]
     pub fn largest_block(&self) -> usize {
         let windows = &self.metadata().windows;
         let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
@@ -177,11 +180,13 @@ impl CoefficientFile {
     }
 
     /// What decoding a window's blocks takes.
+    #[doc(hidden)]
     pub fn codec(&self, window: u32) -> Result<WindowCodec> {
         WindowCodec::of_file(self.metadata(), &self.metadata().windows[window as usize]).map_err(|e| self.failed(e))
     }
 
     /// The directory's leaves of a window, of all channels.
+    #[doc(hidden)]
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
         self.reader.leaves(window)
     }
@@ -237,6 +242,7 @@ impl CoefficientFile {
     }
 
     /// The entries of a leaf's blocks.
+    #[doc(hidden)]
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
         let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
@@ -248,6 +254,7 @@ impl CoefficientFile {
     }
 
     /// The entries of the blocks of a channel and window that touch a region, in order, a leaf of the directory at a time.
+    #[doc(hidden)]
     pub fn entries<'a>(
         &'a self,
         window: u32,
@@ -261,6 +268,7 @@ impl CoefficientFile {
     }
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
+    #[doc(hidden)]
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         self.block_from(&self.reader, codec, entry, wanted)
     }
@@ -287,7 +295,12 @@ impl CoefficientFile {
     }
 
     /// Checks every byte of a leaf and its blocks, of these entries, that is in no part; `found` is told what is wrong.
-    pub(crate) fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+    pub(crate) fn check_leaf(
+        &self,
+        leaf: &LeafEntry,
+        blocks: &[BlockEntry],
+        found: &mut dyn FnMut(Error),
+    ) -> Result<()> {
         self.reader.check_leaf(leaf, blocks, &mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 

@@ -90,7 +90,7 @@ impl Method {
 
 /// The footprint of one view: everything but where a voxel is.
 #[derive(Debug, Clone, Copy)]
-pub struct Footprint {
+pub(crate) struct Footprint {
     /// Pixels from the centre to the cut.
     pub reach: f64,
     /// f at its centre.
@@ -150,11 +150,6 @@ impl Footprint {
     /// The weight so many pixels from a voxel, as a share of the one at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
     pub(crate) fn share(&self, [x, y]: [f64; 2]) -> f64 {
         libm::exp(-self.decay * (x * x + y * y))
-    }
-
-    /// The standard deviation of its Gaussian, in pixels.
-    pub(crate) fn deviation(&self) -> f64 {
-        (0.5 / self.decay).sqrt()
     }
 
     /// The sum of a footprint over all pixels, as a multiple of its weight at its centre.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Names of numbered files, a frame in each.
 #[derive(Debug)]
-pub struct Numbered {
+pub(crate) struct Numbered {
     before: String,
     after: String,
     /// Digits of the number; none: there is but one file.
