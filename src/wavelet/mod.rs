@@ -52,7 +52,7 @@ pub trait TimeBasis: Send + Sync + Debug {
     }
 }
 
-/// The basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
+/// The basis of a window of `frames` frames; `functions` are the learned ones, if any (`Learned::new`).
 pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis> {
     match kind {
         Basis::Haar => Box::new(Haar::new(frames)),
