@@ -148,6 +148,34 @@ pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Opt
     Some((a.0.min(b.0), a.1.max(b.1)))
 }
 
+/// The range of all samples that are not missing, (inf, -inf) without any; `missing` gets the index of each of the others.
+pub fn range_of_present(
+    ty: SampleType,
+    samples: &[u8],
+    declared: Option<f64>,
+    mut missing: impl FnMut(usize),
+) -> (f64, f64) {
+    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    for_each_run(ty, samples, |first, values| {
+        if let Some(run) = range_unless_missing(values, declared) {
+            range = join_ranges(range, run);
+            return;
+        }
+        for (i, value) in values.iter().enumerate() {
+            match is_missing(*value, declared) {
+                true => missing(first + i),
+                false => range = join_ranges(range, (*value, *value)),
+            }
+        }
+    });
+    range
+}
+
+/// The smallest range that holds both.
+pub fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
 /// Values that are looked at together: each comparison waits for the last one.
 const SIDE_BY_SIDE: usize = 16;
 
@@ -308,6 +336,21 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn missing_samples_are_counted_and_not_in_the_range() {
+        let mut values: Vec<f64> = (0..1500).map(f64::from).collect();
+        for i in [0, 700, 1499] {
+            values[i] = [f64::NAN, f64::INFINITY, -9.0][i % 3];
+        }
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut missing = Vec::new();
+        let range = range_of_present(SampleType::F64, &bytes, Some(-9.0), |i| missing.push(i));
+        let expected: Vec<usize> = (0..1500).filter(|i| is_missing(values[*i], Some(-9.0))).collect();
+        assert_eq!((range, missing), ((1.0, 1498.0), expected));
+        let all = range_of_present(SampleType::U8, &[7, 7], Some(7.0), |_| {});
+        assert_eq!(all, (f64::INFINITY, f64::NEG_INFINITY));
     }
 
     #[test]

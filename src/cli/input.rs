@@ -9,8 +9,9 @@ use crate::base::output::part_of;
 use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
-use crate::source::{self, FrameSource, OpenOptions, Selection};
+use crate::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
 use clap::{Args, ValueEnum};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -23,6 +24,20 @@ pub enum Endian {
     Big,
 }
 
+impl fmt::Display for Endian {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if *self == Self::Big { "big" } else { "little" })
+    }
+}
+
+impl FromStr for Endian {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        ValueEnum::from_str(text, false)
+    }
+}
+
 /// How an archive is read, besides its names.
 #[derive(Debug, Clone, Args)]
 pub struct InputArgs {
@@ -32,12 +47,12 @@ pub struct InputArgs {
     /// Sample type of headerless data: u8 i8 u16 i16 u32 i32 f16 f32 f64
     #[arg(long, value_name = "TYPE", help_heading = "Input")]
     pub dtype: Option<SampleType>,
-    /// Byte order of headerless data
-    #[arg(long, value_enum, value_name = "ORDER", default_value = "little", help_heading = "Input")]
-    pub endian: Endian,
-    /// Bytes before the first sample of each headerless file
-    #[arg(long, value_name = "BYTES", default_value_t = 0, help_heading = "Input")]
-    pub offset: u64,
+    /// Byte order of headerless data [default: little]
+    #[arg(long, value_enum, value_name = "ORDER", help_heading = "Input")]
+    pub endian: Option<Endian>,
+    /// Bytes before the first sample of each headerless file [default: 0]
+    #[arg(long, value_name = "BYTES", help_heading = "Input")]
+    pub offset: Option<u64>,
     /// Which array of the files
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub variable: Option<String>,
@@ -64,8 +79,8 @@ impl InputArgs {
         let given = [
             (self.dims.is_some(), "--dims"),
             (self.dtype.is_some(), "--dtype"),
-            (self.endian == Endian::Big, "--endian"),
-            (self.offset > 0, "--offset"),
+            (self.endian.is_some(), "--endian"),
+            (self.offset.is_some(), "--offset"),
             (self.variable.is_some(), "--variable"),
             (self.axes.is_some(), "--axes"),
             (self.spacing.is_some(), "--spacing"),
@@ -85,20 +100,29 @@ impl InputArgs {
 
     /// Opens an archive without a word; `memory` bytes may hold what must be decoded or is piped.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
-        let options = OpenOptions {
+        source::open(inputs, &self.options(memory))
+    }
+
+    /// The variables among which `--variable` must choose; none if an archive can be opened without that.
+    pub fn undecided(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
+        source::undecided(inputs, &self.options(memory))
+    }
+
+    fn options(&self, memory: usize) -> OpenOptions {
+        OpenOptions {
             access: self.access(),
             dims: self.dims.as_ref().map(|d| d.0.clone()),
             sample: self.dtype,
-            big_endian: self.endian == Endian::Big,
-            offset: self.offset,
+            big_endian: self.endian == Some(Endian::Big),
+            offset: self.offset.unwrap_or(0),
+            dims_are_remembered: false,
             variable: self.variable.clone(),
             axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
             allow_gaps: self.allow_gaps,
             memory,
-        };
-        source::open(inputs, &options)
+        }
     }
 }
 
@@ -111,7 +135,23 @@ impl InputArgs {
         Ok(source)
     }
 
-    /// Opens the archive that a file is of, or goes on with: of its variable, and narrowed to its region and to some frames.
+    /// The options that were given, as a file remembers them: [`Self::open_again`] needs them to read the same samples.
+    pub fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
+        let given = [
+            ("variable", self.variable.clone()),
+            ("axes", self.axes.clone()),
+            ("dims", self.dims.as_ref().map(ToString::to_string)),
+            ("dtype", self.dtype.map(|ty| ty.to_string())),
+            ("endian", self.endian.map(|order| order.to_string())),
+            ("offset", self.offset.map(|bytes| bytes.to_string())),
+            ("spacing", self.spacing.map(|s| s.to_string())),
+            ("origin", self.origin.map(|o| o.to_string())),
+        ];
+        given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+    }
+
+    /// Opens the archive that a file was made from, or that continues it: with the options that the file remembers unless they
+    /// are given, and narrowed to its region and to some frames.
     pub fn open_again(
         &self,
         of: &CoefficientFile,
@@ -119,17 +159,47 @@ impl InputArgs {
         frames: Option<FrameRange>,
         common: &CommonArgs,
     ) -> Result<Box<dyn FrameSource>> {
+        let dims_are_remembered = !self.says_layout();
+        let options = OpenOptions { dims_are_remembered, ..self.completed(of)?.options(common.stream_memory()) };
+        let source = source::open(inputs, &options)?;
+        source.archive().notes.iter().for_each(|n| common.note(n));
+        narrow(source, frames, remembered(of, "region")?)
+    }
+
+    /// Whether any option says how headerless data is laid out.
+    fn says_layout(&self) -> bool {
+        self.dims.is_some() || self.dtype.is_some() || self.endian.is_some() || self.offset.is_some()
+    }
+
+    /// These options, and those that a file remembers where they were not given.
+    fn completed(&self, of: &CoefficientFile) -> Result<Self> {
         let mut input = self.clone();
-        let before = |name| setting(of.metadata(), name).map(String::from);
-        input.variable = input.variable.or_else(|| before("variable"));
-        input.axes = input.axes.or_else(|| before("axes"));
-        narrow(input.open(inputs, common)?, frames, remembered(of, "region")?)
+        complete(&mut input.variable, of, "variable")?;
+        complete(&mut input.axes, of, "axes")?;
+        complete(&mut input.spacing, of, "spacing")?;
+        complete(&mut input.origin, of, "origin")?;
+        // Without dims, dtype is the type of samples that were coloured.
+        if setting(of.metadata(), "dims").is_some() {
+            complete(&mut input.dims, of, "dims")?;
+            complete(&mut input.dtype, of, "dtype")?;
+            complete(&mut input.endian, of, "endian")?;
+            complete(&mut input.offset, of, "offset")?;
+        }
+        Ok(input)
     }
 }
 
+/// Fills an option that was not given with what a file remembers.
+fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, of: &CoefficientFile, name: &str) -> Result<()> {
+    if option.is_none() {
+        *option = remembered(of, name)?;
+    }
+    Ok(())
+}
+
 /// What a file remembers under a name of what was converted.
-pub fn remembered<T: FromStr<Err = String>>(of: &CoefficientFile, name: &str) -> Result<Option<T>> {
-    let parsed = |what: String| Error::input(of.path(), format!("its settings are not understood: {what}"));
+pub fn remembered<T: FromStr<Err: fmt::Display>>(of: &CoefficientFile, name: &str) -> Result<Option<T>> {
+    let parsed = |what: T::Err| Error::input(of.path(), format!("its settings are not understood: {what}"));
     setting(of.metadata(), name).map(str::parse).transpose().map_err(parsed)
 }
 

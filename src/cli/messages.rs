@@ -1,6 +1,7 @@
 //! Errors and notes of the library as the programs print them: fields become options, remedies become advice.
 
 use crate::base::error::{Error, Note, Remedy};
+use crate::source::extensions;
 use clap::Command;
 use std::borrow::Cow;
 
@@ -52,7 +53,7 @@ fn advice(remedy: &Remedy) -> Cow<'static, str> {
         }
         Remedy::ChooseIndex { name } => return index(name).into(),
         Remedy::ChooseFrames => "--frames a:b chooses those that the file holds",
-        Remedy::DescribeSamples => "headerless data needs --dims NXxNYxNZ and --dtype",
+        Remedy::DescribeSamples => return known_formats().into(),
         Remedy::Adjust(fields) => return format!("adjust {}", or(fields)).into(),
         Remedy::SetDims { dims: [x, y, z], frames: 1 } => return format!("say --dims {x}x{y}x{z}").into(),
         Remedy::SetDims { dims: [x, y, z], frames } => return format!("say --dims {x}x{y}x{z}x{frames}").into(),
@@ -96,6 +97,12 @@ fn index(name: &str) -> String {
 
 fn append(frames: u64) -> String {
     format!("--frames 0:{frames} makes a file of these, to which append adds the others; --force begins anew")
+}
+
+/// What to type for headerless data, and then the formats that need no options.
+fn known_formats() -> String {
+    let known: Vec<String> = extensions().map(|extension| format!(".{extension}")).collect();
+    format!("for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: {}", known.join(", "))
 }
 
 #[cfg(test)]

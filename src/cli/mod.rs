@@ -22,6 +22,8 @@ mod lines;
 #[cfg(feature = "cli")]
 mod messages;
 #[cfg(feature = "cli")]
+mod optional;
+#[cfg(feature = "cli")]
 mod program;
 #[cfg(feature = "cli")]
 mod terminal;

@@ -3,7 +3,7 @@
 use super::advice;
 use super::common::note;
 use super::config::Config;
-use super::messages;
+use super::{messages, optional};
 use crate::base::error::{Error, Result};
 use crate::base::mapped;
 use crate::base::output::abandon;
@@ -18,9 +18,8 @@ use std::process::{self, ExitCode};
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     mapped::explain_sigbus();
     mapped::on_interrupt(end);
-    let args: Vec<OsString> = env::args_os().collect();
-    let config = match Config::read(&command::<A>(), &args) {
-        Ok(config) => config,
+    let (args, config) = match arguments::<A>() {
+        Ok(read) => read,
         Err(e) => return failed::<A>(&e),
     };
     let args = match parse::<A>(&args, &config) {
@@ -40,6 +39,14 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
             code
         }
     }
+}
+
+/// What the command line and the file of options say.
+fn arguments<A: Parser>() -> Result<(Vec<OsString>, Config)> {
+    let (command, args) = (command::<A>(), env::args_os().collect::<Vec<_>>());
+    let args = optional::joined(&command, &args)?;
+    let config = Config::read(&command, &args)?;
+    Ok((args, config))
 }
 
 /// Ends the program as a signal asks: what can be gone on with is kept, all else that is unfinished removed.

@@ -44,6 +44,13 @@ impl FromStr for Dims {
     }
 }
 
+impl fmt::Display for Dims {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dims: Vec<String> = self.0.iter().map(ToString::to_string).collect();
+        f.write_str(&dims.join("x"))
+    }
+}
+
 /// Width and height, as `512x512`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Whole<const N: usize>(pub [usize; N]);
@@ -75,6 +82,12 @@ impl<const N: usize> FromStr for Numbers<N> {
             text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
         let numbers = numbers.and_then(|n| n.try_into().ok());
         numbers.map(Self).ok_or_else(|| format!("takes {N} numbers with commas between them"))
+    }
+}
+
+impl<const N: usize> fmt::Display for Numbers<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.map(|number| format!("{number:?}")).join(","))
     }
 }
 
@@ -274,6 +287,7 @@ mod tests {
     #[test]
     fn dims_have_three_or_four_numbers() {
         assert_eq!("75x75x20".parse(), Ok(Dims(vec![75, 75, 20])));
+        assert_eq!(Dims(vec![75, 75, 20, 3]).to_string(), "75x75x20x3");
         assert!(["75x75", "1x2x3x4x5", "0x1x1", "axbxc"].iter().all(|t| t.parse::<Dims>().is_err()));
     }
 }

@@ -1,4 +1,7 @@
-//! The samples of a block, loaded a few series at a time; missing ones are found, and filled.
+//! Loads the samples of a block, a few series at a time. Finds missing samples and fills them.
+//!
+//! A block's samples stay bytes. Finding, loading and checking turn a few of them into numbers at a time, which takes less
+//! memory than eight bytes for every sample.
 
 use super::WindowCodec;
 use super::truncate::Group;
@@ -15,30 +18,24 @@ pub(super) struct Missing {
 
 impl Missing {
     pub(super) fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
-        let mut found = Self { mask: vec![false; samples.len() / codec.sample.size()], count: 0, magnitude: 0.0 };
-        sample::for_each_run(codec.sample, samples, |first, values| {
-            if let Some((lo, hi)) = sample::range_unless_missing(values, codec.missing_value) {
-                found.magnitude = found.magnitude.max(-lo).max(hi);
-                return;
-            }
-            for (i, value) in values.iter().enumerate() {
-                found.mask[first + i] = codec.is_missing(*value);
-                found.count += u64::from(found.mask[first + i]);
-                found.magnitude =
-                    if found.mask[first + i] { found.magnitude } else { found.magnitude.max(value.abs()) };
-            }
+        let mut mask = vec![false; samples.len() / codec.sample.size()];
+        let mut count = 0;
+        let (lo, hi) = sample::range_of_present(codec.sample, samples, codec.missing_value, |i| {
+            mask[i] = true;
+            count += 1;
         });
-        found
+        Self { mask, count, magnitude: 0.0_f64.max(-lo).max(hi) }
     }
 
-    /// The very bytes of the missing samples.
+    /// The bytes of the missing samples, in order.
     pub(super) fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
         let each = samples.chunks_exact(codec.sample.size());
         each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
     }
 }
 
-/// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
+/// Loads the series of a group of voxels. Missing samples are filled with the last present one, else the next, else
+/// zero.
 pub(super) fn load_group(
     codec: &WindowCodec,
     weighing: &QuantizerSetup,
@@ -62,7 +59,7 @@ pub(super) fn load_group(
     }
 }
 
-/// The samples of `count` of `voxels` voxels, frame by frame, and zeros.
+/// Loads the samples of `count` of `voxels` voxels, frame by frame; unused lanes are zero.
 fn load_lanes(codec: &WindowCodec, samples: &[u8], (first, count): (usize, usize), voxels: usize, out: &mut [Lane]) {
     let size = codec.sample.size();
     if count == LANES {

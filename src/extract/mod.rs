@@ -1,4 +1,5 @@
-//! A coefficient file back to samples: any frames, any region, without reading the rest; and into files of other programs.
+//! Extracts samples from a coefficient file: any frames and any region, without reading the rest. Writes them in the
+//! formats of other programs.
 
 mod contents;
 mod encoding;
@@ -65,15 +66,15 @@ impl ExtractConfig {
 pub struct ExtractReport {
     /// Frames written.
     pub frames: usize,
-    /// Blocks that were decoded, each time counted.
+    /// Decoded blocks; a block decoded twice counts twice.
     pub blocks_read: u64,
-    /// Stored bytes that were read of blocks.
+    /// Stored bytes of blocks that were read.
     pub bytes_read: u64,
-    /// Bytes of the file that were read, directory and all.
+    /// Bytes that were read of the file, including its directory.
     pub file_bytes_read: u64,
-    /// Bytes that the file has.
+    /// Bytes of the file.
     pub file_bytes: u64,
-    /// Bytes of samples, in the type that they have in the file.
+    /// Bytes of the extracted samples, in the file's sample type.
     pub bytes: u64,
 }
 
@@ -82,7 +83,7 @@ pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()
     Pieces::new(file, config).map(|_| ())
 }
 
-/// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
+/// Writes the samples in the file's sample type, little-endian, frame by frame, x fastest. Messages call `out` `name`.
 pub fn extract(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -94,7 +95,7 @@ pub fn extract(
     extract_to(file, config, &mut write, progress)
 }
 
-/// As [`extract`]; `write` is given the samples in pieces: whole frames, or some of one frame.
+/// As [`extract`]; `write` gets the samples in pieces: whole frames, or part of one frame.
 pub fn extract_to(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -120,15 +121,15 @@ pub fn extract_to(
     Ok(report)
 }
 
-/// How much is decoded at a time: some frames of a window whole, or one frame by slabs of z.
+/// The amount decoded at a time: whole frames of a window, or slabs of z of one frame.
 struct Pieces {
     frames: usize,
     slab: usize,
-    /// Blocks that are decoded at a time.
+    /// Blocks decoded at a time.
     blocks: usize,
 }
 
-/// Frames (of one window) and voxels that are decoded together, in the order of the output.
+/// Frames of one window and voxels that are decoded together, in the order of the output.
 struct Piece {
     window: u32,
     frames: Vec<usize>,
@@ -166,7 +167,7 @@ impl Pieces {
     }
 }
 
-/// Bytes that decoding one block takes: as it is read and refined, and its samples.
+/// Bytes of memory to decode one block: its codes, its coefficients and its samples.
 fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
@@ -185,7 +186,7 @@ fn read_piece(
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
-    out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
+    out.resize(frames.len() * piece.region.voxels() * size, 0); // blocks overwrite all of it
     for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
             let batch = file.batch(&codec, entries, &wanted)?;
@@ -203,7 +204,7 @@ fn read_piece(
     Ok(())
 }
 
-/// Copies the rows that a block and the piece share.
+/// Copies the rows shared by a block and the piece.
 fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], piece: &Region, out: &mut [u8]) {
     let size = codec.sample.size();
     let shared = block.intersect(piece);

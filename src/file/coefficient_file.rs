@@ -3,11 +3,10 @@
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::base::sample::SampleType;
+use crate::base::sample::{SampleType, join_ranges};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
-use crate::source::scan::join_ranges;
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};

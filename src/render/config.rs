@@ -96,10 +96,12 @@ pub struct RenderConfig {
     pub region: Option<Region>,
     /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
     /// brightest point of the picture plane. For a mean it is relative to the value range at pixels with that point's
-    /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default: [`default_splat_error`].
+    /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default:
+    /// [`default_splat_error`].
     pub splat_error: f64,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
-    /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all have this error.
+    /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all
+    /// have this error.
     pub allowed: Option<f64>,
     /// The error that `allowed` limits. Default: the certified error.
     pub limited: Limit,
@@ -143,7 +145,7 @@ impl RenderConfig {
             (self.chooses_by_view(), "limited"),
             (self.quantity != Quantity::Mean, "quantity"),
         ];
-        let projects = |setting| Error::setting(setting, Note::with("is of projections alone", Remedy::Project));
+        let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));
         refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, setting)| Err(projects(setting)))
     }
 }

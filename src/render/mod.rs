@@ -82,7 +82,7 @@ use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
 use splat::ViewSetup;
-use splat::reference_weights::without_what_is_dim;
+use splat::reference_weights::without_dim_voxels;
 use std::time::{Duration, Instant};
 
 /// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
@@ -136,11 +136,11 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
-        let what = "the samples are colours already, of which only projections are made";
+        let what = "the samples are colours already, and colours are rendered as projections only";
         return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
     }
     let volume = (*scene.grid(), scene.blocks());
-    let setup = |view: &View| without_what_is_dim(ViewSetup::new(volume, config, view)?, config);
+    let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
     let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
     match config.mode {
         Mode::Projection => Budget::check(config, scene, &setups)?,

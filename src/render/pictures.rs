@@ -12,8 +12,8 @@ use std::path::Path;
 
 /// Renders all frames from all views into PNG files, which replace existing ones.
 ///
-/// `path` is a pattern: `%04d` stands for the frame's number, `%v` for the view's; it may lack one that is always the same.
-/// For other formats, progress, or pictures in memory see [`super::render`] and [`Sink`].
+/// `path` is a pattern: `%04d` stands for the frame's number, `%v` for the view's; it may lack one that is always the
+/// same. For other formats, progress, or pictures in memory see [`super::render`] and [`Sink`].
 ///
 /// # Errors
 /// A pattern that gives several pictures one name, and those of [`super::render`] and of writing files.

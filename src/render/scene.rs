@@ -18,10 +18,10 @@ use serde::Serialize;
 
 /// A data source to render: a grid of voxels with a value in every frame, read block by block.
 ///
-/// The library has two scenes: [`super::CoefficientScene`] and [`super::FrameScene`]. Another program can implement this
-/// trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the planes of a
-/// scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`], and its inverse
-/// copies.
+/// The library has two scenes: [`super::CoefficientScene`] and [`super::FrameScene`]. Another program can implement
+/// this trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the
+/// planes of a scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`],
+/// and its inverse copies.
 pub trait Scene {
     /// The grid of voxels.
     fn grid(&self) -> &Grid;
@@ -37,7 +37,8 @@ pub trait Scene {
     /// Number of frames; `None` if it is unknown until all are read.
     fn frames(&self) -> Option<usize>;
 
-    /// The largest error of a sample as a share of the value range, if it is known. It determines the default splat error.
+    /// The largest error of a sample as a share of the value range, if it is known. It determines the default splat
+    /// error.
     fn tolerance(&self) -> Option<f64> {
         None
     }

@@ -20,7 +20,7 @@ const SAME_PLACE: f64 = 1e-6;
 
 /// The files of an archive, in order.
 #[derive(Debug, Default)]
-pub(super) struct Files {
+pub(super) struct FrameFiles {
     /// The files, at least one, none twice.
     pub(super) paths: Vec<PathBuf>,
     /// Time of each where a list says so, else empty.
@@ -29,7 +29,7 @@ pub(super) struct Files {
     pub(super) notes: Vec<Note>,
 }
 
-impl Files {
+impl FrameFiles {
     /// Checks what a list says of files and times.
     pub(super) fn of_list(self) -> Parsed<Self> {
         if !self.times.is_empty() && self.times.len() != self.paths.len() {

@@ -157,7 +157,7 @@ fn copy_strided(
     let [axis, rows, planes] = axes;
     let out_strides = [size, size * dims[0], size * dims[0] * dims[1]];
     let place = |axis: usize, index: usize| strides[axis] * (region.start[axis] + index) as i64;
-    let line = Line { samples: dims[axis], size, stride: strides[axis], out_stride: out_strides[axis] };
+    let line = SampleLine { samples: dims[axis], size, stride: strides[axis], out_stride: out_strides[axis] };
     let mut span = line.span(bytes);
     for (k, j) in (0..dims[planes]).flat_map(|k| (0..dims[rows]).map(move |j| (k, j))) {
         let from = frame.wrapping_add_signed(place(planes, k) + place(rows, j) + place(axis, 0));
@@ -168,14 +168,14 @@ fn copy_strided(
 }
 
 /// Samples of a box along one axis.
-struct Line {
+struct SampleLine {
     samples: usize,
     size: usize, // of a sample, in bytes
     stride: i64, // bytes from a sample to the next one
     out_stride: usize,
 }
 
-impl Line {
+impl SampleLine {
     fn pitch(&self) -> usize {
         self.stride.unsigned_abs() as usize
     }
@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn samples_far_apart_are_read_alone_and_near_ones_in_bounded_pieces() {
-        let line = |samples, stride| Line { samples, size: 2, stride, out_stride: 2 };
+        let line = |samples, stride| SampleLine { samples, size: 2, stride, out_stride: 2 };
         let [file, memory] = both(&[0]);
         for bytes in [&file, &memory] {
             assert_eq!(line(1 << 30, 1 << 20).span(bytes).len(), 2, "one sample");
@@ -386,7 +386,7 @@ mod tests {
             let last = ((SAMPLES - 1) * pitch) as u64;
             for bytes in both(&stored) {
                 for (from, stride, expected) in [(0, pitch as i64, &forwards), (last, -(pitch as i64), &backwards)] {
-                    let line = Line { samples: SAMPLES, size: 2, stride, out_stride: 2 };
+                    let line = SampleLine { samples: SAMPLES, size: 2, stride, out_stride: 2 };
                     let mut found = vec![0; 2 * SAMPLES];
                     line.copy(&bytes, from, &mut line.span(&bytes), &mut found).expect("reading");
                     assert!(found == *expected, "{pitch} bytes apart, from {from}");

@@ -1,7 +1,7 @@
 //! What the user named as inputs, as a list of files in the order of time.
 
-use super::file_header::Files;
-use super::formats::{self, Format, SUPPORTED, file_series, pvd};
+use super::file_header::FrameFiles;
+use super::formats::{self, Format, file_series, pvd};
 use super::{OpenOptions, numbering};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::STANDARD;
@@ -10,10 +10,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The files that the inputs stand for.
-pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files> {
+pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {
     let files = match inputs {
         [only] => expand_one(only, options)?,
-        _ => Files { paths: listed(inputs)?, ..Files::default() },
+        _ => FrameFiles { paths: listed(inputs)?, ..FrameFiles::default() },
     };
     refuse_twice(&files.paths)?;
     if files.times.is_empty() && !options.allow_gaps {
@@ -23,6 +23,12 @@ pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Files>
         numbering::check(&files.paths)?;
     }
     Ok(files)
+}
+
+/// Whether the inputs are files that say themselves what they hold.
+pub(super) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
+    let files = expand(inputs, &options.for_headers());
+    files.is_ok_and(|files| formats::has_header(&files.paths[0]))
 }
 
 /// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case, no
@@ -42,17 +48,17 @@ pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn expand_one(input: &Path, options: &OpenOptions) -> Result<Files> {
+fn expand_one(input: &Path, options: &OpenOptions) -> Result<FrameFiles> {
     if input.is_dir() && formats::zarr_metadata(input).is_none() {
         return directory(input, options);
     }
     if !input.exists() && is_pattern(input) {
-        return Ok(Files { paths: matching(input)?, ..Files::default() });
+        return Ok(FrameFiles { paths: matching(input)?, ..FrameFiles::default() });
     }
     match Format::by_name(input) {
         Some(Format::Pvd) => pvd::read(input),
         Some(Format::FileSeries) => file_series::read(input),
-        _ => Ok(Files { paths: vec![input.into()], ..Files::default() }),
+        _ => Ok(FrameFiles { paths: vec![input.into()], ..FrameFiles::default() }),
     }
 }
 
@@ -108,7 +114,7 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
+fn directory(folder: &Path, options: &OpenOptions) -> Result<FrameFiles> {
     let all = visible_files(folder)?;
     let of = |format| all.iter().filter(move |p| Format::by_name(p) == Some(format));
     let mut lists: Vec<_> = of(Format::Pvd).collect();
@@ -132,10 +138,10 @@ fn directory(folder: &Path, options: &OpenOptions) -> Result<Files> {
         paths.retain(|p| formats::extension(p) != "vti"); // the pieces
     }
     let paths = one_extension(folder, paths)?;
-    Ok(Files { paths, ..Files::default() })
+    Ok(FrameFiles { paths, ..FrameFiles::default() })
 }
 
-fn with_list(list: &Path) -> Result<Files> {
+fn with_list(list: &Path) -> Result<FrameFiles> {
     let mut files = match Format::by_name(list) {
         Some(Format::FileSeries) => file_series::read(list)?,
         _ => pvd::read(list)?,
@@ -158,8 +164,7 @@ fn visible_files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let Some(first) = files.first() else {
-        let what = format!("has no file of frames. Supported are {SUPPORTED}");
-        return Err(Error::path(folder, Note::with(what, Remedy::DescribeSamples)));
+        return Err(Error::path(folder, Note::with("has no file of frames", Remedy::DescribeSamples)));
     };
     let extension = formats::extension(first);
     if let Some(other) = files.iter().find(|p| formats::extension(p) != extension) {

@@ -20,6 +20,7 @@ mod series;
 mod stream;
 #[cfg(test)]
 mod testing;
+mod variables;
 
 pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
@@ -31,6 +32,7 @@ pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
 pub use scan::value_range;
 pub use select::{Selection, select};
+pub use variables::{VariableAxis, VariableInfo};
 
 use crate::base::error::{Note, Result};
 use crate::base::grid::{Grid, Region};
@@ -59,6 +61,9 @@ pub struct OpenOptions {
     pub big_endian: bool,
     /// Bytes before the first sample of each file; for headerless data alone.
     pub offset: u64,
+    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive: files with a header of their own need
+    /// them no more, and of headerless data the number of frames is counted anew.
+    pub dims_are_remembered: bool,
     /// Which array of a file is meant, or which component of one: `velocity[0]`.
     pub variable: Option<String>,
     /// What the axes of an array count, the slowest first: letters of t z y x, or another for an axis beside these.
@@ -82,6 +87,7 @@ impl Default for OpenOptions {
             sample: None,
             big_endian: false,
             offset: 0,
+            dims_are_remembered: false,
             variable: None,
             axes: None,
             spacing: None,
@@ -89,6 +95,13 @@ impl Default for OpenOptions {
             allow_gaps: false,
             memory: 256 << 20,
         }
+    }
+}
+
+impl OpenOptions {
+    /// Without what is for headerless data alone.
+    fn for_headers(&self) -> Self {
+        Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }
     }
 }
 
@@ -106,8 +119,26 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
     {
         return open_stream(std::io::stdin(), options);
     }
+    if options.dims_are_remembered && inputs::have_headers(inputs, options) {
+        return open_files(inputs, &options.for_headers());
+    }
+    open_files(inputs, options)
+}
+
+fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let files = inputs::expand(inputs, options)?;
     Ok(Box::new(series::Series::open(&files, options)?))
+}
+
+/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A stream has one.
+///
+/// # Errors
+/// Files that are absent, damaged or of a format that is not supported.
+pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    if options.variable.is_some() || options.dims.is_some() || inputs == [Path::new(STANDARD)] {
+        return Ok(Vec::new());
+    }
+    formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)
 }
 
 /// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`.

@@ -3,7 +3,7 @@
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
 use crate::base::progress::Progress;
-use crate::base::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType, join_ranges};
 use crate::source::{FrameSource, FrameWindow};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
@@ -37,11 +37,6 @@ impl Scan {
             digest: xxh3_64_with_seed(&digests, 0),
         }
     }
-}
-
-/// The smallest range that holds both.
-pub(crate) fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
-    (a.0.min(b.0), a.1.max(b.1))
 }
 
 /// Bytes of the rows that are looked at together. Fixed, since the digest depends on it.
@@ -103,19 +98,9 @@ pub(crate) fn scan_frame(
 
 fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
-    sample::for_each_run(ty, bytes, |first, values| {
-        if let Some(range) = sample::range_unless_missing(values, declared) {
-            seen.range = join_ranges(seen.range, range);
-            return;
-        }
-        for (i, v) in values.iter().enumerate() {
-            if sample::is_missing(*v, declared) {
-                seen.missing += 1;
-                seen.first_missing.get_or_insert((frame, at + first + i));
-            } else {
-                seen.range = join_ranges(seen.range, (*v, *v));
-            }
-        }
+    seen.range = sample::range_of_present(ty, bytes, declared, |i| {
+        seen.missing += 1;
+        seen.first_missing.get_or_insert((frame, at + i));
     });
     seen
 }

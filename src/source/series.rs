@@ -1,6 +1,6 @@
 //! Files as one archive: whatever the format, a file comes down to frames at known places, or to frames that are decoded.
 
-use super::file_header::{DataLocation, FileHeader, Files, Part};
+use super::file_header::{DataLocation, FileHeader, FrameFiles, Part};
 use super::frames::{Bytes, Frame, Frames};
 use super::layout::Shape;
 use super::spill_buffer::{SpillBuffer, Spool};
@@ -36,7 +36,7 @@ struct Decoded {
 
 impl Series {
     /// Reads the header of every file.
-    pub(super) fn open(files: &Files, options: &OpenOptions) -> Result<Self> {
+    pub(super) fn open(files: &FrameFiles, options: &OpenOptions) -> Result<Self> {
         let Some((first_path, rest)) = files.paths.split_first() else {
             return Err(Error::setting("inputs", "no input was given"));
         };
@@ -90,7 +90,7 @@ impl Series {
         }
     }
 
-    fn finish(mut self, files: &Files, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
+    fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
         for note in &files.notes {
             note_once(&mut self.archive.notes, note.clone());
         }

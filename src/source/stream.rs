@@ -39,6 +39,7 @@ impl<R: Read> Stream<R> {
         let mut reader = Cursor::new(head).chain(reader);
         let (shape, frames, big_endian) = match (&options.dims, is_npy) {
             (Some(_), false) => headerless(&mut reader, options)?,
+            (Some(_), true) if options.dims_are_remembered => numpy(&mut reader, &options.for_headers())?,
             (Some(_), true) => {
                 return Err(Error::setting("dims", "the npy stream says them itself; leave them out"));
             }
@@ -155,7 +156,7 @@ fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, O
     let (shape, frames) = raw::shape(options)?;
     let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
     match skipped.map_err(|e| Error::io(STANDARD, "reading", e))? {
-        n if n == options.offset => Ok((shape, frames, options.big_endian)),
+        n if n == options.offset => Ok((shape, frames.filter(|_| !options.dims_are_remembered), options.big_endian)),
         n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the offset of {}", options.offset))),
     }
 }

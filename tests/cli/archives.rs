@@ -65,7 +65,6 @@ fn ambiguous_variables_are_listed_and_chosen() {
     let (work, source) = (Work::new(), input("netcdf/several.nc"));
     let listed = ["has several variables", "density: i8 (time 4, z 3, y 5, x 7) in kg m-3", "--variable"];
     work.wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &listed);
-    work.wavesplat(&format!("info {source}")).fails(3, &listed);
     work.wavesplat(&format!("convert {source} -o a.wspl --variable density")).ok();
     work.wavesplat(&format!("verify a.wspl --against {source}")).ok(); // uses the variable that the file remembers
     work.wavesplat(&format!("convert {source} -o b.wspl --variable nothing")).fails(3, &["has no variable nothing"]);
@@ -73,6 +72,43 @@ fn ambiguous_variables_are_listed_and_chosen() {
     work.wavesplat(&format!("convert {order} -o c.wspl --axes xyzt")).ok();
     work.wavesplat(&format!("verify c.wspl --against {order}")).ok();
     work.wavesplat(&format!("convert {order} -o d.wspl --axes xyz")).fails(3, &["the axes xyz are 3", "--axes"]);
+}
+
+#[test]
+fn info_lists_the_variables_of_which_one_must_be_chosen() {
+    let work = Work::new();
+    for (name, line) in [
+        ("netcdf/several.nc", "  density: i8 (time 4, z 3, y 5, x 7) in kg m-3\n"),
+        ("hdf5/several.h5", " (4, 3, 5, 7)"),
+        ("vti/several.vti", ": f32 (z 3, y 5, x 7)\n"),
+        ("vti/vector.vti", ", 3 components "),
+        ("nrrd/refused_vector.nrrd", "  samples[1]: "),
+        ("metaimage/refused_channels.mha", "  samples[1]: "),
+        ("nifti/refused_vector.nii", "[1]: "),
+    ] {
+        let told = work.wavesplat(&format!("info {}", input(name))).ok();
+        assert!(told.text().contains(line), "{name}: {}", told.text());
+        assert!(told.text().ends_with("choose one with --variable NAME\n"), "{name}: {}", told.text());
+        let told = work.wavesplat(&format!("info --json {}", input(name))).ok().json();
+        let first = &told["variables"][0];
+        let chosen = match first["components"].as_u64() {
+            Some(1) => first["name"].as_str().unwrap().into(),
+            _ => format!("{}[0]", first["name"].as_str().unwrap()),
+        };
+        let told = work.wavesplat(&format!("info --json {} --variable {chosen}", input(name))).ok().json();
+        assert_eq!(told["sample"], first["sample"], "{name}");
+        work.wavesplat(&format!("convert {} -o a.wspl", input(name))).fails(3, &["--variable"]);
+    }
+    for name in ["netcdf/era5.nc", "vti/active.vti", "vtk/several.vtk", "hdf5/gzip.h5", "nrrd/f32.nrrd"] {
+        assert!(work.wavesplat(&format!("info {}", input(name))).ok().text().starts_with("format "), "{name}");
+    }
+}
+
+#[test]
+fn a_filter_that_is_not_supported_is_named_with_the_command_that_removes_it() {
+    let source = input("hdf5/refused_lzf.h5");
+    let refused = Work::new().wavesplat(&format!("convert {source} -o a.wspl"));
+    refused.fails(3, &["refused_lzf.h5", "LZF", "h5repack -f GZIP=4 IN OUT"]);
 }
 
 #[test]
@@ -90,6 +126,16 @@ fn info_describes_frames_and_estimates_their_file() {
         let ratio = told["estimate"]["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
         assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");
     }
+    let estimate = |options: &str| {
+        let told = work.wavesplat(&format!("info --json {options}")).ok().json();
+        (told["estimate"]["tolerance"].as_f64(), told["frames"].as_u64())
+    };
+    assert_eq!(estimate("a.npy --estimate 0.1 --frames 0:4"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--estimate 0.1 --frames 0:4 a.npy"), (Some(0.1), Some(4)));
+    assert_eq!(estimate("--frames 0:4 --estimate a.npy"), (Some(0.01), Some(4)));
+    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate 1%", "no number", "type --estimate 0.01"]);
+    work.write("0.1", "a file with the name of a number");
+    work.wavesplat("info a.npy --estimate 0.1").fails(2, &["type --estimate=0.1", "./0.1"]);
     work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);
     work.piped("info - --estimate", &work.read("a.npy")).fails(2, &["standard input"]);
 }

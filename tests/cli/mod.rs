@@ -1,5 +1,6 @@
 //! The programs from the outside: arguments, files, pipes, messages and exit codes.
 
+mod again;
 mod along;
 mod archives;
 mod ceilings;
@@ -113,6 +114,25 @@ impl Work {
         work.wavesplat(&format!("convert a.npy -o a.wspl {more}")).ok();
         work
     }
+}
+
+/// What a coefficient file says of itself, but for the options that it remembers, and the id and size that depend on them.
+fn all_but_options(work: &Work, file: &str) -> serde_json::Value {
+    let mut info = work.wavesplat(&format!("info {file} --json")).ok().json();
+    for key in ["settings", "options", "id", "bytes"] {
+        info.as_object_mut().unwrap().remove(key).unwrap();
+    }
+    info
+}
+
+/// The files differ in the options that they remember alone: their windows and samples are the same.
+#[track_caller]
+pub(crate) fn assert_same_but_options(work: &Work, a: &str, b: &str) {
+    assert_eq!(all_but_options(work, a), all_but_options(work, b), "{a} and {b}");
+    for (file, samples) in [(a, "same_a.raw"), (b, "same_b.raw")] {
+        work.wavesplat(&format!("extract {file} -o {samples} --force")).ok();
+    }
+    assert!(work.read("same_a.raw") == work.read("same_b.raw"), "{a} and {b}");
 }
 
 /// The result of a program.

@@ -89,10 +89,22 @@ fn an_extension_without_a_format_is_refused_with_the_known_ones() {
     work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", "png npy y4m rgb24 gray16"]);
     work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);
     work.write("in.xyz", [7; 300]);
-    work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", "--dims", "--dtype", ".npy", ".nrrd", ".vti"]);
+    let remedy = "for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: .npy, .nrrd";
+    work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", remedy, ".vti"]);
     work.piped("convert - -o b.wspl", &[7; 300]).fails(2, &["-:", "--dims"]);
     work.wavesplat("convert a.wspl -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "in.xyz"]);
+}
+
+#[test]
+fn a_video_is_refused_with_the_pipe_that_makes_it() {
+    let work = Work::with_file("");
+    for ending in ["mp4", "mov", "avi", "mkv", "webm", "MP4"] {
+        let pipe = format!("wavesplat-render a.wspl -o - --format y4m | ffmpeg -i - -pix_fmt yuv420p run.{ending}");
+        work.render(&format!("a.wspl -o run.{ending}")).fails(2, &["ffmpeg makes videos", &pipe]);
+    }
+    work.render("a.wspl -o run.gif").fails(2, &["--format y4m | ffmpeg -i - run.gif"]);
+    work.render("a.wspl --size 20x20 -o run.mp4 --format y4m").ok();
 }
 
 #[test]

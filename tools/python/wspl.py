@@ -43,7 +43,7 @@ MAGIC = bytes.fromhex("89 57 53 50 0D 0A 1A 0A")
 END_MAGIC = bytes.fromhex("89 57 53 50 45 4E 44 0A")
 
 class Layout:
-    """A structure of fixed length: names and struct's codes of its fields, without padding."""
+    """A structure of fixed length: the names and `struct` codes of its fields, without padding."""
 
     def __init__(self, name: str, text: str):
         words = text.split()
@@ -81,7 +81,7 @@ LEAF = Layout(
 LEVEL, OUTLIERS, MISSING, EXACT = 0, 1, 2, 3
 KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22}
 
-# What the blocks of a window add up to before the first one: reached, share, squared_error, min, max, then counts.
+# The totals of no blocks: reached, share, squared_error, min, max, then counts.
 NO_BLOCKS = struct.pack("<ddddd", 0, 0, 0, math.inf, -math.inf) + bytes(24)
 
 # Variants, in the order of section 6.
@@ -93,7 +93,7 @@ STENCILS = ["linear", "cubic"]
 
 
 class Damaged(Exception):
-    """The file is not what the format says, or what was asked for is lost."""
+    """The file does not follow the format, or the requested samples are lost."""
 
     def __init__(self, place: str, reason: str, offset: int | None = None):
         super().__init__(f"{place}{'' if offset is None else f' at byte {offset}'}: {reason}")
@@ -139,7 +139,7 @@ def decompress(stored: bytes, raw: int, place: str, offset: int) -> bytes:
 
 
 class Record:
-    """Fields of a record, taken one after another, never beyond its end."""
+    """Reads the fields of a record in order, never beyond its end."""
 
     def __init__(self, data: bytes, place: str, at: int = 0):
         self.data, self.place, self.at = data, place, at
@@ -327,14 +327,14 @@ class Metadata:
         return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(number, self.dims))
 
     def window_section(self, number: int) -> bytes:
-        """The record of a window section: the window's number, the window before its first block, then its times."""
+        """The record of a window section: number, the window with the totals of no blocks, then its times."""
         w = self.windows[number]
         times = self.times[w.first_frame : w.first_frame + w.frames]
         window = w.bytes[: -len(NO_BLOCKS)] + NO_BLOCKS
         return struct.pack("<I", number) + window + struct.pack("<Q", len(times)) + times.tobytes()
 
     def window_end(self, number: int) -> bytes:
-        """The record of a window's end: the window's number, and what its blocks add up to."""
+        """The record of a window's end: the window's number, and the totals of its blocks."""
         return struct.pack("<I", number) + self.windows[number].bytes[-len(NO_BLOCKS) :]
 
 
@@ -351,7 +351,7 @@ def read_bound(r: Record) -> dict:
 
 
 class Block(namedtuple("Block", BLOCK.type._fields + ("parts", "bytes"))):
-    """A block's entry, its parts and its bytes, which the block's header repeats."""
+    """A block's entry, its parts and its bytes. The block's header repeats the bytes."""
 
     @staticmethod
     def read(r: Record) -> "Block":
@@ -382,7 +382,7 @@ def name_of(leaf) -> str:
 
 
 def sums(blocks: list[Block]) -> dict:
-    """What a leaf's entry says of its blocks, recomputed; float sums in order, from 0."""
+    """Recomputes the statistics in a leaf's entry; float sums run in order, from 0."""
     energies = [p.energy for b in blocks for p in b.parts if p.kind == LEVEL]
     return {
         "exact": sum(b.exact for b in blocks),
@@ -499,7 +499,7 @@ def read_outliers(data: bytes, dtype, count: int, samples: int, place: str):
 
 
 def read_missing(data: bytes, dtype, count: int, samples: int, place: str):
-    """Which samples are missing, and these."""
+    """The mask of missing samples, and their values."""
     split = -(-samples // 8)
     mask = bitmap(data[:split], samples, place)
     need(mask.sum() == count, place, "the bitmap does not fit the count")
@@ -537,7 +537,7 @@ class Bits:
 
 
 def take_number(r: Record) -> int:
-    """1 to 5 bytes with 7 bits each, the lowest first, no more than it has to take."""
+    """A number of 1 to 5 bytes with 7 bits each, the lowest first, in as few bytes as possible."""
     value = 0
     for i in range(5):
         byte = r.take(1)[0]
@@ -631,7 +631,7 @@ def read_values(r: Record, streams: list[bytes], c: np.ndarray, a: np.ndarray, p
 
 
 def uncell(codes: np.ndarray, box, place: str) -> np.ndarray:
-    """Cells of 8 codes, bit dx + 2 dy + 4 dz, to a box [t, z, y, x]; beyond its far faces is nothing."""
+    """Arranges cells of 8 codes, bit dx + 2 dy + 4 dz, in a box [t, z, y, x]; cuts off codes beyond its far faces."""
     x, y, z, t = cells_of(box)
     full = codes.reshape(t, z, y, x, 2, 2, 2).transpose(0, 1, 4, 2, 5, 3, 6).reshape(t, 2 * z, 2 * y, 2 * x)
     inside = full[:, : box[2], : box[1], : box[0]]
@@ -745,7 +745,7 @@ def passes(extents: tuple[int, ...], order: tuple[str, ...]) -> list[Pass]:
 
 
 def predict(e: np.ndarray, count: int, stencil: str) -> np.ndarray:
-    """p of the `count` nodes between e[0] .. e[n-1] (first axis): the table of stencils, its last rows first."""
+    """Predicts the `count` nodes between e[0] .. e[n-1] (first axis) by the table of stencils, its last rows first."""
     n = len(e)
     c = e.dtype.type
     p = np.empty((count, *e.shape[1:]), e.dtype)
@@ -917,7 +917,7 @@ def to_samples(x: np.ndarray, dtype: np.dtype, place: str) -> np.ndarray:
 
 
 class Archive:
-    """An open file. Opening it goes through section 2 up to the root; leaves and blocks are read when asked for."""
+    """An open file. Opening it does the checks of section 2 up to the root; leaves and blocks are read on demand."""
 
     def __init__(self, path: str):
         with open(path, "rb") as f:
@@ -993,7 +993,7 @@ class Archive:
     # ---- section 5
 
     def _places(self) -> None:
-        """Window sections, blocks, leaves, window's ends and metadata follow each other without a gap but padding."""
+        """Checks that only padding separates window sections, blocks, leaves, window's ends and metadata."""
         m = self.metadata
         per_channel = -(-m.blocks // BLOCKS_PER_LEAF)
         runs = m.channels * len(m.windows)
@@ -1011,7 +1011,7 @@ class Archive:
         need(at == end, "metadata", f"is not at byte {at}, where what is before ends", end)
 
     def _place(self, leaf, key: tuple, at: int) -> int:
-        """Checks a leaf's entry, and returns where the next thing begins."""
+        """Checks a leaf's entry, and returns the offset of the next section."""
         place = f"root, {name_of(leaf)}"
         need((leaf.window, leaf.channel, leaf.first_block) == key, place, "leaves are not in order")
         need(leaf.count == min(BLOCKS_PER_LEAF, self.metadata.blocks - leaf.first_block), place, "bad count of blocks")
@@ -1022,7 +1022,7 @@ class Archive:
         return align(leaf.offset + FRAME.size + leaf.stored)
 
     def _totals(self) -> None:
-        """What the metadata says of a window fits what its leaves say."""
+        """Checks that the metadata of a window matches its leaves."""
         of_window: list[list] = [[] for _ in self.metadata.windows]
         for leaf in self.leaves:
             of_window[leaf.window].append(leaf)
@@ -1071,14 +1071,14 @@ class Archive:
         return self.leaf(leaf)[number % BLOCKS_PER_LEAF]
 
     def payload(self, b: Block, p) -> bytes:
-        """What a part holds once decompressed."""
+        """The content of a part after decompression."""
         place = f"{b.place}, part of kind {p.kind}, level {p.level}"
         seed = self._seed(p.kind, b.window, b.block, b.channel, p.level)
         return decompress(self._bytes(p.offset, p.stored, p.checksum, seed, place), p.raw, place, p.offset)
 
     def samples(self, b: Block) -> np.ndarray:
         """The samples of a block, [frame, z, y, x] (section 7)."""
-        need(not b.lost, b.place, "lost: its data were gone when the file was recovered")
+        need(not b.lost, b.place, "lost: its data were missing when the file was recovered")
         w, size, dtype = self.metadata.windows[b.window], self._size(b), self.metadata.dtype
         count = math.prod(size) * w.frames
         payloads = {(p.kind, p.level): (p, self.payload(b, p)) for p in b.parts}
@@ -1161,12 +1161,12 @@ class Archive:
         return lost
 
     def _padding(self, end: int) -> int:
-        """Zeros up to the next multiple of 64, which is returned."""
+        """Checks for zeros up to the next multiple of 64, and returns it."""
         need(not any(self.data[end : align(end)]), "padding", "is not zero", end)
         return align(end)
 
     def _repeats(self, tag: bytes, at: int, expected: bytes, where: tuple, place: str) -> int:
-        """A section that repeats what leaf or metadata say; returns its end."""
+        """Checks a section that repeats leaf or metadata; returns its end."""
         found = self._section(tag, at, len(expected), len(expected), None, where, place)
         need(found == expected, place, "is not what leaf or metadata say", at)
         return at + FRAME.size + len(expected)

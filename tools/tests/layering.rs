@@ -1,5 +1,6 @@
 //! Checks the order of the benchmark's modules by reading the sources: a module may only use those listed before it in
 //! `mod.rs`.
+#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};

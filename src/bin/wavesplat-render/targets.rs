@@ -1,4 +1,4 @@
-//! Which files pictures go to.
+//! The files that pictures go to.
 
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -6,7 +6,7 @@ use wavesplat::base::output::{STANDARD, names_of_views};
 use wavesplat::render::RenderConfig;
 use wavesplat::render::sink::{Depth, PictureFormat};
 
-/// Where pictures go: a name for each view, or one for all.
+/// The files of pictures: one for each view, or one for all.
 pub(crate) struct Targets {
     pub(crate) format: PictureFormat,
     pub(crate) names: Vec<PathBuf>,
@@ -20,13 +20,13 @@ impl Targets {
         Ok(Self { format, names: names_of_views(path, config.views.len(), joined)? })
     }
 
-    /// Which view and which frame each picture is of that goes to the name of such a number.
+    /// The view and the frame of each picture in the file of this number.
     pub(crate) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
         let views = if self.names.len() == 1 { 0..config.views.len() } else { name..name + 1 };
         views.flat_map(|view| config.frames.iter().map(move |frame| (view, *frame))).collect()
     }
 
-    /// Bytes that writing takes.
+    /// Bytes of memory that writing takes.
     pub(crate) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
         let each = config.frames.len() * config.views.len() / self.names.len();
         Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())
@@ -56,4 +56,19 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
         let what = "the ending says no format: one of png npy y4m rgb24 gray16 apng exr";
         Error::usage(format!("{}: {what}", path.display()))
     })
+}
+
+/// Endings of videos, which ffmpeg makes from a stream of pictures.
+const VIDEOS: [&str; 6] = ["mp4", "mov", "avi", "mkv", "webm", "gif"];
+
+/// An error with the pipe to type if `output` is the name of a video.
+pub(crate) fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
+    let ending = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    if !VIDEOS.contains(&ending.as_str()) {
+        return Ok(());
+    }
+    let (name, pixels) = (output.display(), if ending == "gif" { "" } else { " -pix_fmt yuv420p" });
+    let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
+    let pipe = format!("wavesplat-render {} -o - --format y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
+    Err(Error::usage(format!("{name}: ffmpeg makes videos; type: {pipe}")))
 }

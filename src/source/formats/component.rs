@@ -86,6 +86,16 @@ pub(in crate::source) fn choose(
     Ok(Chosen { array, component: chosen(name, components, index)? })
 }
 
+/// Whether [`choose`] finds neither which array nor which component of it is meant, unless `--variable` names them.
+pub(in crate::source) fn is_undecided(arrays: &[(&str, usize)], active: Option<usize>) -> bool {
+    match (active, arrays) {
+        (_, []) => false,
+        (Some(array), _) => arrays[array].1 > 1,
+        (None, [(_, components)]) => *components > 1,
+        (None, _) => true,
+    }
+}
+
 /// What a component is called: as its array, if this has no other.
 pub(in crate::source) fn label(name: &str, components: usize, component: usize) -> String {
     if components == 1 { name.into() } else { format!("{name}[{component}]") }
@@ -118,6 +128,10 @@ mod tests {
             assert!(choose(&arrays, active, variable).is_err());
         }
         assert!(choose(&[], None, Some("p")).is_err());
+        for (arrays, active) in [(&arrays[..], None), (&arrays, Some(0)), (&arrays, Some(1)), (&arrays[..1], None)] {
+            assert_eq!(is_undecided(arrays, active), choose(arrays, active, None).is_err());
+        }
+        assert!(!is_undecided(&[], None) && !is_undecided(&[], Some(0)));
     }
 
     #[test]

@@ -2,36 +2,36 @@
 
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::file_header::Files;
+use crate::source::file_header::FrameFiles;
 use serde::Deserialize;
 use std::fs;
 use std::path::Path;
 
 #[derive(Deserialize)]
-struct List {
-    files: Vec<Listed>,
+struct SeriesList {
+    files: Vec<SeriesEntry>,
 }
 
 #[derive(Deserialize)]
-struct Listed {
+struct SeriesEntry {
     name: String,
     time: Option<f64>,
 }
 
 /// Reads the list; its files are found from its own folder.
-pub(in crate::source) fn read(path: &Path) -> Result<Files> {
+pub(in crate::source) fn read(path: &Path) -> Result<FrameFiles> {
     let bytes = fs::read(path).map_err(|e| Error::io(path, "reading", e))?;
     parse(&bytes, path.parent().unwrap_or(Path::new(""))).map_err(|e| Error::input(path, e))
 }
 
-fn parse(bytes: &[u8], folder: &Path) -> Parsed<Files> {
-    let list: List = serde_json::from_slice(bytes).map_err(|e| format!("is no list of files and times: {e}"))?;
+fn parse(bytes: &[u8], folder: &Path) -> Parsed<FrameFiles> {
+    let list: SeriesList = serde_json::from_slice(bytes).map_err(|e| format!("is no list of files and times: {e}"))?;
     if list.files.is_empty() {
         return Err("lists no file".into());
     }
     let times = list.files.iter().filter_map(|file| file.time).collect();
     let paths = list.files.iter().map(|file| folder.join(&file.name)).collect();
-    Files { paths, times, notes: Vec::new() }.of_list()
+    FrameFiles { paths, times, notes: Vec::new() }.of_list()
 }
 
 #[cfg(test)]

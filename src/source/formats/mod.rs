@@ -24,12 +24,11 @@ mod xml;
 
 pub use npy::{ArrayHeader, array_header};
 
-use super::OpenOptions;
+use super::{OpenOptions, VariableInfo};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::npy::MAGIC;
 use crate::source::file_header::{FileHeader, head};
-use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
@@ -67,19 +66,6 @@ pub fn extensions() -> impl Iterator<Item = &'static str> {
     EXTENSIONS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
 }
 
-/// What is supported, for messages.
-pub(in crate::source) const SUPPORTED: Supported = Supported;
-
-/// As [`SUPPORTED`].
-pub(in crate::source) struct Supported;
-
-impl Display for Supported {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        extensions().try_for_each(|ending| write!(f, ".{ending}, "))?;
-        write!(f, "and headerless data of any name")
-    }
-}
-
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
 
 /// Extensions of files that may be in gzip as a whole.
@@ -111,6 +97,12 @@ impl Format {
     pub(in crate::source) fn by_name(path: &Path) -> Option<Self> {
         let found = extension(path);
         EXTENSIONS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
+    }
+
+    /// By extension, or by what is in a folder.
+    fn of_file(path: &Path) -> Option<Self> {
+        let is_store = path.is_dir() && zarr_metadata(path).is_some();
+        if is_store { Some(Self::Zarr) } else { Self::by_name(path) }
     }
 
     /// Whether a file of it holds frames, and says itself what they are.
@@ -163,19 +155,59 @@ pub(in crate::source) fn extension(path: &Path) -> String {
     if own == "gz" && COMPRESSED.contains(&inner.as_str()) { format!("{inner}.gz") } else { own }
 }
 
+/// Whether a file says itself what it holds.
+pub(in crate::source) fn has_header(path: &Path) -> bool {
+    Format::of_file(path).is_some() || Format::by_content(path).is_ok_and(|format| format.is_some())
+}
+
 /// Reads the header of a file of frames and checks its size.
 pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let format = match Format::by_name(path) {
-        _ if path.is_dir() && zarr_metadata(path).is_some() => Some(Format::Zarr),
-        None if options.dims.is_none() => Format::by_content(path)?,
-        format => format,
-    };
+    let format = format_of(path, options)?;
     if let Some(format) = format {
         refuse_options(path, format, options)?;
     }
     let described = of_format(format, path, options)?;
     Ok(FileHeader { format: format.map_or("headerless data", Format::name), ..described })
 }
+
+fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<Format>> {
+    match Format::of_file(path) {
+        None if options.dims.is_none() => Format::by_content(path),
+        format => Ok(format),
+    }
+}
+
+/// The variables of a file among which the user must choose; none if it is clear which one is meant.
+pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    match format_of(path, options)? {
+        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.undecided(),
+        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.undecided(),
+        #[cfg(feature = "zarr")]
+        Some(Format::Zarr) => arrays::open_zarr(path, options)?.undecided(),
+        Some(Format::Vti) => vti::undecided(path),
+        Some(Format::Vtk) => vtk::undecided(path),
+        Some(Format::Nrrd | Format::Nifti | Format::MetaImage) => Ok(components(path, options)),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// The components of a file's only array, if it has several; none of a file that cannot be read.
+fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
+    let component = |index: usize| {
+        let options = OpenOptions { variable: Some(format!("[{index}]")), ..options.clone() };
+        let header = describe(path, &options).ok()?;
+        let (name, shape) = (header.variable.unwrap_or_default(), header.shape);
+        Some(VariableInfo {
+            unit: header.units.samples,
+            ..VariableInfo::volume(&name, shape.sample().name(), shape.dims(), 1)
+        })
+    };
+    let found: Vec<_> = (0..MOST_COMPONENTS).map_while(component).collect();
+    if found.len() > 1 { found } else { Vec::new() }
+}
+
+/// Components that are listed, where one array has several.
+const MOST_COMPONENTS: usize = 16;
 
 fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     match format {
@@ -186,11 +218,11 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
         #[cfg(feature = "hdf5")]
-        Some(Format::Hdf5) => arrays::describe_hdf5(path, options),
+        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options),
         #[cfg(feature = "netcdf")]
-        Some(Format::NetCdf) => arrays::describe_netcdf(path, options),
+        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.describe(options),
         #[cfg(feature = "zarr")]
-        Some(Format::Zarr) => arrays::describe_zarr(path, options),
+        Some(Format::Zarr) => arrays::open_zarr(path, options)?.describe(options),
         #[cfg(not(feature = "hdf5"))]
         Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5)),
         #[cfg(not(feature = "netcdf"))]
@@ -216,8 +248,7 @@ fn not_built_in(path: &Path, format: Format) -> Error {
 }
 
 fn unknown(path: &Path) -> Error {
-    let what = format!("is of no known format. Supported are {SUPPORTED}");
-    Error::path(path, Note::with(what, Remedy::DescribeSamples))
+    Error::path(path, Note::with("is of no known format", Remedy::DescribeSamples))
 }
 
 /// Options that would be ignored are refused, so that nobody thinks they had an effect.
@@ -249,8 +280,10 @@ mod tests {
         for (ending, format) in EXTENSIONS {
             assert_eq!(Format::by_name(Path::new(&format!("a.b.{}", ending.to_uppercase()))), Some(format));
         }
-        let supported = SUPPORTED.to_string();
-        assert!(supported.starts_with(".npy, .nrrd, ") && supported.contains(".hdf5, "), "{supported}");
-        assert!(!supported.contains("wspl") && extensions().all(|ending| supported.contains(ending)));
+        let known: Vec<&str> = extensions().collect();
+        assert!(
+            known.starts_with(&["npy", "nrrd"]) && known.contains(&"hdf5") && !known.contains(&"wspl"),
+            "{known:?}"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::xml::{attribute, required};
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::file_header::Files;
+use crate::source::file_header::FrameFiles;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;
@@ -11,15 +11,15 @@ use std::fs;
 use std::path::Path;
 
 /// Reads the list; its files are found from its own folder.
-pub(in crate::source) fn read(path: &Path) -> Result<Files> {
+pub(in crate::source) fn read(path: &Path) -> Result<FrameFiles> {
     let bytes = fs::read(path).map_err(|e| Error::io(path, "reading", e))?;
     let text = std::str::from_utf8(&bytes).map_err(|e| Error::input(path, format!("is not UTF-8 text: {e}")))?;
     parse(text, path.parent().unwrap_or(Path::new(""))).map_err(|e| Error::input(path, e))
 }
 
-fn parse(text: &str, folder: &Path) -> Parsed<Files> {
+fn parse(text: &str, folder: &Path) -> Parsed<FrameFiles> {
     let mut reader = Reader::from_str(text);
-    let (mut files, mut sets) = (Files::default(), HashSet::new());
+    let (mut files, mut sets) = (FrameFiles::default(), HashSet::new());
     loop {
         let event =
             reader.read_event().map_err(|e| format!("is not well-formed at byte {}: {e}", reader.error_position()))?;
@@ -32,7 +32,12 @@ fn parse(text: &str, folder: &Path) -> Parsed<Files> {
     finish(files, sets.len())
 }
 
-fn element(e: &BytesStart<'_>, folder: &Path, files: &mut Files, sets: &mut HashSet<(String, String)>) -> Parsed<()> {
+fn element(
+    e: &BytesStart<'_>,
+    folder: &Path,
+    files: &mut FrameFiles,
+    sets: &mut HashSet<(String, String)>,
+) -> Parsed<()> {
     match e.name().as_ref() {
         "VTKFile" if required(e, "type")? != "Collection" => Err("is not a VTK collection".into()),
         "DataSet" => {
@@ -49,7 +54,7 @@ fn element(e: &BytesStart<'_>, folder: &Path, files: &mut Files, sets: &mut Hash
     }
 }
 
-fn finish(files: Files, sets: usize) -> Parsed<Files> {
+fn finish(files: FrameFiles, sets: usize) -> Parsed<FrameFiles> {
     if files.paths.is_empty() {
         return Err("lists no DataSet".into());
     }

@@ -37,7 +37,11 @@ pub(in crate::source) fn shape(options: &OpenOptions) -> Result<(Shape, Option<u
 pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let (shape, frames) = shape(options)?;
     let state = FileBytes::open(path, Access::Read)?.state();
-    let count = frames.unwrap_or(1);
+    let room = state.len.saturating_sub(options.offset) / shape.frame_bytes() as u64;
+    let count = match frames {
+        Some(_) if options.dims_are_remembered => usize::try_from(room).unwrap_or(usize::MAX).max(1),
+        frames => frames.unwrap_or(1),
+    };
     check_size(state.len, options.offset, &shape, count)
         .map_err(|what| Error::input(path, Note::with(what, remedy(state.len, &shape, options))))?;
     let part = Part::plain((path, state), (&shape, count), options.big_endian, options.offset)
@@ -119,6 +123,6 @@ mod tests {
             &OpenOptions { variable: Some("a".into()), ..of(&[2, 2, 2]) },
             "variable: is for files that have names",
         );
-        refused(&file, &OpenOptions::default(), "Supported are .npy");
+        refused(&file, &OpenOptions::default(), "is of no known format");
     }
 }

@@ -52,7 +52,8 @@ fn frames_that_are_stepped_over_are_not_decoded_and_spooled_ones_share_a_file() 
     let folder = Folder::new();
     let file = folder.write("a.raw", payload(SampleType::U8, 0..40, false));
     let options = OpenOptions { dims: Some([&DIMS[..], &[40]].concat()), memory: 210, ..raw() };
-    let mut series = Series::open(&Files { paths: vec![file], ..Files::default() }, &options).expect("opening");
+    let mut series =
+        Series::open(&FrameFiles { paths: vec![file], ..FrameFiles::default() }, &options).expect("opening");
     let decoded = Arc::new(Mutex::new(Vec::new()));
     let part = &mut series.parts[0];
     part.at = DataLocation::Decoded(Box::new(Counted(decoded.clone())));

@@ -2,6 +2,7 @@
 
 mod archive;
 mod coefficients;
+mod variables;
 
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -9,19 +10,19 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, share};
 use wavesplat::file::CoefficientFile;
 
-/// Say what a coefficient file holds, promises and reached; or what an archive holds, and how it is read
+/// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
 #[derive(Debug, Args)]
 #[command(before_help = "\
 Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
-  wavesplat info frames/ --estimate=0.001")]
+  wavesplat info frames/ --estimate 0.001")]
 pub(crate) struct InfoArgs {
-    /// A coefficient file; or frames, as convert takes them
+    /// A coefficient file, or frames as for convert
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// Of frames: convert a few blocks, and say about how large a coefficient file of this tolerance would be [0.01 if none is
+    /// For frames: convert a few blocks, and estimate the size of a coefficient file of this tolerance [0.01 if none is
     /// given]
     #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
     estimate: Option<f64>,
@@ -35,14 +36,17 @@ pub(crate) struct InfoArgs {
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {
     args.common.start()?;
-    match args.coefficients()? {
-        Some(file) => coefficients::run(&file, &args.common),
-        None => archive::run(args),
+    if let Some(file) = args.coefficients()? {
+        return coefficients::run(&file, &args.common);
+    }
+    match args.input.undecided(&args.inputs, args.common.stream_memory())?.as_slice() {
+        [] => archive::run(args),
+        several => variables::run(several, &args.common),
     }
 }
 
 impl InfoArgs {
-    /// The coefficient file that is meant; none if frames are.
+    /// The coefficient file, or none if the inputs are frames.
     fn coefficients(&self) -> Result<Option<CoefficientFile>> {
         let [only] = self.inputs.as_slice() else { return Ok(None) };
         let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");

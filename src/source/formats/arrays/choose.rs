@@ -2,11 +2,9 @@
 
 use super::{Variable, component};
 use crate::base::error::{Note, Remedy};
-use crate::source::{Advised, Parsed};
+use crate::source::variables::{self, VariableAxis};
+use crate::source::{self, Advised, Parsed};
 use std::collections::{BTreeMap, HashSet};
-use std::fmt::Write;
-
-const MOST_LISTED: usize = 20;
 
 /// What stands for the number of a step in the path of a variable that has one array for each.
 pub(super) const STEP: &str = "%T";
@@ -29,6 +27,20 @@ impl<'a> Choice<'a> {
 
     fn name(&self) -> &str {
         self.arrays[0].name()
+    }
+
+    /// Name, size, type and unit for users.
+    fn info(&self) -> source::VariableInfo {
+        let first = self.arrays[0];
+        let axis = |(length, name): (&usize, &String)| VariableAxis { name: name.clone(), length: *length };
+        source::VariableInfo {
+            name: self.path.clone(),
+            sample: first.sample.as_ref().map_or_else(Clone::clone, ToString::to_string),
+            axes: first.lengths.iter().zip(&first.dims).map(axis).collect(),
+            components: 1,
+            steps: self.arrays.len(),
+            unit: first.text("units").map(String::from),
+        }
     }
 }
 
@@ -54,18 +66,28 @@ pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>,
 
 /// The one variable that can be an archive, or of several the one that is `active`.
 pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Choice<'a>> {
-    let bounds = bounds(all);
-    let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
-    let mut volumes = choices(all.iter().filter(|v| is_volume(v, least) && !bounds.contains(v.name())));
-    if volumes.len() > 1
-        && let Some(at) = volumes.iter().position(|c| active == Some(c.name()))
-    {
-        return Ok(volumes.swap_remove(at));
-    }
+    let mut volumes = volumes(all, active);
     match volumes.len() {
         1 => Ok(volumes.remove(0)),
         0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&choices(all.iter()))).into()),
         _ => Err(Note::with(format!("has several variables:{}", listed(&volumes)), Remedy::ChooseVariable)),
+    }
+}
+
+/// The variables among which the user must choose; none if [`only`] finds the one.
+pub(super) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::VariableInfo> {
+    let volumes = volumes(all, active);
+    if volumes.len() > 1 { volumes.iter().map(Choice::info).collect() } else { Vec::new() }
+}
+
+/// The variables that can be an archive, or of several the one that is `active`.
+fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
+    let bounds = bounds(all);
+    let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
+    let mut volumes = choices(all.iter().filter(|v| is_volume(v, least) && !bounds.contains(v.name())));
+    match volumes.iter().position(|c| active == Some(c.name())) {
+        Some(at) => vec![volumes.swap_remove(at)],
+        None => volumes,
     }
 }
 
@@ -119,26 +141,8 @@ fn is_volume(variable: &Variable, least: usize) -> bool {
     variable.sample.is_ok() && variable.lengths.len() >= least && !variable.lengths.contains(&0)
 }
 
-/// Variables by name and size, for messages.
 fn listed(all: &[Choice<'_>]) -> String {
-    let mut text = String::new();
-    for Choice { path, arrays, .. } in all.iter().take(MOST_LISTED) {
-        let of = |(n, dim): (&usize, &String)| if dim.is_empty() { n.to_string() } else { format!("{dim} {n}") };
-        let axes: Vec<_> = arrays[0].lengths.iter().zip(&arrays[0].dims).map(of).collect();
-        let what = arrays[0].sample.as_ref().map_or_else(Clone::clone, ToString::to_string);
-        let _ = write!(text, "\n  {path}: {what} ({})", axes.join(", "));
-        if arrays.len() > 1 {
-            let _ = write!(text, ", {} steps", arrays.len());
-        }
-        if let Some(unit) = arrays[0].text("units") {
-            let _ = write!(text, " in {unit}");
-        }
-    }
-    match all.len() {
-        0 => " none".into(),
-        n if n > MOST_LISTED => text + &format!("\n  and {} more", n - MOST_LISTED),
-        _ => text,
-    }
+    variables::listed(&all.iter().map(Choice::info).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -166,7 +166,7 @@ impl fmt::Debug for Chunks {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Attributes, How};
+    use super::super::{Attributes, ReadConfig};
     use super::*;
     use crate::base::mapped::Access;
     use std::sync::{Arc, Mutex};
@@ -210,7 +210,7 @@ mod tests {
         let counts = [vec![Counts::Frames, Counts::Only(1)], voxels.to_vec()].concat();
         for memory in [240, 500, 1 << 20] {
             READS.lock().expect("no panic").clear();
-            let how = How { access: Access::Read, memory };
+            let how = ReadConfig { access: Access::Read, memory };
             let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
             let mut chunks = Chunks::new(&variable, &counts, Vec::new(), &opener).expect("small chunks");
             let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
@@ -228,7 +228,7 @@ mod tests {
             let expected = (0..LENGTHS.iter().product()).map(|i: usize| u8::from(i / 120 % 2 == 1));
             assert!(expected.eq(reads), "{memory} bytes");
         }
-        let how = How { access: Access::Read, memory: 200 };
+        let how = ReadConfig { access: Access::Read, memory: 200 };
         let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
         let refused = Chunks::new(&variable, &counts, Vec::new(), &opener).expect_err("chunks of 240 bytes");
         assert!(matches!(refused, Error::Setting { setting: "memory", .. }), "{refused}");

@@ -1,6 +1,6 @@
 //! HDF5 files, as [`super::ArrayFile`].
 
-use super::{ArrayFile, Attribute, Attributes, How, Variable};
+use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
@@ -19,11 +19,11 @@ const MOST_DEPTH: usize = 16;
 const MOST_OBJECTS: usize = 100_000;
 
 /// Opens a file.
-pub(super) fn open(path: &Path, how: How) -> Result<Box<dyn ArrayFile>> {
+pub(super) fn open(path: &Path, how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
     let file = FileBytes::open(path, how.access)?;
     let file = Hdf5File::from_storage_with_options(storage(file), options(how));
     let file = file.map_err(|e| Error::input(path, format!("is no HDF5 file that can be read: {e}")))?;
-    Ok(Box::new(Opened(file)))
+    Ok(Box::new(Hdf5ArrayFile(file)))
 }
 
 /// The bytes of a file for the reader.
@@ -31,7 +31,7 @@ pub(super) fn storage(file: FileBytes) -> DynStorage {
     Arc::new(Bytes(file))
 }
 
-fn options(how: How) -> OpenOptions {
+fn options(how: ReadConfig) -> OpenOptions {
     // Every chunk is read once, so none is kept.
     OpenOptions::default().with_chunk_cache_bytes(0).with_max_chunk_bytes(how.memory)
 }
@@ -54,9 +54,9 @@ impl Storage for Bytes {
     }
 }
 
-struct Opened(Hdf5File);
+struct Hdf5ArrayFile(Hdf5File);
 
-impl ArrayFile for Opened {
+impl ArrayFile for Hdf5ArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
         let mut listing = Listing::default();
         listing.add(&self.0.root_group().map_err(|e| e.to_string())?, "", 0)?;
@@ -65,12 +65,12 @@ impl ArrayFile for Opened {
 
     fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
-        slice(&dataset, sample, ranges).map_err(|e| e.to_string())
+        slice(&dataset, sample, ranges).map_err(|e| reason(&e))
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
-        let numbers = dataset.read_array::<Number>().map_err(|e| format!("{path}: {e}"))?;
+        let numbers = dataset.read_array::<AnyNumber>().map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().map(|number| number.0).collect())
     }
 
@@ -78,6 +78,28 @@ impl ArrayFile for Opened {
         let group = self.0.group(path).and_then(|group| group.attributes());
         group.map(|all| attributes(&all)).unwrap_or_default()
     }
+}
+
+/// Plugin filters that files are often written with, by their registered numbers.
+const PLUGIN_FILTERS: [(u16, &str); 9] = [
+    (305, "LZO"),
+    (307, "BZIP2"),
+    (32000, "LZF"),
+    (32001, "Blosc"),
+    (32008, "Bitshuffle"),
+    (32013, "ZFP"),
+    (32015, "Zstandard"),
+    (32017, "SZ"),
+    (32026, "Blosc2"),
+];
+
+/// Why something cannot be read. A filter that is not supported is named, with the command that rewrites the file without it.
+pub(super) fn reason(error: &Hdf5Error) -> String {
+    let Hdf5Error::UnsupportedFilter(filter) = error else { return error.to_string() };
+    let Some(id) = filter.strip_prefix("filter id ") else { return error.to_string() };
+    let known = PLUGIN_FILTERS.iter().find(|(known, _)| id.parse() == Ok(*known));
+    let name = known.map_or_else(|| format!("filter {id}"), |(_, name)| format!("filter {name} ({id})"));
+    format!("{name} is not supported; rewrite the file where HDF5 has that filter: h5repack -f GZIP=4 IN OUT")
 }
 
 /// All arrays of a file.
@@ -120,7 +142,8 @@ fn variable(dataset: &Dataset, path: String) -> Variable {
 fn attributes(all: &[hdf5_reader::Attribute]) -> Attributes {
     let value = |attribute: &hdf5_reader::Attribute| match &attribute.datatype {
         Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. } => {
-            let numbers = attribute.read_1d::<Number>().or_else(|_| attribute.read_scalar::<Number>().map(|n| vec![n]));
+            let numbers =
+                attribute.read_1d::<AnyNumber>().or_else(|_| attribute.read_scalar::<AnyNumber>().map(|n| vec![n]));
             Some(Attribute::Numbers(numbers.ok()?.into_iter().map(|number| number.0).collect()))
         }
         Datatype::String { .. } | Datatype::VarLen { .. } => match attribute.read_strings().ok()? {
@@ -158,9 +181,9 @@ fn kind(ty: &Datatype) -> String {
 
 /// The stored bytes of a sample, with the least significant one first.
 #[derive(Debug, Clone, Copy)]
-struct Stored<const N: usize>([u8; N]);
+struct StoredBytes<const N: usize>([u8; N]);
 
-impl<const N: usize> H5Type for Stored<N> {
+impl<const N: usize> H5Type for StoredBytes<N> {
     fn hdf5_type() -> Datatype {
         Datatype::FixedPoint { size: N as u8, signed: false, byte_order: ByteOrder::LittleEndian }
     }
@@ -191,7 +214,7 @@ fn slice(dataset: &Dataset, sample: SampleType, ranges: &[Range<usize>]) -> std:
     let slice = SliceInfo { selections: ranges.iter().map(of).collect() };
     macro_rules! read {
         ($n:expr) => {
-            dataset.read_slice_parallel::<Stored<$n>>(&slice)?.into_iter().flat_map(|stored| stored.0).collect()
+            dataset.read_slice_parallel::<StoredBytes<$n>>(&slice)?.into_iter().flat_map(|stored| stored.0).collect()
         };
     }
     Ok(match sample.size() {
@@ -204,9 +227,9 @@ fn slice(dataset: &Dataset, sample: SampleType, ranges: &[Range<usize>]) -> std:
 
 /// A number of any type.
 #[derive(Debug, Clone, Copy)]
-struct Number(f64);
+struct AnyNumber(f64);
 
-impl H5Type for Number {
+impl H5Type for AnyNumber {
     fn hdf5_type() -> Datatype {
         f64::hdf5_type()
     }
@@ -233,5 +256,20 @@ impl H5Type for Number {
             Datatype::FixedPoint { size, .. } | Datatype::FloatingPoint { size, .. } => usize::from(*size),
             _ => 8,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_are_refused_by_name_with_the_command_that_removes_them() {
+        let refused = |id: &str| reason(&Hdf5Error::UnsupportedFilter(format!("filter id {id}")));
+        assert!(refused("32013").starts_with("filter ZFP (32013) is not supported"));
+        assert!(refused("999").starts_with("filter 999 is not supported"));
+        assert!(refused("999").ends_with("h5repack -f GZIP=4 IN OUT"));
+        let other = Hdf5Error::UnsupportedFilter("scaleoffset float E-scale".into());
+        assert_eq!(reason(&other), other.to_string());
     }
 }

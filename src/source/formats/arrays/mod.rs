@@ -23,7 +23,7 @@ use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
-use crate::source::{Advised, OpenOptions, Parsed, numbering};
+use crate::source::{self, Advised, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
 use places::Places;
@@ -123,25 +123,28 @@ trait ArrayFile: Send {
 
 /// How a file is read.
 #[derive(Debug, Clone, Copy)]
-struct How {
+struct ReadConfig {
     access: Access,
     /// Bytes that reading may take.
     memory: usize,
 }
 
+/// Opens a file of one format.
+type OpenFile = fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>>;
+
 /// What opens a file of arrays, as often as it is asked.
 #[derive(Clone)]
 struct Opener {
     path: PathBuf,
-    how: How,
-    open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>,
+    how: ReadConfig,
+    open: OpenFile,
     /// The file, while frames are taken of any of its arrays.
     opened: Arc<Mutex<Option<Box<dyn ArrayFile>>>>,
 }
 
 impl Opener {
-    fn new(path: &Path, open: fn(&Path, How) -> Result<Box<dyn ArrayFile>>, options: &OpenOptions) -> Self {
-        let how = How { access: options.access, memory: options.memory / SHARE };
+    fn new(path: &Path, open: OpenFile, options: &OpenOptions) -> Self {
+        let how = ReadConfig { access: options.access, memory: options.memory / SHARE };
         Self { path: path.into(), how, open, opened: Arc::default() }
     }
 
@@ -166,68 +169,86 @@ impl Opener {
     }
 }
 
-/// Reads what an HDF5 file holds.
-#[cfg(feature = "hdf5")]
-pub(super) fn describe_hdf5(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let opener = Opener::new(path, hdf5::open, options);
-    let file = opener.open()?;
-    // What the NetCDF library wrote says so, whatever its name is.
-    match file.group("/").contains_key("_NCProperties") {
-        #[cfg(feature = "netcdf")]
-        true => describe_netcdf(path, options),
-        #[cfg(not(feature = "netcdf"))]
-        true => Err(super::not_built_in(path, super::Format::NetCdf)),
-        false => describe(&opener, file.as_ref(), path, options),
-    }
+/// A file of arrays that was opened to see what it holds.
+pub(super) struct ArrayArchive {
+    opener: Opener,
+    file: Box<dyn ArrayFile>,
+    /// The file whose state says whether the archive was changed.
+    watched: PathBuf,
 }
 
-/// Reads what a NetCDF file holds.
-#[cfg(feature = "netcdf")]
-pub(super) fn describe_netcdf(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let opener = Opener::new(path, netcdf::open, options);
-    describe(&opener, opener.open()?.as_ref(), path, options)
+/// Opens an HDF5 file. One that the NetCDF library wrote is a NetCDF file, whatever its name is.
+pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
+    let archive = ArrayArchive::open(path, path, hdf5::open, options)?;
+    let is_netcdf = archive.file.group("/").contains_key("_NCProperties");
+    if is_netcdf { open_netcdf(path, options) } else { Ok(archive) }
 }
 
-/// Reads what a Zarr store, a folder, holds.
+/// Opens a NetCDF file.
+pub(super) fn open_netcdf(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
+    ArrayArchive::open(path, path, netcdf::open, options)
+}
+
+/// Opens a Zarr store, a folder.
 #[cfg(feature = "zarr")]
-pub(super) fn describe_zarr(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
+pub(super) fn open_zarr(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    let opener = Opener::new(path, zarr::open, options);
-    describe(&opener, opener.open()?.as_ref(), &metadata, options)
+    ArrayArchive::open(path, &metadata, zarr::open, options)
 }
 
-/// Reads what is in a file that was opened; it changes when the file `watched` does.
-fn describe(opener: &Opener, file: &dyn ArrayFile, watched: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let (path, state) = (opener.path.as_path(), FileBytes::open(watched, Access::Read)?.state());
-    let refused = |e| Error::input(path, e);
-    let mut all = file.variables().map_err(refused)?;
-    let image = vtkhdf::Image::of(file, &all).map_err(refused)?;
-    if let Some(image) = &image {
-        all.clone_from(&image.variables);
+impl ArrayArchive {
+    fn open(path: &Path, watched: &Path, open: OpenFile, options: &OpenOptions) -> Result<Self> {
+        let opener = Opener::new(path, open, options);
+        Ok(Self { file: opener.open()?, opener, watched: watched.into() })
     }
-    let (choice, index) = match options.variable.as_deref() {
-        Some(name) => choose::named(&all, name).map_err(Note::from),
-        None => choose::only(&all, image.as_ref().and_then(|i| i.active.as_deref())).map(|choice| (choice, None)),
+
+    /// All arrays, or those of an image in VTKHDF.
+    fn variables(&self) -> Parsed<(Vec<Variable>, Option<vtkhdf::Image>)> {
+        let all = self.file.variables()?;
+        let image = vtkhdf::Image::of(self.file.as_ref(), &all)?;
+        Ok((image.as_ref().map_or(all, |image| image.variables.clone()), image))
     }
-    .map_err(|e| Error::input(path, e))?;
-    check_steps(path, &choice, options)?;
-    let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
-    let context = Context { file, all: &all, image, index, axes, spaced };
-    let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Advised<Vec<_>>>();
-    let found = found.map_err(|e| Error::input(path, e))?;
-    let mut parts = Vec::new();
-    for found in &found {
-        let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), opener)?;
-        parts.push(found.part((watched, state), chunks).map_err(refused)?);
+
+    /// The variables among which the user must choose; none if it is clear which one is meant.
+    pub(super) fn undecided(&self) -> Result<Vec<source::VariableInfo>> {
+        let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
+        Ok(choose::undecided(&all, active(image.as_ref())))
     }
-    let mut described = joined(found, parts).map_err(refused)?;
-    if let Some((times, are_seconds)) = openpmd::times(file, &choice) {
-        (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+
+    /// Reads what the variable that is meant says of its frames.
+    pub(super) fn describe(&self, options: &OpenOptions) -> Result<FileHeader> {
+        let (path, state) = (self.opener.path.as_path(), FileBytes::open(&self.watched, Access::Read)?.state());
+        let refused = |e| Error::input(path, e);
+        let (all, image) = self.variables().map_err(refused)?;
+        let (choice, index) = match options.variable.as_deref() {
+            Some(name) => choose::named(&all, name).map_err(Note::from),
+            None => choose::only(&all, active(image.as_ref())).map(|choice| (choice, None)),
+        }
+        .map_err(|e| Error::input(path, e))?;
+        check_steps(path, &choice, options)?;
+        let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
+        let context = Context { file: self.file.as_ref(), all: &all, image, index, axes, spaced };
+        let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Advised<Vec<_>>>();
+        let found = found.map_err(|e| Error::input(path, e))?;
+        let mut parts = Vec::new();
+        for found in &found {
+            let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), &self.opener)?;
+            parts.push(found.part((&self.watched, state), chunks).map_err(refused)?);
+        }
+        let mut described = joined(found, parts).map_err(refused)?;
+        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice) {
+            (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+        }
+        if choice.arrays.len() > 1 {
+            described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
+        }
+        Ok(described)
     }
-    if choice.arrays.len() > 1 {
-        described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
-    }
-    Ok(described)
+}
+
+/// The name of the active array of an image.
+fn active(image: Option<&vtkhdf::Image>) -> Option<&str> {
+    image.and_then(|image| image.active.as_deref())
 }
 
 /// An error if steps are not numbered regularly.
@@ -241,7 +262,7 @@ fn check_steps(path: &Path, choice: &Choice<'_>, options: &OpenOptions) -> Resul
 }
 
 /// One archive of the arrays of all steps.
-fn joined(mut found: Vec<Found>, parts: Vec<Part>) -> Parsed<FileHeader> {
+fn joined(mut found: Vec<ResolvedArray>, parts: Vec<Part>) -> Parsed<FileHeader> {
     let first = found.swap_remove(0);
     if let Some(other) = found.iter().find(|other| other.layout.dims() != first.layout.dims()) {
         let (a, b) = (&first.variable, &other.variable);
@@ -270,7 +291,7 @@ struct Context<'a> {
 }
 
 /// What an array is.
-struct Found {
+struct ResolvedArray {
     variable: Variable,
     name: String,
     counts: Vec<Counts>,
@@ -283,7 +304,7 @@ struct Found {
 }
 
 impl Context<'_> {
-    fn found(&self, variable: &Variable) -> Advised<Found> {
+    fn found(&self, variable: &Variable) -> Advised<ResolvedArray> {
         let mesh = openpmd::Mesh::of(self.file, variable);
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
@@ -313,7 +334,7 @@ impl Context<'_> {
             None => variable.name().to_string(),
         };
         let values = Values::of(&variable, sample)?;
-        Ok(Found { name, counts, layout, order, places, values, variable })
+        Ok(ResolvedArray { name, counts, layout, order, places, values, variable })
     }
 
     /// What VTKHDF says of places, and the order of frames.
@@ -329,7 +350,7 @@ impl Context<'_> {
     }
 }
 
-impl Found {
+impl ResolvedArray {
     /// The frames of this array.
     fn part(&self, (path, state): (&Path, State), chunks: Chunks) -> Parsed<Part> {
         let stored = Stored { packing: self.values.packing.clone(), ..chunks.stored(&self.layout)? };

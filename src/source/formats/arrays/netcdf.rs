@@ -1,11 +1,12 @@
 //! NetCDF files, classic and version 4, as [`super::ArrayFile`].
 
-use super::{ArrayFile, Attribute, Attributes, How, Variable, hdf5};
+use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable, hdf5};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use hdf5_reader::Hdf5File;
+use netcdf_reader::error::Error as NcError;
 use netcdf_reader::{NcAttrValue, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
 use std::ops::Range;
 use std::path::Path;
@@ -14,22 +15,30 @@ use std::path::Path;
 const UNWRITTEN: f64 = 9.969_209_968_386_869e36;
 
 /// Opens a file.
-pub(super) fn open(path: &Path, how: How) -> Result<Box<dyn ArrayFile>> {
+pub(super) fn open(path: &Path, how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
     let storage = hdf5::storage(FileBytes::open(path, how.access)?);
     let options = NcOpenOptions { chunk_cache_bytes: 0, max_chunk_bytes: how.memory, ..NcOpenOptions::default() };
     let file = NcFile::from_storage_with_options(storage.clone(), options);
     let file = file.map_err(|e| Error::input(path, format!("is no NetCDF file that can be read: {e}")))?;
     let hdf5 = if file.as_classic().is_some() { None } else { Hdf5File::from_storage(storage).ok() };
-    Ok(Box::new(Opened { file, hdf5 }))
+    Ok(Box::new(NetCdfArrayFile { file, hdf5 }))
 }
 
-struct Opened {
+/// Why something cannot be read.
+fn reason(error: &NcError) -> String {
+    match error {
+        NcError::Hdf5(error) => hdf5::reason(error),
+        error => error.to_string(),
+    }
+}
+
+struct NetCdfArrayFile {
     file: NcFile,
     /// The same file, of version 4: it knows of chunks.
     hdf5: Option<Hdf5File>,
 }
 
-impl ArrayFile for Opened {
+impl ArrayFile for NetCdfArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
         let mut all = Vec::new();
         self.add(self.file.root_group().map_err(|e| e.to_string())?, "", &mut all);
@@ -43,7 +52,7 @@ impl ArrayFile for Opened {
         let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };
         macro_rules! read {
             ($ty:ty) => {{
-                let numbers = self.file.read_variable_slice_parallel::<$ty>(path, &slice).map_err(|e| e.to_string())?;
+                let numbers = self.file.read_variable_slice_parallel::<$ty>(path, &slice).map_err(|e| reason(&e))?;
                 numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
             }};
         }
@@ -61,12 +70,12 @@ impl ArrayFile for Opened {
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
-        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {e}"))?;
+        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().collect())
     }
 }
 
-impl Opened {
+impl NetCdfArrayFile {
     fn add(&self, group: &NcGroup, path: &str, all: &mut Vec<Variable>) {
         for variable in &group.variables {
             all.push(self.variable(variable, format!("{path}{}", variable.name())));

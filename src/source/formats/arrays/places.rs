@@ -40,7 +40,7 @@ pub(super) struct Places {
 
 /// What the coordinates of an axis come to.
 #[derive(Debug, Clone)]
-struct Line {
+struct AxisCoordinates {
     /// Name of the axis.
     name: String,
     /// The coordinate that is least.
@@ -85,8 +85,8 @@ impl Places {
     }
 
     /// The coordinates of an axis; none, with a note, where they lead nowhere.
-    fn line(&mut self, file: &dyn ArrayFile, coordinate: &Variable) -> Option<Line> {
-        let line = numbers(file, coordinate).ok().and_then(|at| Line::of(at, coordinate));
+    fn line(&mut self, file: &dyn ArrayFile, coordinate: &Variable) -> Option<AxisCoordinates> {
+        let line = numbers(file, coordinate).ok().and_then(|at| AxisCoordinates::of(at, coordinate));
         if line.is_none() {
             let name = coordinate.name();
             self.notes.push(format!("{name} does not lead from one end to the other: its voxels are numbered").into());
@@ -103,7 +103,7 @@ impl Places {
         self.calendar = times.text("calendar").map(String::from);
     }
 
-    fn take_lines(&mut self, lines: &[Option<Line>; 3], spaced: bool) {
+    fn take_lines(&mut self, lines: &[Option<AxisCoordinates>; 3], spaced: bool) {
         for (along, line) in lines.iter().enumerate() {
             self.backwards[along] = line.as_ref().is_some_and(|line| line.backwards);
         }
@@ -161,7 +161,7 @@ fn scalar_time<'a>(all: &'a [Variable], variable: &Variable) -> Option<&'a Varia
     times().find(is_valid).or_else(|| times().find(is_named)).or_else(|| times().next())
 }
 
-impl Line {
+impl AxisCoordinates {
     /// None for coordinates that do not lead from one end to the other.
     fn of(mut at: Vec<f64>, coordinate: &Variable) -> Option<Self> {
         let unit = unit(coordinate.text("units").unwrap_or_default());
@@ -215,11 +215,11 @@ mod tests {
     use super::super::{Attribute, Attributes};
     use super::*;
 
-    fn line(at: &[f64], attributes: &[(&str, &str)]) -> Option<Line> {
+    fn line(at: &[f64], attributes: &[(&str, &str)]) -> Option<AxisCoordinates> {
         let text = |(name, text): &(&str, &str)| ((*name).to_string(), Attribute::Text((*text).into()));
         let attributes: Attributes = attributes.iter().map(text).collect();
         let (lengths, dims) = (vec![at.len()], vec!["a".into()]);
-        Line::of(
+        AxisCoordinates::of(
             at.to_vec(),
             &Variable { path: "a".into(), sample: Err("f64".into()), lengths, dims, chunk: None, attributes },
         )

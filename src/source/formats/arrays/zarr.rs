@@ -1,6 +1,6 @@
 //! Zarr stores of versions 2 and 3, as [`super::ArrayFile`].
 
-use super::{ArrayFile, Attribute, Attributes, How, Variable};
+use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
 use crate::base::error::{Error, Result};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
@@ -15,14 +15,14 @@ use zarrs::group::Group;
 const MOST_DEPTH: usize = 16;
 
 /// Opens a folder.
-pub(super) fn open(path: &Path, _how: How) -> Result<Box<dyn ArrayFile>> {
+pub(super) fn open(path: &Path, _how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
     let store = FilesystemStore::new(path);
-    Ok(Box::new(Opened(Arc::new(store.map_err(|e| Error::input(path, format!("is no Zarr store: {e}")))?))))
+    Ok(Box::new(ZarrArrayFile(Arc::new(store.map_err(|e| Error::input(path, format!("is no Zarr store: {e}")))?))))
 }
 
-struct Opened(Arc<FilesystemStore>);
+struct ZarrArrayFile(Arc<FilesystemStore>);
 
-impl ArrayFile for Opened {
+impl ArrayFile for ZarrArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
         if let Ok(array) = Array::open(self.0.clone(), "/") {
             return Ok(vec![variable(&array)]);

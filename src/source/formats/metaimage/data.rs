@@ -1,7 +1,7 @@
 //! Where the samples of a MetaImage are: after the header, in another file, or in a file for each frame or slice.
 
-use super::Samples;
-use super::header::Header;
+use super::MetaImageSamples;
+use super::header::MetaImageHeader;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
@@ -12,7 +12,7 @@ use crate::source::formats::pieces::{Piece, Pieces, Stream};
 use std::path::{Path, PathBuf};
 
 /// The files that hold the frames, checked for their size.
-pub(super) fn parts(file: &FileBytes, header: &Header, samples: &Samples) -> Result<Vec<Part>> {
+pub(super) fn parts(file: &FileBytes, header: &MetaImageHeader, samples: &MetaImageSamples) -> Result<Vec<Part>> {
     let refused = |e| Error::input(file.path(), e);
     let skip = skip(header).map_err(refused)?;
     let data = Data { file, samples, skip };
@@ -32,7 +32,7 @@ pub(super) fn parts(file: &FileBytes, header: &Header, samples: &Samples) -> Res
 }
 
 /// Bytes before the samples of each data file; none if the samples are its end.
-fn skip(header: &Header) -> Parsed<Option<u64>> {
+fn skip(header: &MetaImageHeader) -> Parsed<Option<u64>> {
     let text = header.get("headersize").unwrap_or("0");
     match text.parse::<i64>() {
         Ok(-1) => Ok(None),
@@ -43,7 +43,7 @@ fn skip(header: &Header) -> Parsed<Option<u64>> {
 
 struct Data<'a> {
     file: &'a FileBytes, // the header
-    samples: &'a Samples,
+    samples: &'a MetaImageSamples,
     skip: Option<u64>,
 }
 
@@ -122,7 +122,7 @@ struct Names<'a> {
 }
 
 impl<'a> Names<'a> {
-    fn parse(text: &'a str, header: &'a Header, samples: &Samples) -> Parsed<Self> {
+    fn parse(text: &'a str, header: &'a MetaImageHeader, samples: &MetaImageSamples) -> Parsed<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
         match words[..] {
             [] => Err("ElementDataFile names no file".into()),
@@ -136,7 +136,7 @@ impl<'a> Names<'a> {
     }
 
     /// A pattern and up to three numbers: the first, the last, and the step.
-    fn of_pattern(words: &[&str], samples: &Samples) -> Parsed<Self> {
+    fn of_pattern(words: &[&str], samples: &MetaImageSamples) -> Parsed<Self> {
         let mut numbers: Vec<i64> = words[1..].iter().rev().take(3).map_while(|word| word.parse().ok()).collect();
         numbers.reverse();
         let name = words[..words.len() - numbers.len()].join(" ");
@@ -153,7 +153,7 @@ impl<'a> Names<'a> {
     }
 
     /// Axes of each file, where there are as many files as it takes.
-    fn checked_axes(&self, samples: &Samples) -> Parsed<usize> {
+    fn checked_axes(&self, samples: &MetaImageSamples) -> Parsed<usize> {
         let (axes, frames, planes) = (self.axes, samples.frames, samples.lengths[2]);
         let expected = match axes {
             _ if axes == samples.axes => Some(1),

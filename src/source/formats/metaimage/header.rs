@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 /// The fields of a header, and where it ends.
 #[derive(Debug, Default)]
-pub(super) struct Header {
+pub(super) struct MetaImageHeader {
     fields: HashMap<String, String>, // names in lower case
     /// The file names after `ElementDataFile = LIST`.
     pub(super) list: Vec<String>,
@@ -14,7 +14,7 @@ pub(super) struct Header {
     pub(super) len: u64,
 }
 
-impl Header {
+impl MetaImageHeader {
     /// Reads a header that these bytes start with; none if it goes on after them, unless they are the `whole` file.
     pub(super) fn parse(bytes: &[u8], whole: bool) -> Parsed<Option<Self>> {
         let mut header = Self::default();

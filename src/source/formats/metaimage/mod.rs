@@ -13,7 +13,7 @@ use crate::source::file_header::{FileHeader, Stored, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::{Advised, Parsed};
-use header::Header;
+use header::MetaImageHeader;
 use std::path::Path;
 
 const SPACING: [&str; 2] = ["elementspacing", "elementsize"];
@@ -24,18 +24,18 @@ const TRANSFORM: [&str; 3] = ["transformmatrix", "rotation", "orientation"];
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
-    let header = growing_head(&file, Header::parse)?;
+    let header = growing_head(&file, MetaImageHeader::parse)?;
     let samples = samples(&header, variable).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &samples)?;
     let times = times(&header, &samples).map_err(refused)?;
     let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
-    let Samples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
+    let MetaImageSamples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
     let notes = note.into_iter().chain(unheeded).collect();
     Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(shape, parts) })
 }
 
 /// What the samples are, wherever they are.
-struct Samples {
+struct MetaImageSamples {
     axes: usize,
     /// Voxels along its axes of space, the fastest first, as they are stored.
     lengths: [usize; 3],
@@ -51,7 +51,7 @@ struct Samples {
     compressed: bool,
 }
 
-impl Samples {
+impl MetaImageSamples {
     /// How some frames are stored.
     fn stored(&self, frames: usize) -> Parsed<Stored> {
         let components = Axis::new(Counts::Only(self.component), self.components);
@@ -68,7 +68,7 @@ impl Samples {
     }
 }
 
-fn samples(header: &Header, variable: Option<&str>) -> Advised<Samples> {
+fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImageSamples> {
     if header.flag(&["binarydata"])? == Some(false) {
         return Err("has its samples as text (BinaryData = False), which is not supported; write them as binary".into());
     }
@@ -89,8 +89,18 @@ fn samples(header: &Header, variable: Option<&str>) -> Advised<Samples> {
     let (component, variable) = component::of_only(None, components, variable)?;
     let big_endian = header.flag(&["binarydatabyteordermsb", "elementbyteordermsb"])?.unwrap_or(false);
     let compressed = header.flag(&["compresseddata"])?.unwrap_or(false);
-    let samples =
-        Samples { axes, lengths, placed, shape, frames, components, component, variable, big_endian, compressed };
+    let samples = MetaImageSamples {
+        axes,
+        lengths,
+        placed,
+        shape,
+        frames,
+        components,
+        component,
+        variable,
+        big_endian,
+        compressed,
+    };
     samples.stored(frames)?; // so that all sizes that follow are small enough
     Ok(samples)
 }
@@ -113,7 +123,7 @@ fn sample_type(name: &str) -> Parsed<SampleType> {
 }
 
 /// Where voxels are in the world.
-fn directions(header: &Header, axes: usize) -> Parsed<Directions> {
+fn directions(header: &MetaImageHeader, axes: usize) -> Parsed<Directions> {
     let matrix = matrix(header, axes)?;
     let rows = std::array::from_fn(|row| std::array::from_fn(|axis| matrix[row][axis]));
     let of_space = |all: Vec<f64>| std::array::from_fn(|axis| all[axis]);
@@ -122,14 +132,14 @@ fn directions(header: &Header, axes: usize) -> Parsed<Directions> {
 }
 
 /// The direction of each axis.
-fn matrix(header: &Header, axes: usize) -> Parsed<Vec<Vec<f64>>> {
+fn matrix(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Vec<f64>>> {
     let unit = |axis| (0..axes).map(|a| if a == axis { 1.0 } else { 0.0 }).collect();
     let Some(text) = header.any(&TRANSFORM) else { return Ok((0..axes).map(unit).collect()) };
     Ok(numbers(text, "TransformMatrix", axes * axes)?.chunks(axes).map(<[f64]>::to_vec).collect())
 }
 
 /// Times where a fourth axis has a spacing.
-fn times(header: &Header, &Samples { axes, frames, .. }: &Samples) -> Parsed<Vec<f64>> {
+fn times(header: &MetaImageHeader, &MetaImageSamples { axes, frames, .. }: &MetaImageSamples) -> Parsed<Vec<f64>> {
     let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
     Ok(match (spacing.get(3), header.any(&SPACING)) {
         (Some(step), Some(_)) if step.is_finite() => (0..frames).map(|t| origin[3] + step * t as f64).collect(),
@@ -138,12 +148,12 @@ fn times(header: &Header, &Samples { axes, frames, .. }: &Samples) -> Parsed<Vec
 }
 
 /// A number for each axis, by the first of some fields that is there.
-fn per_axis(header: &Header, names: &[&str], default: f64, axes: usize) -> Parsed<Vec<f64>> {
+fn per_axis(header: &MetaImageHeader, names: &[&str], default: f64, axes: usize) -> Parsed<Vec<f64>> {
     header.any(names).map_or_else(|| Ok(vec![default; axes]), |text| numbers(text, names[0], axes))
 }
 
 /// What the header says and nothing is done about.
-fn unheeded(header: &Header, axes: usize) -> Parsed<Vec<Note>> {
+fn unheeded(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Note>> {
     let mut notes = Vec::new();
     let matrix = matrix(header, axes)?;
     let of_time = |a: usize| [matrix[3][a], matrix[a][3]];

@@ -11,7 +11,7 @@ const SECOND: usize = 540;
 
 /// A header, as it is written.
 #[derive(Debug)]
-pub(super) struct Header {
+pub(super) struct NiftiHeader {
     pub(super) big_endian: bool,
     /// Whether the samples are in another file.
     pub(super) pair: bool,
@@ -44,7 +44,7 @@ pub(in crate::source) fn is_nifti(head: &[u8]) -> bool {
     Fields::of(head).is_ok_and(|fields| fields.pair().is_ok())
 }
 
-impl Header {
+impl NiftiHeader {
     /// Reads a header that these bytes start with.
     pub(super) fn parse(bytes: &[u8]) -> Parsed<Self> {
         let fields = Fields::of(bytes)?;
@@ -159,8 +159,8 @@ impl<'a> Fields<'a> {
         String::from_utf8_lossy(bytes).trim().to_string()
     }
 
-    fn first(&self, pair: bool) -> Header {
-        Header {
+    fn first(&self, pair: bool) -> NiftiHeader {
+        NiftiHeader {
             big_endian: self.big_endian,
             pair,
             len: FIRST,
@@ -180,8 +180,8 @@ impl<'a> Fields<'a> {
         }
     }
 
-    fn second(&self, pair: bool) -> Header {
-        Header {
+    fn second(&self, pair: bool) -> NiftiHeader {
+        NiftiHeader {
             big_endian: self.big_endian,
             pair,
             len: SECOND,

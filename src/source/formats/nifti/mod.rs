@@ -15,7 +15,7 @@ use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::packing::Packing;
 use crate::source::{Advised, Parsed};
-use header::{Header, LONGEST};
+use header::{LONGEST, NiftiHeader};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -26,9 +26,9 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let path = &header_of(path).unwrap_or_else(|| path.into());
     let refused = |e| Error::input(path, e);
     let (bytes, compressed) = header_bytes(path)?;
-    let header = Header::parse(&bytes).map_err(refused)?;
+    let header = NiftiHeader::parse(&bytes).map_err(refused)?;
     let (data, compressed) = if header.pair { image_of(path)? } else { (path.clone(), compressed) };
-    let array = Array::new(&header, variable).map_err(|e| Error::input(path, e))?;
+    let array = NiftiSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let part = array.part(&header, &data, compressed)?;
     Ok(array.described(&header, part))
 }
@@ -72,26 +72,26 @@ fn header_bytes(path: &Path) -> Result<(Vec<u8>, bool)> {
 }
 
 /// The samples that are meant.
-struct Array {
+struct NiftiSamples {
     layout: Layout,
     shape: Shape,
     stored: SampleType,
     packing: Option<Packing>,
     components: usize,
     /// What is known but not where the samples are.
-    known: Known,
+    known: Placement,
 }
 
 /// The grid and the name.
-struct Known {
+struct Placement {
     spacing: [f64; 3],
     origin: [f64; 3],
     variable: Option<String>,
     notes: Vec<Note>,
 }
 
-impl Array {
-    fn new(header: &Header, variable: Option<&str>) -> Advised<Self> {
+impl NiftiSamples {
+    fn new(header: &NiftiHeader, variable: Option<&str>) -> Advised<Self> {
         let [x, y, z, frames, components] = lengths(&header.dim)?;
         let own = Some(header.intent_name.as_str()).filter(|name| !name.is_empty());
         let (index, variable) = component::of_only(own, components, variable)?;
@@ -102,7 +102,7 @@ impl Array {
         let packing = packing(header)?;
         let sample = packing.as_ref().map_or(stored, |packing| packing.sample(stored));
         let shape = Shape::new(layout.dims(), sample)?;
-        let known = Known {
+        let known = Placement {
             spacing: placed.spacing,
             origin: placed.origin,
             variable,
@@ -111,7 +111,7 @@ impl Array {
         Ok(Self { layout, shape, stored, packing, components, known })
     }
 
-    fn part(&self, header: &Header, data: &Path, compressed: bool) -> Result<Part> {
+    fn part(&self, header: &NiftiHeader, data: &Path, compressed: bool) -> Result<Part> {
         let refused = |e| Error::input(data, e);
         let file = FileBytes::open(data, Access::Read)?;
         let start = start(header).map_err(refused)?;
@@ -130,8 +130,8 @@ impl Array {
         Ok(part)
     }
 
-    fn described(self, header: &Header, part: Part) -> FileHeader {
-        let Known { spacing, origin, variable, notes } = self.known;
+    fn described(self, header: &NiftiHeader, part: Part) -> FileHeader {
+        let Placement { spacing, origin, variable, notes } = self.known;
         let times = times(header, part.frames);
         let units = Units {
             space: space_unit(header.units).map(String::from),
@@ -189,8 +189,8 @@ fn sample_type(datatype: i64) -> Parsed<SampleType> {
 }
 
 /// None if the stored numbers are the samples.
-fn packing(header: &Header) -> Parsed<Option<Packing>> {
-    let Header { slope, inter, .. } = *header;
+fn packing(header: &NiftiHeader) -> Parsed<Option<Packing>> {
+    let NiftiHeader { slope, inter, .. } = *header;
     if slope == 0.0 || !slope.is_finite() || (slope == 1.0 && inter == 0.0) {
         return Ok(None);
     }
@@ -201,7 +201,7 @@ fn packing(header: &Header) -> Parsed<Option<Packing>> {
 }
 
 /// Where the samples start in their file.
-fn start(header: &Header) -> Parsed<u64> {
+fn start(header: &NiftiHeader) -> Parsed<u64> {
     let offset = header.vox_offset;
     let least = if header.pair { 0 } else { header.len };
     if offset.fract() != 0.0 || !(least as f64..9e15).contains(&offset) {
@@ -211,7 +211,7 @@ fn start(header: &Header) -> Parsed<u64> {
 }
 
 /// Times of several frames, if a step says how far they are apart.
-fn times(header: &Header, frames: usize) -> Vec<f64> {
+fn times(header: &NiftiHeader, frames: usize) -> Vec<f64> {
     let (first, step) = (header.toffset, header.pixdim[4]);
     if frames == 1 || !(step.is_finite() && step > 0.0 && first.is_finite()) {
         return Vec::new();

@@ -1,6 +1,6 @@
 //! What the axes of a NRRD count, and where they lie in the world.
 
-use super::header::{Header, vectors};
+use super::header::{NrrdHeader, vectors};
 use crate::source::Parsed;
 use crate::source::file_header::Units;
 use crate::source::formats::directions::Directions;
@@ -21,14 +21,14 @@ pub(super) struct Axes {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Counts {
+enum AxisKind {
     Voxels,
     Frames,
     Components,
 }
 
 impl Axes {
-    pub(super) fn parse(header: &Header) -> Parsed<Self> {
+    pub(super) fn parse(header: &NrrdHeader) -> Parsed<Self> {
         let axes: usize = header.required("dimension")?.parse().map_err(|_| "dimension is no number")?;
         if !(3..=5).contains(&axes) {
             return Err(format!(
@@ -42,7 +42,7 @@ impl Axes {
         }
         let counts = counts(header, axes, directions.as_deref())?;
         let of = |what| (0..axes).filter(|axis| counts[*axis] == what).collect::<Vec<_>>();
-        let (voxels, frames, components) = (of(Counts::Voxels), of(Counts::Frames), of(Counts::Components));
+        let (voxels, frames, components) = (of(AxisKind::Voxels), of(AxisKind::Frames), of(AxisKind::Components));
         let (&[x, y, z], [] | [_], [] | [_]) = (&voxels[..], &frames[..], &components[..]) else {
             let found =
                 format!("{} of space, {} of frames, {} of components", voxels.len(), frames.len(), components.len());
@@ -58,7 +58,7 @@ impl Axes {
     }
 
     /// Where voxels are in the world.
-    pub(super) fn placed(&self, header: &Header) -> Parsed<Directions> {
+    pub(super) fn placed(&self, header: &NrrdHeader) -> Parsed<Directions> {
         let steps = self.steps(header)?;
         if let Some(text) = header.get("spaceorigin") {
             let origin = vectors(text)?.into_iter().next().flatten().ok_or("space origin is no vector")?;
@@ -75,7 +75,7 @@ impl Axes {
         Ok(Directions { steps, first })
     }
 
-    fn steps(&self, header: &Header) -> Parsed<[[f64; 3]; 3]> {
+    fn steps(&self, header: &NrrdHeader) -> Parsed<[[f64; 3]; 3]> {
         let spacings = per_axis(header, "spacings")?;
         let mut steps = [[0.0; 3]; 3];
         for (a, (step, axis)) in steps.iter_mut().zip(self.voxels).enumerate() {
@@ -88,7 +88,7 @@ impl Axes {
     }
 
     /// Times where the axis of frames has a step.
-    pub(super) fn times(&self, header: &Header) -> Parsed<Vec<f64>> {
+    pub(super) fn times(&self, header: &NrrdHeader) -> Parsed<Vec<f64>> {
         let Some(axis) = self.frames else { return Ok(Vec::new()) };
         let finite = |n: Option<f64>| n.filter(|n| n.is_finite());
         let along = |field| per_axis(header, field).map(|all| finite(all.get(axis).copied()));
@@ -102,7 +102,7 @@ impl Axes {
     }
 
     /// Units of what lies along the axes, and of samples.
-    pub(super) fn units(&self, header: &Header) -> Units {
+    pub(super) fn units(&self, header: &NrrdHeader) -> Units {
         let words = |field| quoted(header.get(field).unwrap_or_default());
         let (all, space) = (words("units"), words("spaceunits"));
         let known = |unit: Option<&String>| unit.filter(|u| !matches!(u.as_str(), "" | "???" | "none")).cloned();
@@ -118,7 +118,7 @@ impl Axes {
 }
 
 /// What each axis counts, by its kind and by whether it has a direction; where that says too little, x, y, z come first.
-fn counts(header: &Header, axes: usize, directions: Option<&[Option<Vec<f64>>]>) -> Parsed<Vec<Counts>> {
+fn counts(header: &NrrdHeader, axes: usize, directions: Option<&[Option<Vec<f64>>]>) -> Parsed<Vec<AxisKind>> {
     let kinds: Vec<String> =
         header.get("kinds").unwrap_or_default().split_whitespace().map(str::to_lowercase).collect();
     let mut counts = Vec::new();
@@ -126,16 +126,16 @@ fn counts(header: &Header, axes: usize, directions: Option<&[Option<Vec<f64>>]>)
         let aside = directions.is_some_and(|all| all[axis].is_none());
         let kind = kinds.get(axis).map_or("???", String::as_str);
         counts.push(match kind {
-            "time" | "list" => Counts::Frames,
-            "domain" | "space" | "none" | "???" if aside => Counts::Frames,
-            "domain" | "space" | "none" | "???" => Counts::Voxels,
-            _ if is_component(kind) => Counts::Components,
+            "time" | "list" => AxisKind::Frames,
+            "domain" | "space" | "none" | "???" if aside => AxisKind::Frames,
+            "domain" | "space" | "none" | "???" => AxisKind::Voxels,
+            _ if is_component(kind) => AxisKind::Components,
             _ => return Err(format!("axis {axis} is of kind {kind}, which is not known")),
         });
     }
-    let many = counts.iter().filter(|c| **c == Counts::Voxels).count() > 3 && !counts.contains(&Counts::Frames);
-    if let Some(slowest) = counts.iter().rposition(|c| many && *c == Counts::Voxels) {
-        counts[slowest] = Counts::Frames;
+    let many = counts.iter().filter(|c| **c == AxisKind::Voxels).count() > 3 && !counts.contains(&AxisKind::Frames);
+    if let Some(slowest) = counts.iter().rposition(|c| many && *c == AxisKind::Voxels) {
+        counts[slowest] = AxisKind::Frames;
     }
     Ok(counts)
 }
@@ -147,7 +147,7 @@ fn is_component(kind: &str) -> bool {
 }
 
 /// A number for each axis, or none at all.
-fn per_axis(header: &Header, field: &str) -> Parsed<Vec<f64>> {
+fn per_axis(header: &NrrdHeader, field: &str) -> Parsed<Vec<f64>> {
     let name = if field == "axismins" { "axis mins" } else { field };
     list(header.get(field).unwrap_or_default(), name)
 }

@@ -1,8 +1,8 @@
 //! Where the samples of a NRRD are: after the header, in another file, or in several.
 
-use super::Array;
-use super::files::Files;
-use super::header::Header;
+use super::NrrdSamples;
+use super::files::DataFiles;
+use super::header::NrrdHeader;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
@@ -21,7 +21,7 @@ struct Skip {
 }
 
 /// The files that hold the frames, checked for their size.
-pub(super) fn parts(file: &FileBytes, header: &Header, array: &Array) -> Result<Vec<Part>> {
+pub(super) fn parts(file: &FileBytes, header: &NrrdHeader, array: &NrrdSamples) -> Result<Vec<Part>> {
     let refused = |e| Error::input(file.path(), e);
     let skip = skip(header).map_err(refused)?;
     let Some(named) = header.get("datafile") else {
@@ -32,8 +32,8 @@ pub(super) fn parts(file: &FileBytes, header: &Header, array: &Array) -> Result<
     };
     let folder = file.path().parent().unwrap_or(Path::new(""));
     let open = |name: &str| FileBytes::open(&folder.join(name), Access::Read);
-    let files = match Files::parse(named, &header.list).map_err(refused)? {
-        Files::One(name) => return Ok(vec![array.part(&open(&name)?, 0, &skip, &array.layout)?]),
+    let files = match DataFiles::parse(named, &header.list).map_err(refused)? {
+        DataFiles::One(name) => return Ok(vec![array.part(&open(&name)?, 0, &skip, &array.layout)?]),
         many => many,
     };
     let (count, whole) = array.split(&files).map_err(refused)?;
@@ -48,9 +48,9 @@ pub(super) fn parts(file: &FileBytes, header: &Header, array: &Array) -> Result<
     Ok(vec![array.of_pieces(file, pieces, bytes).map_err(refused)?])
 }
 
-impl Array {
+impl NrrdSamples {
     /// How many files there must be, and whether each holds whole frames.
-    fn split(&self, files: &Files) -> Parsed<(usize, bool)> {
+    fn split(&self, files: &DataFiles) -> Parsed<(usize, bool)> {
         let sizes = &self.axes.sizes;
         let slowest = sizes.len() - 1;
         let (axes, count) = (files.axes().unwrap_or(slowest), files.count()?);
@@ -126,7 +126,7 @@ impl Array {
     }
 }
 
-fn skip(header: &Header) -> Parsed<Skip> {
+fn skip(header: &NrrdHeader) -> Parsed<Skip> {
     let number = |name| header.get(name).unwrap_or("0").parse::<i64>().map_err(|_| format!("{name} is no number"));
     let lines = u64::try_from(number("lineskip")?).map_err(|_| "line skip is negative")?;
     match number("byteskip")? {

@@ -4,13 +4,13 @@ use crate::source::Parsed;
 use crate::source::formats::pattern;
 
 /// What `data file` says.
-pub(super) enum Files {
+pub(super) enum DataFiles {
     One(String),
     Pattern { pattern: String, first: i64, last: i64, step: i64, axes: Option<usize> },
     List { names: Vec<String>, axes: Option<usize> },
 }
 
-impl Files {
+impl DataFiles {
     pub(super) fn parse(text: &str, list: &[String]) -> Parsed<Self> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let axes = |word: Option<&&str>| {

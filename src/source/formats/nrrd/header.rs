@@ -8,7 +8,7 @@ pub(in crate::source) const MAGIC: &[u8] = b"NRRD000";
 
 /// The fields of a header, and where it ends.
 #[derive(Debug)]
-pub(super) struct Header {
+pub(super) struct NrrdHeader {
     fields: HashMap<String, String>, // names in lower case, without spaces
     /// The file names after `data file: LIST`.
     pub(super) list: Vec<String>,
@@ -18,7 +18,7 @@ pub(super) struct Header {
     pub(super) closed: bool,
 }
 
-impl Header {
+impl NrrdHeader {
     /// Reads a header that these bytes start with; none if it goes on after them, unless they are the `whole` file.
     pub(super) fn parse(bytes: &[u8], whole: bool) -> Parsed<Option<Self>> {
         if !bytes.starts_with(MAGIC) {

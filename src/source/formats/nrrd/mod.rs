@@ -18,26 +18,26 @@ use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::{Advised, Parsed};
 use axes::Axes;
-use header::Header;
+use header::NrrdHeader;
 use std::path::Path;
 
 /// Reads the header and checks the size of every data file that is not compressed.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
-    let header = growing_head(&file, Header::parse)?;
-    let array = Array::new(&header, variable).map_err(|e| Error::input(path, e))?;
+    let header = growing_head(&file, NrrdHeader::parse)?;
+    let array = NrrdSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &array)?;
     let times = array.axes.times(&header).map_err(refused)?;
     let units = array.axes.units(&header);
-    let Array { shape, placed, variable, .. } = array;
+    let NrrdSamples { shape, placed, variable, .. } = array;
     let Placed { spacing, origin, note, .. } = placed;
     let notes = note.into_iter().collect();
     Ok(FileHeader { spacing, origin, times, units, variable, notes, ..FileHeader::plain(shape, parts) })
 }
 
 /// The samples that are meant.
-struct Array {
+struct NrrdSamples {
     axes: Axes,
     layout: Layout,
     shape: Shape,
@@ -47,8 +47,8 @@ struct Array {
     variable: Option<String>,
 }
 
-impl Array {
-    fn new(header: &Header, variable: Option<&str>) -> Advised<Self> {
+impl NrrdSamples {
+    fn new(header: &NrrdHeader, variable: Option<&str>) -> Advised<Self> {
         let gzip = is_gzip(header.required("encoding")?)?;
         let axes = Axes::parse(header)?;
         if axes.len(axes.frames) == 0 {
@@ -85,7 +85,7 @@ fn layout(axes: &Axes, placed: &Placed, component: usize) -> Layout {
     Layout(axes.sizes.iter().enumerate().map(axis).rev().collect())
 }
 
-fn big_endian(header: &Header, sample: SampleType) -> Parsed<bool> {
+fn big_endian(header: &NrrdHeader, sample: SampleType) -> Parsed<bool> {
     match header.get("endian").map(str::to_lowercase).as_deref() {
         Some("big") => Ok(true),
         Some("little") => Ok(false),

@@ -55,7 +55,7 @@ pub(super) enum Form {
 
 /// An array.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Encoded {
+pub(super) struct EncodedArray {
     /// Its first byte, or that of its text.
     pub(super) start: u64,
     pub(super) form: Form,
@@ -66,7 +66,7 @@ pub(super) struct Encoded {
     pub(super) bytes: usize,
 }
 
-impl Encoded {
+impl EncodedArray {
     /// Where its samples are, if they are as they are.
     pub(super) fn plain(&self) -> Option<u64> {
         let plain = self.form == Form::Raw && !self.compressed;
@@ -142,7 +142,7 @@ impl Encoded {
     }
 }
 
-impl Packed for Encoded {
+impl Packed for EncodedArray {
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>> {
         let left = file.len().saturating_sub(self.start);
         let mut reader = self.reader(file);

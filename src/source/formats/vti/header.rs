@@ -10,7 +10,7 @@ use quick_xml::events::{BytesStart, Event};
 
 /// One `<DataArray>`, as it is written.
 #[derive(Debug)]
-pub(super) struct Array {
+pub(super) struct VtiArray {
     pub(super) of: Association,
     pub(super) name: String,
     pub(super) ty: String,
@@ -24,16 +24,16 @@ pub(super) struct Array {
 
 /// One `<Piece>`: a box of the lattice.
 #[derive(Debug)]
-pub(super) struct Piece {
+pub(super) struct VtiPiece {
     pub(super) extent: Extent,
     /// The file that it is in, if this file is a list of pieces.
     pub(super) source: Option<String>,
-    pub(super) arrays: Vec<Array>,
+    pub(super) arrays: Vec<VtiArray>,
 }
 
 /// The file, as it is written; what it leaves out has the value that VTK gives it.
 #[derive(Debug)]
-pub(super) struct Header {
+pub(super) struct VtiHeader {
     /// Whether it lists pieces that are files of their own.
     pub(super) parallel: bool,
     pub(super) big_endian: bool,
@@ -46,13 +46,13 @@ pub(super) struct Header {
     pub(super) spacing: [f64; 3],
     pub(super) origin: [f64; 3],
     pub(super) direction: [f64; 9],
-    pub(super) pieces: Vec<Piece>,
+    pub(super) pieces: Vec<VtiPiece>,
     /// The arrays of every piece of a list.
-    declared: Vec<Array>,
+    declared: Vec<VtiArray>,
     /// Names of the active arrays, those of points first.
     pub(super) scalars: Vec<(Association, String)>,
     /// The time that the file is of.
-    pub(super) time: Option<Array>,
+    pub(super) time: Option<VtiArray>,
     /// Of the appended data.
     pub(super) encoding: Option<String>,
     inside: Inside,
@@ -66,7 +66,7 @@ enum Inside {
     Samples(Association),
 }
 
-impl Header {
+impl VtiHeader {
     fn new() -> Self {
         Self {
             parallel: false,
@@ -87,12 +87,25 @@ impl Header {
     }
 
     /// The arrays that every piece has, as the first of them has them, or the list of pieces says.
-    pub(super) fn arrays(&self) -> &[Array] {
+    pub(super) fn arrays(&self) -> &[VtiArray] {
         let first = self.pieces.iter().find(|piece| !piece.extent.is_empty()).or(self.pieces.first());
         match first {
             Some(piece) if !self.parallel => &piece.arrays,
             _ => &self.declared,
         }
+    }
+
+    /// The arrays by their names and numbers of components.
+    pub(super) fn names(&self) -> Vec<(&str, usize)> {
+        self.arrays().iter().map(|array| (array.name.as_str(), array.components)).collect()
+    }
+
+    /// Which of the arrays is the active one.
+    pub(super) fn active(&self) -> Option<usize> {
+        let place = |(of, name): &(Association, String)| {
+            self.arrays().iter().position(|array| array.of == *of && array.name == *name)
+        };
+        self.scalars.iter().find_map(place)
     }
 
     fn element(&mut self, e: &BytesStart<'_>, text: u64) -> Parsed<()> {
@@ -162,7 +175,7 @@ impl Header {
         if self.parallel && source.is_none() {
             return Err("has a <Piece> without a Source".into());
         }
-        self.pieces.push(Piece { extent, source, arrays: Vec::new() });
+        self.pieces.push(VtiPiece { extent, source, arrays: Vec::new() });
         Ok(())
     }
 
@@ -184,7 +197,7 @@ impl Header {
         let number = |attribute: &str, text: String| format!("array {name}: {attribute} {text:?} is no number");
         let offset = attribute(e, "offset")?.map(|o| o.parse().map_err(|_| number("offset", o)));
         let components = attribute(e, "NumberOfComponents")?.unwrap_or_else(|| "1".into());
-        let array = Array {
+        let array = VtiArray {
             of,
             ty: required(e, "type")?,
             format: attribute(e, "format")?.unwrap_or_else(|| "ascii".into()),
@@ -209,9 +222,9 @@ impl Header {
 }
 
 /// Reads XML that may end after the `<AppendedData>` tag.
-pub(super) fn parse(text: &str) -> Parsed<Header> {
+pub(super) fn parse(text: &str) -> Parsed<VtiHeader> {
     let mut reader = Reader::from_str(text);
-    let mut header = Header::new();
+    let mut header = VtiHeader::new();
     loop {
         let event = reader.read_event();
         match event.map_err(|e| format!("is not well-formed XML at byte {}: {e}", reader.error_position()))? {

@@ -1,7 +1,7 @@
 //! A file of VTK's image data, and where its arrays are.
 
-use super::encoded::{Count, Encoded, Form};
-use super::header::{self, Array, Header};
+use super::encoded::{Count, EncodedArray, Form};
+use super::header::{self, VtiArray, VtiHeader};
 use super::skeleton::Skeleton;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
@@ -11,13 +11,13 @@ use std::io::Read;
 use std::path::Path;
 
 /// A file, and what its XML says.
-pub(super) struct Image {
+pub(super) struct VtiFile {
     pub(super) file: FileBytes,
-    pub(super) header: Header,
+    pub(super) header: VtiHeader,
     xml: Skeleton,
 }
 
-impl Image {
+impl VtiFile {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = FileBytes::open(path, Access::Read)?;
         let refused = |e| Error::input(path, e);
@@ -28,9 +28,9 @@ impl Image {
     }
 
     /// Where an array is, checked to be all there.
-    pub(super) fn encoded(&self, array: &Array, sample: SampleType, bytes: usize) -> Result<Encoded> {
+    pub(super) fn encoded(&self, array: &VtiArray, sample: SampleType, bytes: usize) -> Result<EncodedArray> {
         let refused = |e| Error::input(self.file.path(), e);
-        let Header { wide, big_endian, compressed, .. } = self.header;
+        let VtiHeader { wide, big_endian, compressed, .. } = self.header;
         let count = Count { wide, big_endian };
         let (form, start) = match (array.format.as_str(), self.header.encoding.as_deref()) {
             ("binary", _) => (Form::Base64, self.xml.place(array.text)),
@@ -45,13 +45,13 @@ impl Image {
                 return Err(refused(format!("data in format {other:?} is not supported; write it appended or binary")));
             }
         };
-        let encoded = Encoded { start, form, compressed, count, sample, bytes };
+        let encoded = EncodedArray { start, form, compressed, count, sample, bytes };
         encoded.check(&self.file)?;
         Ok(encoded)
     }
 
     /// Where an appended array starts: its offset counts from the `_` after the tag.
-    fn appended(&self, array: &Array) -> Result<u64> {
+    fn appended(&self, array: &VtiArray) -> Result<u64> {
         let (mut gap, end) = ([0; 64], self.xml.end());
         let len = usize::try_from(self.file.len().saturating_sub(end)).unwrap_or(gap.len()).min(gap.len());
         let failed = |e| Error::io(self.file.path(), "reading the appended data", e);

@@ -14,17 +14,17 @@ use crate::base::error::{Error, Result};
 use crate::source::file_header::{FileHeader, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
-use crate::source::{Advised, Parsed};
+use crate::source::{Advised, Parsed, VariableInfo};
 use extent::Extent;
-use header::{Array, Header};
-use image::{Image, sample_type};
+use header::{VtiArray, VtiHeader};
+use image::{VtiFile, sample_type};
 use std::path::Path;
 
 /// Reads the XML of one file, and of those that it lists, and checks that the array is all there.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
-    let image = Image::open(path)?;
+    let image = VtiFile::open(path)?;
     let header = &image.header;
-    let wanted = Wanted::of(header, variable).map_err(|e| Error::input(path, e))?;
+    let wanted = ChosenArray::of(header, variable).map_err(|e| Error::input(path, e))?;
     let (part, time) = pieced::part(&image, &wanted)?;
     let array = wanted.array;
     let variable = Some(component::label(&array.name, array.components, wanted.chosen.component));
@@ -33,9 +33,23 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(wanted.shape, vec![part]) })
 }
 
+/// The arrays among which the user must choose; none if it is clear which one is meant.
+pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
+    let header = VtiFile::open(path)?.header;
+    let points = header.whole.points().map_err(|e| Error::input(path, e))?;
+    if !component::is_undecided(&header.names(), header.active()) {
+        return Ok(Vec::new());
+    }
+    let variable = |array: &VtiArray| {
+        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        VariableInfo::volume(&array.name, sample, array.of.dims(points), array.components)
+    };
+    Ok(header.arrays().iter().map(variable).collect())
+}
+
 /// The array that is meant.
-struct Wanted<'a> {
-    array: &'a Array,
+struct ChosenArray<'a> {
+    array: &'a VtiArray,
     chosen: Chosen,
     whole: Extent,
     /// Voxels along its axes, the fastest first, as they are stored.
@@ -47,14 +61,10 @@ struct Wanted<'a> {
     voxel: usize,
 }
 
-impl<'a> Wanted<'a> {
-    fn of(header: &'a Header, variable: Option<&str>) -> Advised<Self> {
-        let arrays = header.arrays();
-        let names: Vec<_> = arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
-        let active =
-            header.scalars.iter().find_map(|(of, name)| arrays.iter().position(|a| a.of == *of && a.name == *name));
-        let chosen = component::choose(&names, active, variable)?;
-        let array = &arrays[chosen.array];
+impl<'a> ChosenArray<'a> {
+    fn of(header: &'a VtiHeader, variable: Option<&str>) -> Advised<Self> {
+        let chosen = component::choose(&header.names(), header.active(), variable)?;
+        let array = &header.arrays()[chosen.array];
         let points = header.whole.points()?;
         let Some(sample) = sample_type(&array.ty) else {
             let types = "UInt8 to Int32, Float32 and Float64 are";
@@ -75,7 +85,7 @@ impl<'a> Wanted<'a> {
 }
 
 /// Where the samples of an array are in the world: those of cells between points.
-fn directions(header: &Header, array: &Array, points: [usize; 3]) -> Parsed<Directions> {
+fn directions(header: &VtiHeader, array: &VtiArray, points: [usize; 3]) -> Parsed<Directions> {
     let matrix = &header.direction;
     let columns = std::array::from_fn(|axis| [0, 1, 2].map(|row| matrix[3 * row + axis]));
     let lattice = Directions::of(columns, header.spacing, header.origin)?;

@@ -1,10 +1,10 @@
 //! The pieces of an image, in one file or in files of their own, as one frame.
 
-use super::Wanted;
-use super::encoded::Encoded;
+use super::ChosenArray;
+use super::encoded::EncodedArray;
 use super::extent::{Extent, check_pieces};
-use super::header::{Array, Piece};
-use super::image::Image;
+use super::header::{VtiArray, VtiPiece};
+use super::image::VtiFile;
 use crate::base::error::{Error, Result};
 use crate::source::file_header::{DataLocation, Part};
 use crate::source::formats::pieces::{self, Pieces};
@@ -14,10 +14,10 @@ use std::path::Path;
 const MOST: usize = 1 << 14; // pieces: each is compared with every other one
 
 /// Where the array of an image is, checked to be all there, and the time that its files say.
-pub(super) fn part(image: &Image, wanted: &Wanted<'_>) -> Result<(Part, Option<f64>)> {
+pub(super) fn part(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<(Part, Option<f64>)> {
     let path = image.file.path();
     let refused = |e| Error::input(path, e);
-    let found = if image.header.parallel { listed(image, wanted)? } else { Found::of(image, wanted)? };
+    let found = if image.header.parallel { listed(image, wanted)? } else { LocatedPieces::of(image, wanted)? };
     let extents: Vec<Extent> = found.pieces.iter().map(|located| located.extent).collect();
     check_pieces(&image.header.whole, &extents).map_err(refused)?;
     let stored = wanted.stored(found.big_endian).map_err(refused)?;
@@ -36,21 +36,21 @@ pub(super) fn part(image: &Image, wanted: &Wanted<'_>) -> Result<(Part, Option<f
 }
 
 /// The pieces that one file has.
-struct Found {
-    pieces: Vec<Located>,
+struct LocatedPieces {
+    pieces: Vec<LocatedPiece>,
     big_endian: bool,
     time: Option<f64>,
 }
 
 /// A piece, and where its samples are.
-struct Located {
+struct LocatedPiece {
     extent: Extent,
-    encoded: Encoded,
+    encoded: EncodedArray,
     piece: pieces::Piece,
 }
 
-impl Found {
-    fn of(image: &Image, wanted: &Wanted<'_>) -> Result<Self> {
+impl LocatedPieces {
+    fn of(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<Self> {
         let refused = |what: String| Err(Error::input(image.file.path(), what));
         if image.header.parallel {
             return refused("is a list of pieces among the pieces of another".into());
@@ -64,7 +64,7 @@ impl Found {
 }
 
 /// Refuses more pieces than can be compared.
-fn check_count(image: &Image, pieces: usize) -> Result<()> {
+fn check_count(image: &VtiFile, pieces: usize) -> Result<()> {
     if pieces <= MOST {
         return Ok(());
     }
@@ -72,14 +72,14 @@ fn check_count(image: &Image, pieces: usize) -> Result<()> {
 }
 
 /// The pieces of the files that a file lists.
-fn listed(image: &Image, wanted: &Wanted<'_>) -> Result<Found> {
+fn listed(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<LocatedPieces> {
     let folder = image.file.path().parent().unwrap_or(Path::new(""));
     check_count(image, image.header.pieces.len())?;
     let sources = image.header.pieces.iter().filter(|piece| !piece.extent.is_empty());
-    let mut all: Option<Found> = None;
+    let mut all: Option<LocatedPieces> = None;
     for source in sources.filter_map(|piece| piece.source.as_deref()) {
         let path = folder.join(source);
-        let found = Found::of(&Image::open(&path)?, wanted)?;
+        let found = LocatedPieces::of(&VtiFile::open(&path)?, wanted)?;
         let Some(before) = &mut all else {
             all = Some(found);
             continue;
@@ -94,7 +94,7 @@ fn listed(image: &Image, wanted: &Wanted<'_>) -> Result<Found> {
 }
 
 /// The array in a piece; none if it has no cell of the whole.
-fn locate(image: &Image, piece: &Piece, wanted: &Wanted<'_>) -> Result<Option<Located>> {
+fn locate(image: &VtiFile, piece: &VtiPiece, wanted: &ChosenArray<'_>) -> Result<Option<LocatedPiece>> {
     let refused = |e| Error::input(image.file.path(), e);
     let (extent, whole, sample) = (piece.extent, &wanted.whole, wanted.shape.sample());
     let Some(start) = extent.start_in(whole) else {
@@ -103,8 +103,8 @@ fn locate(image: &Image, piece: &Piece, wanted: &Wanted<'_>) -> Result<Option<Lo
     if !extent.has_cells(whole) {
         return Ok(None);
     }
-    let Array { of, name, ty, components, .. } = wanted.array;
-    let same = |a: &&Array| a.of == *of && a.name == *name && a.ty == *ty && a.components == *components;
+    let VtiArray { of, name, ty, components, .. } = wanted.array;
+    let same = |a: &&VtiArray| a.of == *of && a.name == *name && a.ty == *ty && a.components == *components;
     let Some(array) = piece.arrays.iter().find(same) else {
         return Err(refused(format!("has a piece without the array {name} of {components} {ty}")));
     };
@@ -115,5 +115,5 @@ fn locate(image: &Image, piece: &Piece, wanted: &Wanted<'_>) -> Result<Option<Lo
     let encoded = image.encoded(array, sample, bytes)?;
     let (path, state) = (image.file.path().into(), image.file.state());
     let piece = pieces::Piece { path, state, start, dims, samples: Box::new(encoded) };
-    Ok(Some(Located { extent, encoded, piece }))
+    Ok(Some(LocatedPiece { extent, encoded, piece }))
 }

@@ -16,7 +16,7 @@ pub(in crate::source) const MAGIC: &[u8] = b"# vtk DataFile";
 
 /// One array of points or cells.
 #[derive(Debug)]
-pub(super) struct Array {
+pub(super) struct VtkArray {
     pub(super) of: Association,
     pub(super) name: String,
     /// The type by its name in the file.
@@ -30,14 +30,14 @@ pub(super) struct Array {
 
 /// The file, as it is written.
 #[derive(Debug)]
-pub(super) struct Header {
+pub(super) struct VtkHeader {
     /// Whether its arrays are text.
     pub(super) ascii: bool,
     /// Points along x, y, z.
     pub(super) points: [usize; 3],
     pub(super) spacing: [f64; 3],
     pub(super) origin: [f64; 3],
-    pub(super) arrays: Vec<Array>,
+    pub(super) arrays: Vec<VtkArray>,
     /// Which of them are scalars.
     pub(super) scalars: Vec<usize>,
     pub(super) time: Option<f64>,
@@ -45,7 +45,7 @@ pub(super) struct Header {
     inside: Option<(Association, usize)>,
 }
 
-impl Header {
+impl VtkHeader {
     /// Goes through the whole file, from array to array.
     pub(super) fn read(file: &FileBytes) -> Result<Self> {
         let mut lines = Lines { file, at: 0 };
@@ -64,6 +64,11 @@ impl Header {
             return Err(refused("does not say its DIMENSIONS".into()));
         }
         Ok(header)
+    }
+
+    /// The arrays by their names and numbers of components.
+    pub(super) fn names(&self) -> Vec<(&str, usize)> {
+        self.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect()
     }
 
     /// Whether a line says something of the lattice, or what arrays are of.
@@ -164,7 +169,7 @@ impl Header {
         };
         let start = self.pass(lines, components.checked_mul(tuples), bits)?;
         match self.inside {
-            Some((of, _)) => self.arrays.push(Array { of, name, ty: ty.into(), components, tuples, start }),
+            Some((of, _)) => self.arrays.push(VtkArray { of, name, ty: ty.into(), components, tuples, start }),
             None if is_time(&name) && (components, tuples) == (1, 1) => self.time = self.time(lines.file, start, ty)?,
             None => {}
         }

@@ -10,19 +10,18 @@ use super::pieces::{Piece, Pieces};
 use super::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::source::Parsed;
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
-use header::{Array, Header, sample_type};
+use crate::source::{Parsed, VariableInfo};
+use header::{VtkArray, VtkHeader, sample_type};
 use std::path::Path;
 
 /// Goes through the text of one file and finds the array.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let file = FileBytes::open(path, Access::Read)?;
-    let header = Header::read(&file)?;
-    let arrays: Vec<_> = header.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect();
-    let chosen = component::choose(&arrays, header.scalars.first().copied(), variable);
+    let header = VtkHeader::read(&file)?;
+    let chosen = component::choose(&header.names(), header.scalars.first().copied(), variable);
     let chosen = chosen.map_err(|e| Error::input(path, e))?;
     let array = &header.arrays[chosen.array];
     let (shape, stored) = stored(&header, array, chosen).map_err(|e| Error::input(path, e))?;
@@ -36,8 +35,21 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     Ok(described)
 }
 
+/// The arrays among which the user must choose; none if it is clear which one is meant.
+pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
+    let header = VtkHeader::read(&FileBytes::open(path, Access::Read)?)?;
+    if !component::is_undecided(&header.names(), header.scalars.first().copied()) {
+        return Ok(Vec::new());
+    }
+    let variable = |array: &VtkArray| {
+        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        VariableInfo::volume(&array.name, sample, array.of.dims(header.points), array.components)
+    };
+    Ok(header.arrays.iter().map(variable).collect())
+}
+
 /// An array as text: all of it is one piece.
-fn text(file: &FileBytes, array: &Array, shape: Shape) -> DataLocation {
+fn text(file: &FileBytes, array: &VtkArray, shape: Shape) -> DataLocation {
     let (dims, sample) = (shape.dims(), shape.sample());
     let samples = Words { start: array.start, count: array.components * array.tuples, sample };
     let (path, state) = (file.path().into(), file.state());
@@ -50,7 +62,7 @@ fn text(file: &FileBytes, array: &Array, shape: Shape) -> DataLocation {
     }))
 }
 
-fn stored(header: &Header, array: &Array, chosen: Chosen) -> Parsed<(Shape, Stored)> {
+fn stored(header: &VtkHeader, array: &VtkArray, chosen: Chosen) -> Parsed<(Shape, Stored)> {
     let refused = |what: String| format!("array {}: {what}", array.name);
     let Some(sample) = sample_type(&array.ty) else {
         let types = "unsigned_char to int, float and double are";

@@ -1,0 +1,20 @@
+//! The variables of an archive, where the user must choose one.
+
+use serde::Serialize;
+use wavesplat::base::error::Result;
+use wavesplat::cli::{CommonArgs, print};
+use wavesplat::source::VariableInfo;
+
+/// The keys of `--json`.
+#[derive(Debug, Serialize)]
+struct Info<'a> {
+    variables: &'a [VariableInfo],
+}
+
+pub(super) fn run(variables: &[VariableInfo], common: &CommonArgs) -> Result<()> {
+    if common.json {
+        return common.report(&Info { variables }, false);
+    }
+    let lines: String = variables.iter().map(|variable| format!("  {variable}\n")).collect();
+    print(&format!("several variables\n{lines}choose one with --variable NAME\n"))
+}

@@ -1,0 +1,80 @@
+//! How frames are read is remembered: to convert them again, to append to them, to verify against them.
+
+use super::{Archive, Work, small};
+
+const OPTIONS: &str =
+    "--dims 20x14x10x40 --dtype f32 --endian big --offset 8 --spacing 1,2,0.5 --origin=-3,0,1e-7 --region 2:18,:,1:9";
+
+/// Samples with their most significant byte first, after eight other bytes.
+fn headerless(archive: &Archive) -> Vec<u8> {
+    b"a header".iter().copied().chain(archive.values.iter().flat_map(|v| v.to_be_bytes())).collect()
+}
+
+/// The frames from `first` to `end`.
+fn part(archive: &Archive, first: usize, end: usize) -> Archive {
+    let voxels = archive.frame_len();
+    Archive { frames: end - first, values: archive.values[first * voxels..end * voxels].to_vec(), ..archive.clone() }
+}
+
+/// The options by which a file says that it is made again.
+fn options_of(work: &Work, file: &str) -> String {
+    let info = work.wavesplat(&format!("info {file} --json")).ok().json();
+    let options = info["options"].as_object().unwrap();
+    options.iter().map(|(name, value)| format!(" --{name}={}", value.as_str().unwrap())).collect()
+}
+
+#[test]
+fn a_file_is_made_again_by_the_options_that_it_names() {
+    let work = Work::new();
+    work.write("a.raw", headerless(&small()));
+    let axes = format!("{}/tests/golden/inputs/hdf5/axes_xyzt.h5", env!("CARGO_MANIFEST_DIR"));
+    for (input, options, said) in [
+        ("a.raw", OPTIONS.to_string(), "--dims=20x14x10x40 --dtype=f32 --endian=big"),
+        ("a.raw", format!("{OPTIONS} --transfer-function turbo"), "--transfer-function=turbo"),
+        (&axes, "--axes xyzt --spacing 2,2,2".into(), "--axes=xyzt"),
+    ] {
+        work.wavesplat(&format!("convert {input} -o a.wspl --force {options}")).ok();
+        let again = options_of(&work, "a.wspl");
+        assert!(again.contains(said), "{again}");
+        assert!(work.wavesplat("info a.wspl").ok().text().contains(&format!("made by    convert{again}")), "{again}");
+        work.wavesplat(&format!("convert {input} -o b.wspl --force{again}")).ok();
+        assert!(work.read("a.wspl") == work.read("b.wspl"), "{options}");
+        work.wavesplat(&format!("verify a.wspl --against {input}")).ok();
+    }
+}
+
+#[test]
+fn frames_are_appended_and_compared_as_the_first_were_read() {
+    let (work, all) = (Work::new(), small());
+    let parts = [part(&all, 0, 32), part(&all, 32, 37), part(&all, 37, 40)];
+    for (name, part) in ["a", "b", "c"].iter().zip(&parts) {
+        work.write(&format!("{name}.raw"), headerless(part));
+        work.write(&format!("{name}.npy"), part.npy());
+    }
+    let first = OPTIONS.replace("x40", "x32");
+    work.wavesplat(&format!("convert a.raw -o a.wspl {first}")).ok();
+    work.wavesplat("append a.wspl b.raw").ok();
+    work.shell("cat c.raw | $WAVESPLAT append a.wspl -").ok();
+    work.write("all.raw", headerless(&all));
+    work.write("all.npy", all.npy());
+    for source in ["all.raw", "all.npy"] {
+        let report = work.wavesplat(&format!("verify a.wspl --against {source} --json")).ok().json();
+        assert_eq!(report["against"]["samples"], 16 * 14 * 8 * 40, "{source}");
+    }
+    work.wavesplat(&format!("convert a.raw -o n.wspl {first}")).ok();
+    work.wavesplat("append n.wspl b.npy").ok();
+    work.shell("cat c.npy | $WAVESPLAT append n.wspl -").ok();
+    assert!(work.read("a.wspl") == work.read("n.wspl"));
+}
+
+#[test]
+fn options_that_are_given_go_before_those_that_are_remembered() {
+    let (work, all) = (Work::new(), small());
+    work.write("a.raw", headerless(&all));
+    work.write("plain.raw", all.bytes());
+    work.wavesplat(&format!("convert a.raw -o a.wspl {OPTIONS}")).ok();
+    work.wavesplat("verify a.wspl --against plain.raw").fails(3, &["plain.raw", "expected"]);
+    work.wavesplat("verify a.wspl --against plain.raw --endian little --offset 0").ok();
+    work.wavesplat("verify a.wspl --against a.raw --dims 20x14x10x39").fails(3, &["expected 436808"]);
+    work.wavesplat("verify a.wspl --against a.raw --dtype f64").fails(3, &["expected 896008"]);
+}
