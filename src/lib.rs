@@ -129,15 +129,27 @@ pub use base::sample::SampleType;
 pub mod base;
 pub mod source;
 pub mod colour;
-pub mod wavelet;
-pub mod codec;
+mod wavelet;
+mod codec;
 pub mod file;
 pub mod convert;
 pub mod view;
 pub mod render;
 pub mod extract;
+#[doc(hidden)]
 #[cfg(feature = "args")]
 pub mod cli;
+
+/// The parts of `wavelet` and `codec` that tests and benchmarks use. This is no public interface: it may change at any time.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::codec::WindowCodec;
+    pub use crate::codec::bound::{ErrorBound, difference_up};
+    pub use crate::codec::decode::Block;
+    pub use crate::codec::encode::Encoder;
+    pub use crate::codec::scheme::Scheme;
+    pub use crate::wavelet::{LANES, Lane, TimeBasis, basis, synthesis};
+}
 
 #[doc = include_str!("method.md")]
 #[allow(rustdoc::private_intra_doc_links, reason = "it links to the modules that implement it, public or not")]

@@ -12,11 +12,10 @@ use std::time::Instant;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::WindowCodec;
-use wavesplat::codec::bound::Bound;
+use wavesplat::convert::{Basis, Bound};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
-use wavesplat::wavelet::Basis;
+use wavesplat::internal::WindowCodec;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Case {

@@ -11,11 +11,9 @@ use crate::images::{bits, under_less_memory};
 use crate::reference::splat::{BACKGROUND, Images};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, Bound, ConvertConfig};
 use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, RenderReport, Scene, SplatSource};
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 
 /// The reference pictures of one view, with which several pictures are compared.

@@ -10,13 +10,11 @@ use crate::reference::splat::Images;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
 use wavesplat::colour::{ColourSpace, TransferFunction};
-use wavesplat::convert::{ConvertConfig, convert};
+use wavesplat::convert::{Basis, Bound, ConvertConfig, convert};
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 
 /// Largest rounding error of a colour as `f32`, for either way of computing it.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;

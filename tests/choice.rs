@@ -6,9 +6,11 @@ use crate::common::samples::bytes;
 use crate::common::{settings, stored};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::WindowCodec;
-use wavesplat::codec::encode::Encoder;
-use wavesplat::codec::scheme::{Axis, Basis, Pyramid, Scheme, Stencil};
+use wavesplat::convert::{Basis, Stencil};
+use wavesplat::internal::Encoder;
+use wavesplat::internal::Scheme;
+use wavesplat::internal::WindowCodec;
+use wavesplat_format::{Axis, Pyramid};
 use wavesplat_format::{BlockId, EncodedPart};
 
 const EDGE: usize = 24;

@@ -8,12 +8,10 @@ use crate::common::{Stored, direct, looking, pictures, settings, stored, windows
 use crate::images::{bits, under_less_memory};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, Bound, ConvertConfig};
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 19;
 

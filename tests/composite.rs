@@ -8,10 +8,9 @@ use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::colour::{ColourSpace, TransferFunction};
-use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
 use wavesplat::render::{CoefficientScene, Mode, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::view::camera::{Camera, View};
-use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 5;
 const GRID: Grid = Grid { dims: [13, 9, 11], spacing: [1.0, 0.8, 1.2], origin: [5.0, -2.0, 100.0] };

@@ -10,10 +10,8 @@ use std::process::Command;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::{ConvertConfig, convert};
+use wavesplat::convert::{Basis, Bound, ConvertConfig, convert};
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
-use wavesplat::wavelet::Basis;
 use xxhash_rust::xxh3::xxh3_64;
 
 const GRID: Grid = Grid { dims: [40, 33, 20], spacing: [1.0; 3], origin: [0.0; 3] };

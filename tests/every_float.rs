@@ -13,10 +13,9 @@ use std::time::Instant;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::WindowCodec;
-use wavesplat::codec::decode::Block;
-use wavesplat::convert::{ConvertConfig, convert};
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, ConvertConfig, convert};
+use wavesplat::internal::Block;
+use wavesplat::internal::WindowCodec;
 use wavesplat_format::{BlockEntry, Reader};
 
 /// Voxels along the edge of a block. A row of blocks along z holds consecutive patterns.

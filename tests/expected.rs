@@ -6,9 +6,8 @@ use crate::common::views::{archive, field, view};
 use crate::common::{Stored, direct, looking, pictures, report, settings, stored, windows};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, SplatSource};
-use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 16;
 const GRID: Grid = Grid { dims: [36, 33, 24], spacing: [1.0; 3], origin: [0.0; 3] };

@@ -9,13 +9,12 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{ConvertConfig, PartialFile, SchemeConstraint, SpatialPredictor, resume};
+use wavesplat::convert::{
+    Basis, Bound, ConvertConfig, PartialFile, SchemeConstraint, SpatialPredictor, Stencil, resume,
+};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
 use wavesplat::file::verify::verify;
-use wavesplat::wavelet::Basis;
 use wavesplat_format::{CompletePrefix, Metadata};
 use xxhash_rust::xxh3::xxh3_64;
 

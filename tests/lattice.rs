@@ -6,10 +6,9 @@ use crate::images::under_less_memory;
 use crate::reference::splat::Images;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
 use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, Scene, SplatSource};
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 
 const FRAMES: usize = 9;
 

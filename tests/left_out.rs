@@ -6,12 +6,11 @@ use crate::common::views::{archive, field, view};
 use crate::common::{looking, pictures, rendered, settings, stored};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::WindowCodec;
-use wavesplat::codec::decode::Block;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat::file::CoefficientFile;
+use wavesplat::internal::Block;
+use wavesplat::internal::WindowCodec;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
-use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockEntry, PartKind};
 
 const FRAMES: usize = 16;

@@ -7,9 +7,8 @@ use std::path::Path;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat::extract::{ExtractConfig, ExtractReport, extract};
-use wavesplat::wavelet::Basis;
 use wavesplat_format::{
     BlockId, BlockStats, Compressor, EncodedBlock, FileId, PartKind, PartStats, Reader, Storage, WindowEnd,
     WindowRecord, Writer,

@@ -10,11 +10,9 @@ use std::process::Command;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
+use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::file::CoefficientFile;
-use wavesplat::wavelet::Basis;
 
 const FILES: usize = 300;
 

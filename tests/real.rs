@@ -4,10 +4,10 @@ use crate::common::views::{rounding, view};
 use crate::common::{looking, pictures, settings, stored};
 use std::path::PathBuf;
 use wavesplat::base::progress::Silent;
+use wavesplat::convert::Basis;
 use wavesplat::file::verify::verify;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, SplatSource};
 use wavesplat::source::{FrameSource, OpenOptions, open};
-use wavesplat::wavelet::Basis;
 
 fn plate() -> Option<Box<dyn FrameSource>> {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "shared", "data", "plate_jz.npy"].iter().collect();

@@ -12,12 +12,10 @@ use crate::reference::sampled::{Line, delta};
 use std::io::Write;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::ConvertConfig;
 use wavesplat::convert::sampled::pixels;
+use wavesplat::convert::{Basis, Bound, ConvertConfig};
 use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
 use wavesplat::source::FrameSource;
-use wavesplat::wavelet::Basis;
 
 /// The library cuts the kernel at six standard deviations and adds in a different order.
 const ROUNDING: f64 = 1e-6;

@@ -7,8 +7,7 @@ use crate::common::series::{Kind, Mask, volume};
 use crate::common::{report, settings, stored, times};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::ConvertConfig;
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat_format::CompletePrefix;
 
 const DISKS: usize = 20_000;

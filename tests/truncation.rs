@@ -13,9 +13,7 @@ use crate::reference::transform::{Matrix, ghm_matrix, haar_matrix, inverse, tran
 use crate::reference::truncate::{Measure, fewest};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, SpatialPredictor};
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor};
 
 const VOXELS: usize = 64;
 

@@ -6,10 +6,9 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
 use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render};
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 
 const GRID: Grid = Grid { dims: [20, 21, 90], spacing: [1.0, 0.9, 1.1], origin: [5.0, 0.0, -3.0] };
 const FRAMES: usize = 11;

@@ -102,7 +102,7 @@ pub enum Error {
 /// Why bytes cannot be read that a file had when it was opened; inside an [`io::Error`].
 #[derive(Debug, Clone, Copy, thiserror::Error)]
 #[error("became shorter while it was being read")]
-pub struct BecameShorter;
+pub(crate) struct BecameShorter;
 
 /// The library's result.
 pub type Result<T> = std::result::Result<T, Error>;

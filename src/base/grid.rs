@@ -35,7 +35,7 @@ impl Grid {
     }
 
     /// The grid of a region of this one, at the same place in the world.
-    pub fn crop(&self, region: &Region) -> Self {
+    pub(crate) fn crop(&self, region: &Region) -> Self {
         Self { dims: region.dims(), spacing: self.spacing, origin: self.position(region.start) }
     }
 }
@@ -79,7 +79,7 @@ impl Region {
     }
 
     /// The same box moved by `offset`.
-    pub fn moved_by(&self, offset: [usize; 3]) -> Self {
+    pub(crate) fn moved_by(&self, offset: [usize; 3]) -> Self {
         Self {
             start: std::array::from_fn(|a| self.start[a] + offset[a]),
             end: std::array::from_fn(|a| self.end[a] + offset[a]),

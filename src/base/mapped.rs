@@ -15,7 +15,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::ptr;
-use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::thread;
 use std::time::SystemTime;
 
@@ -37,7 +37,7 @@ impl Access {
 
 /// What tells that a file is still the same, with the same content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct State {
+pub(crate) struct State {
     /// Length in bytes.
     pub len: u64,
     modified: Option<SystemTime>,
@@ -51,7 +51,7 @@ impl State {
     }
 
     /// An error if a file that was in this state is `now` in another.
-    pub fn check(&self, path: &Path, now: &Self) -> Result<()> {
+    pub(crate) fn check(&self, path: &Path, now: &Self) -> Result<()> {
         let what = match now {
             now if now == self => return Ok(()),
             now if now.len != self.len => format!("{} bytes, now {}", self.len, now.len),
@@ -62,7 +62,7 @@ impl State {
     }
 
     /// An error if what has this name is no longer in this state.
-    pub fn check_path(&self, path: &Path) -> Result<()> {
+    pub(crate) fn check_path(&self, path: &Path) -> Result<()> {
         let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
         self.check(path, &Self::of(&now))
     }
@@ -70,13 +70,13 @@ impl State {
 
 /// An open file, and its state as it was at open.
 #[derive(Debug)]
+#[doc(hidden)]
 pub struct FileBytes {
     path: PathBuf,
     /// Closed once mapped: an archive may have more files than a process may hold open.
     file: Option<File>,
     state: State,
     map: Option<RegisteredMap>,
-    read: AtomicU64,
 }
 
 impl FileBytes {
@@ -96,7 +96,7 @@ impl FileBytes {
             _ => None,
         };
         let file = map.is_none().then_some(file);
-        Ok(Self { path: path.into(), file, state, map, read: AtomicU64::new(0) })
+        Ok(Self { path: path.into(), file, state, map })
     }
 
     /// The path it was opened by.
@@ -109,14 +109,14 @@ impl FileBytes {
         self.state.len
     }
 
-    /// Its state at open.
-    pub fn state(&self) -> State {
-        self.state
-    }
-
     /// Whether the file was empty at open.
     pub fn is_empty(&self) -> bool {
-        self.state.len == 0
+        self.len() == 0
+    }
+
+    /// Its state at open.
+    pub(crate) fn state(&self) -> State {
+        self.state
     }
 
     /// Copies `out.len()` bytes from `offset`.
@@ -134,22 +134,16 @@ impl FileBytes {
             })?,
             (None, None) => {} // no bytes at all
         }
-        self.read.fetch_add(out.len() as u64, Ordering::Relaxed);
         Ok(())
     }
 
-    /// Bytes that were copied out so far.
-    pub fn bytes_read(&self) -> u64 {
-        self.read.load(Ordering::Relaxed)
-    }
-
     /// Whether small reads are cheap (mapped), or worth joining into larger ones.
-    pub fn is_mapped(&self) -> bool {
+    pub(crate) fn is_mapped(&self) -> bool {
         self.map.is_some()
     }
 
     /// An error if what has the file's name is no longer in the state that the file had at open.
-    pub fn check_unchanged(&self) -> Result<()> {
+    pub(crate) fn check_unchanged(&self) -> Result<()> {
         self.state.check_path(&self.path)
     }
 }
@@ -234,6 +228,7 @@ impl Slot {
 /// the limit on a file's size an error like others, not the process's end.
 ///
 /// For programs, called once at their start. A library must not take over signals.
+#[doc(hidden)]
 pub fn explain_sigbus() {
     // SAFETY: `action` is zeroed (a valid value: no flags, empty mask) and then filled in; the handler only uses
     // async-signal-safe calls (`write`, `_exit`) and lock-free atomics. Ignoring a signal runs nothing.
@@ -253,6 +248,7 @@ const WAITING_STACK: usize = 256 << 10;
 /// ends the process at once. Signals that are ignored, as those of a background job may be, stay so.
 ///
 /// For programs, called once at their start, before any thread: those that come inherit what is blocked.
+#[doc(hidden)]
 pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
     // SAFETY: both sets are made by `sigemptyset`, `was` is zeroed and filled in by `sigaction`, which changes nothing where
     // it is given no new action. Only the mask of this thread changes, and that of the thread that waits.

@@ -12,5 +12,7 @@ pub(crate) mod half;
 pub mod sample;
 pub mod grid;
 pub mod mapped;
+#[doc(hidden)]
 pub mod output;
+#[doc(hidden)]
 pub mod npy;

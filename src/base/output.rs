@@ -2,7 +2,8 @@
 
 mod names;
 
-pub use names::{Numbered, names_of_views};
+pub(crate) use names::Numbered;
+pub use names::names_of_views;
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use std::ffi::OsString;
@@ -59,7 +60,7 @@ fn parts() -> MutexGuard<'static, Vec<(PathBuf, Arc<AtomicBool>)>> {
 
 /// Removes all unfinished files but those that can be gone on with, which it names. The process must end now: whoever gives a
 /// file its name, or takes one away, waits for ever.
-pub fn abandon() -> Vec<PathBuf> {
+pub(crate) fn abandon() -> Vec<PathBuf> {
     let parts = parts();
     let is_kept = |keep: &AtomicBool| keep.load(Ordering::Relaxed);
     for (path, _) in parts.iter().filter(|(_, keep)| !is_kept(keep)) {
@@ -82,7 +83,7 @@ impl Drop for Part {
 
 impl Output {
     /// Bytes that are collected before they are written.
-    pub const BUFFER: usize = 256 << 10;
+    pub(crate) const BUFFER: usize = 256 << 10;
 
     /// Opens `path`, or standard output for `-`. An existing file is an error unless `force` replaces it.
     pub fn create(path: &Path, force: bool) -> Result<Self> {
@@ -111,7 +112,7 @@ impl Output {
 
     /// As [`Self::create`], but of a file what is flushed is kept whatever comes, to be gone on with; and what an earlier
     /// run left is still there, until [`Self::begin_at`] says from where on to write.
-    pub fn resumable(path: &Path, force: bool) -> Result<Self> {
+    pub(crate) fn resumable(path: &Path, force: bool) -> Result<Self> {
         let mut out = Self::create_after(path, force, |_| Ok(()))?;
         if let Target::File(part, file) = &mut out.target {
             let held = file.get_ref().metadata().map_or(0, |m| m.len());
@@ -130,7 +131,7 @@ impl Output {
     }
 
     /// Leaves the first `bytes` of an unfinished file, after which writing goes on.
-    pub fn begin_at(&mut self, bytes: u64) -> Result<()> {
+    pub(crate) fn begin_at(&mut self, bytes: u64) -> Result<()> {
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         part.set_kept(bytes > 0);
         let cut = file.get_mut().set_len(bytes).and_then(|()| file.seek(SeekFrom::Start(bytes)));
@@ -161,7 +162,7 @@ impl Output {
     }
 
     /// The name for messages.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 

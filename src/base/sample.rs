@@ -28,7 +28,7 @@ pub fn load(ty: SampleType, bytes: &[u8], out: &mut [f64]) {
 }
 
 /// As [`load`], each number made another by `of`.
-pub fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) -> T) {
+pub(crate) fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) -> T) {
     assert_eq!(bytes.len(), out.len() * ty.size(), "bytes of {} samples", out.len());
     macro_rules! run {
         ($t:ty, $bytes:expr, $out:expr) => {
@@ -41,7 +41,7 @@ pub fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) 
 }
 
 /// Fills each of `out` with `N` neighbouring samples, those of the next one `stride` samples further on.
-pub fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride: usize, out: &mut [[f64; N]]) {
+pub(crate) fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride: usize, out: &mut [[f64; N]]) {
     macro_rules! run {
         ($t:ty, $bytes:expr, $out:expr) => {{
             let samples = $bytes.as_chunks::<{ size_of::<$t>() }>().0;
@@ -109,7 +109,7 @@ pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
 
 /// Whether any value is missing; all are looked at, as vector code does.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-pub fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
+pub(crate) fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut any = false;
     for v in values {
@@ -120,13 +120,13 @@ pub fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) 
 }
 
 /// A declared missing value as samples of type `ty` have it: 1e35 is another number as f32 than as f64.
-pub fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
+pub(crate) fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
     declared.map(|v| if ty.is_float() { round_to(ty, v) } else { v })
 }
 
 /// The range of some values; none if any of them is missing. For runs long enough to pay for vector code.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-pub fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
+pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut all = Range::<SIDE_BY_SIDE>::NOTHING;
     let (many, rest) = values.as_chunks();
@@ -196,7 +196,7 @@ impl<const N: usize> Range<N> {
 }
 
 /// What storing a few values as `ty` leaves, as [`round_to`].
-pub fn round_all<const N: usize>(ty: SampleType, values: &[f64; N]) -> [f64; N] {
+pub(crate) fn round_all<const N: usize>(ty: SampleType, values: &[f64; N]) -> [f64; N] {
     match ty {
         SampleType::F64 => *values,
         SampleType::F32 => values.map(|v| f64::from(v as f32)),
@@ -205,7 +205,7 @@ pub fn round_all<const N: usize>(ty: SampleType, values: &[f64; N]) -> [f64; N] 
 }
 
 /// Calls `visit(index of the first, values)` for all samples, a run at a time.
-pub fn for_each_run(ty: SampleType, samples: &[u8], mut visit: impl FnMut(usize, &[f64])) {
+pub(crate) fn for_each_run(ty: SampleType, samples: &[u8], mut visit: impl FnMut(usize, &[f64])) {
     const RUN: usize = 512;
     let mut values = [0.0; RUN];
     for (run, bytes) in samples.chunks(RUN * ty.size()).enumerate() {
@@ -223,7 +223,7 @@ pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
 }
 
 /// How far rounding to a type moves numbers that are no larger than `magnitude`, at most.
-pub fn rounding(ty: SampleType, magnitude: f64) -> f64 {
+pub(crate) fn rounding(ty: SampleType, magnitude: f64) -> f64 {
     match ty {
         SampleType::F16 => magnitude * 2f64.powi(-11),
         SampleType::F32 => magnitude * 2f64.powi(-24),
@@ -233,7 +233,7 @@ pub fn rounding(ty: SampleType, magnitude: f64) -> f64 {
 }
 
 /// The largest absolute value in a range; 0 if it is empty.
-pub fn magnitude((lo, hi): (f64, f64)) -> f64 {
+pub(crate) fn magnitude((lo, hi): (f64, f64)) -> f64 {
     if lo <= hi { (-lo).max(hi) } else { 0.0 }
 }
 

@@ -84,7 +84,7 @@ pub fn range_bound(tolerance: f64, range: (f64, f64)) -> f64 {
 
 /// `tolerance` times the larger of |`value`| and `floor`, rounded down: the error that [`Bound::Relative`] allows (eq
 /// 22).
-pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
+pub(crate) fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
     product_down(tolerance, value.abs().max(floor))
 }
 
@@ -101,7 +101,7 @@ pub struct ErrorBound {
 
 /// How the share of a series follows from the shares of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
+pub(crate) enum Measure {
     /// The largest.
     Largest,
     /// The root mean square.
@@ -110,7 +110,7 @@ pub enum Measure {
 
 impl ErrorBound {
     /// How the share of a series follows from the shares of its samples.
-    pub fn measure(&self) -> Measure {
+    pub(crate) fn measure(&self) -> Measure {
         match self.bound {
             Bound::Pointwise | Bound::Relative { .. } => Measure::Largest,
             Bound::Rms | Bound::Sampled { .. } => Measure::RootMeanSquare,
@@ -119,7 +119,7 @@ impl ErrorBound {
 
     /// The error allowed to a sample of this value, rounded down. For a bound of the mean, the allowed root mean
     /// square.
-    pub fn allowed(&self, value: f64) -> f64 {
+    pub(crate) fn allowed(&self, value: f64) -> f64 {
         match self.bound {
             Bound::Relative { floor } => relative_bound(self.tolerance, floor, value),
             _ => self.delta,
@@ -128,7 +128,7 @@ impl ErrorBound {
 
     /// Whether the errors of one series are within the bound (eq 21-23). For each frame: the error, rounded up, and the
     /// allowed error.
-    pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
+    pub(crate) fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
         match self.measure() {
             Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
             Measure::RootMeanSquare => {
@@ -145,7 +145,7 @@ impl ErrorBound {
     }
 
     /// The share of a series, rounded up; `errors` are as for [`Self::holds`].
-    pub fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
+    pub(crate) fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
         let frames = errors.len() as f64;
         let add = |(largest, squares): (f64, f64), (e, allowed)| {
             let share = share(e, allowed);
@@ -161,7 +161,7 @@ impl ErrorBound {
 
     /// Adds the errors of the next frame of `N` series with samples `values` to the sums for [`Self::largest_share`].
     /// This is vector code without directed rounding.
-    pub fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
+    pub(crate) fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
         for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
             match self.bound {
                 Bound::Pointwise => *sum = if *e > *sum { *e } else { *sum },
@@ -178,7 +178,7 @@ impl ErrorBound {
     }
 
     /// An upper bound of the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
-    pub fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
+    pub(crate) fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         match self.bound {
             Bound::Pointwise if largest > 0.0 => share(largest.next_up(), self.delta),
@@ -196,7 +196,7 @@ impl ErrorBound {
     /// The largest quantisation step for which rounding alone stays within the allowed `error` (eq 25).
     ///
     /// `gain` is the largest sum of |u_k(t)| over k ([`crate::wavelet::gain`]). Bounds of the mean ignore it.
-    pub fn step(&self, error: f64, gain: f64) -> f64 {
+    pub(crate) fn step(&self, error: f64, gain: f64) -> f64 {
         match self.measure() {
             Measure::Largest => 2.0 * error / gain,
             // Rounding has a root mean square of step / sqrt 12; the rest of the budget is for dropped coefficients.
@@ -209,14 +209,14 @@ impl ErrorBound {
 const UP: f64 = 1.0 + 1e-12;
 
 /// The share: an error, rounded up, divided by the allowed error, rounded down. The result is rounded up.
-pub fn share(error: f64, allowed: f64) -> f64 {
+pub(crate) fn share(error: f64, allowed: f64) -> f64 {
     if error > 0.0 { (error / allowed).next_up() } else { 0.0 }
 }
 
 /// The largest error before rounding to the sample type that stays within `delta` after it; 0 or less if none does.
 ///
 /// `magnitude` is the largest absolute value of the samples.
-pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
+pub(crate) fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
         SampleType::F32 => delta - magnitude * f64::from(f32::EPSILON) - f64::from(f32::from_bits(1)),

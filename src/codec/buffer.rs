@@ -11,7 +11,7 @@ pub struct Buffer<T: Pooled>(Vec<T>);
 
 impl<T: Pooled> Buffer<T> {
     /// Creates a slice of `len` entries with arbitrary values.
-    pub fn of(len: usize) -> Self {
+    pub(crate) fn of(len: usize) -> Self {
         let mut values = spare::<T>().pop().unwrap_or_default();
         if values.capacity() < len {
             values = Vec::new(); // avoids copying old values

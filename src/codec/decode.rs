@@ -70,7 +70,7 @@ impl Block {
     }
 
     /// A block with every sample missing: NaN for float types, else the declared value, or 0 without one.
-    pub fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
+    pub(crate) fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
         let voxels: usize = size.iter().product();
         let samples = codec.frames() * voxels;
         let number = if codec.sample.is_float() { f64::NAN } else { codec.missing_value.unwrap_or(0.0) };
@@ -113,19 +113,19 @@ impl Block {
 
     /// Decodes all codes of a pyramid, if that is needed at once: because one k cannot be decoded without the others,
     /// or because some samples are overridden.
-    pub fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
+    pub(crate) fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
         at_once.then(|| Field::refined(codec, self.size, self.step, &self.codes))
     }
 
     /// Whether any sample is stored exactly, and overrides the coefficients.
-    pub fn overrides(&self) -> bool {
+    pub(crate) fn overrides(&self) -> bool {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
     /// Decodes the codes of one k into `scratch`.
-    pub fn plane<'a>(
+    pub(crate) fn plane<'a>(
         &'a self,
         codec: &WindowCodec,
         k: usize,
@@ -147,7 +147,7 @@ impl Block {
     }
 
     /// Whether a sample is missing.
-    pub fn is_missing(&self, index: usize) -> bool {
+    pub(crate) fn is_missing(&self, index: usize) -> bool {
         self.missing.0.get(index).copied().unwrap_or(false)
     }
 
@@ -163,7 +163,7 @@ impl Block {
     }
 
     /// The series of one voxel, decoded from the coefficients.
-    pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
+    pub(crate) fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
         field.series(codec.basis.as_ref(), self.voxels, voxel)
     }
 
@@ -173,7 +173,7 @@ impl Block {
     }
 
     /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.
-    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
+    pub(crate) fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
         let mut values = Buffer::of(codec.frames() * self.voxels);
         let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
         if self.exact.is_some() {

@@ -99,11 +99,6 @@ impl<'a> Field<'a> {
         Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
     }
 
-    /// Whether all coefficients are zero.
-    pub fn is_zero(&self) -> bool {
-        !self.marked.contains(&true)
-    }
-
     /// The coefficient at `k * voxels + voxel`.
     pub fn at(&self, index: usize) -> f64 {
         match &self.values {
@@ -157,7 +152,7 @@ impl<'a> Field<'a> {
     }
 
     /// The coefficients of one k, converted into `scratch` if needed.
-    pub fn plane<'p>(&'p self, k: usize, voxels: usize, scratch: &'p mut Vec<f64>) -> Plane<'p> {
+    pub(crate) fn plane<'p>(&'p self, k: usize, voxels: usize, scratch: &'p mut Vec<f64>) -> Plane<'p> {
         let range = k * voxels..(k + 1) * voxels;
         match &self.values {
             _ if !self.marked[k] => Plane::Zero,

@@ -4,19 +4,19 @@
 //! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
 //! renderer use it. To change the transform along time, only this folder's use of [`crate::wavelet`] must change.
 
-pub mod bound;
-pub mod buffer;
+pub(crate) mod bound;
+pub(crate) mod buffer;
 mod check;
-pub mod decode;
-pub mod encode;
-pub mod field;
+pub(crate) mod decode;
+pub(crate) mod encode;
+pub(crate) mod field;
 mod gain;
 mod load;
 pub(crate) mod pyramid;
 pub(crate) mod real;
 mod refine;
 mod rows;
-pub mod scheme;
+pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
 mod weigh;
@@ -87,7 +87,7 @@ impl WindowCodec {
     }
 
     /// The largest number of level parts of a block.
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         if self.scheme.pyramid.is_some() { usize::from(Pyramid::PARTS) } else { self.levels.len() }
     }
 
@@ -121,13 +121,13 @@ impl WindowCodec {
     }
 
     /// Whether a sample is missing: not finite, or equal to the declared value.
-    pub fn is_missing(&self, value: f64) -> bool {
+    pub(crate) fn is_missing(&self, value: f64) -> bool {
         sample::is_missing(value, self.missing_value)
     }
 
     /// The larger of the errors of the splatted and the extracted value, rounded up. Infinite if the extracted value
     /// would be read as missing.
-    pub fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
+    pub(crate) fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
         let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
         if lost { f64::INFINITY } else { a.max(b) }

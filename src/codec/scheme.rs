@@ -1,7 +1,7 @@
 //! Schemes: the transform and the pyramid that code the blocks of a window.
 
 use crate::wavelet::{self, TimeBasis};
-pub use wavesplat_format::{Axis, Basis, Pyramid, Stencil, Window};
+pub(crate) use wavesplat_format::{Axis, Basis, Pyramid, Stencil, Window};
 
 /// How the blocks of one window are coded.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,12 +30,12 @@ impl Scheme {
     }
 
     /// The transform along time of a window of `frames` frames.
-    pub fn time_basis(&self, frames: usize) -> Box<dyn TimeBasis> {
+    pub(crate) fn time_basis(&self, frames: usize) -> Box<dyn TimeBasis> {
         wavelet::basis(self.basis, &self.functions, frames)
     }
 
     /// A name for reports: the transform, and the pyramid's stencil and axes.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let Some(pyramid) = &self.pyramid else { return self.basis.name().into() };
         let axes: String = pyramid.order.iter().map(|axis| format!("{axis:?}").to_lowercase()).collect();
         let stencil = format!("{:?}", pyramid.stencil).to_lowercase();

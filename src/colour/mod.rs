@@ -158,7 +158,7 @@ impl TransferFunction {
     }
 
     /// The values of the first and the last opacity.
-    pub fn opacity_range(&self) -> (f64, f64) {
+    pub(crate) fn opacity_range(&self) -> (f64, f64) {
         (self.opacity[0].0, self.opacity[self.opacity.len() - 1].0)
     }
 
@@ -224,7 +224,7 @@ impl TransferFunction {
     }
 
     /// The colours as text. [`Self::of_text`] restores them exactly.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match &self.colours {
             Colours::Named(named) => format!("{} {:?} {:?}", named.name, self.range.0, self.range.1),
             Colours::Points(points, space) => {
@@ -236,7 +236,7 @@ impl TransferFunction {
     }
 
     /// Restores the colours from [`Self::text`]; `None` for any other text.
-    pub fn of_text(text: &str) -> Option<Self> {
+    pub(crate) fn of_text(text: &str) -> Option<Self> {
         let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().ok()).collect::<Option<Vec<f64>>>();
         let Some((space, points)) = text.split_once(';') else {
             let (name, range) = text.split_once(' ')?;

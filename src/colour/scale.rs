@@ -74,7 +74,7 @@ impl Scale {
     }
 
     /// The same as [`Self::colour_of_pixel`], but neither rounded nor from a table.
-    pub fn exact_colour_of_pixel(&self, numbers: &[f32]) -> Colour {
+    pub(crate) fn exact_colour_of_pixel(&self, numbers: &[f32]) -> Colour {
         let background = || self.background.map(|c| f64::from(c) / 255.0);
         match *numbers {
             _ if numbers.iter().any(|n| n.is_nan()) => background(),
@@ -98,7 +98,7 @@ impl Scale {
     }
 
     /// The position of a value in the range, 0 to 1; 0 for NaN.
-    pub fn share(&self, value: impl Into<f64>) -> f64 {
+    pub(crate) fn share(&self, value: impl Into<f64>) -> f64 {
         let normed = |v: f64| if self.norm == Norm::Log { libm::log(v.max(f64::MIN_POSITIVE)) } else { v };
         let (lo, hi) = (normed(self.range.0), normed(self.range.1));
         let t = (normed(value.into()) - lo) / (hi - lo);
@@ -116,7 +116,7 @@ impl Scale {
     }
 
     /// Whether every colour is a grey.
-    pub fn is_grey(&self) -> bool {
+    pub(crate) fn is_grey(&self) -> bool {
         let [r, g, b] = self.background;
         self.map.is_grey() && r == g && g == b
     }

@@ -20,6 +20,7 @@ pub mod estimate;
 mod gather;
 mod learn;
 mod record;
+#[doc(hidden)]
 pub mod sampled;
 mod settings;
 mod task;
@@ -30,9 +31,8 @@ use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
-pub use crate::codec::bound::Bound;
+pub use crate::codec::bound::{Bound, range_bound};
 use crate::codec::encode::{Encoded, Encoder};
-pub use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
@@ -43,6 +43,7 @@ use gather::Batch;
 use rayon::prelude::*;
 use record::Recorder;
 use serde::Serialize;
+#[doc(hidden)]
 pub use settings::{of_file, options};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -50,7 +51,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
 pub use to_file::convert_to_file;
-pub use wavesplat_format::Basis;
+pub use wavesplat_format::{Basis, Stencil};
 use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
@@ -224,6 +225,7 @@ pub fn resume<W: Write>(
 }
 
 /// The metadata of a file of `archive` before its first frame: all that is decided without reading samples.
+#[doc(hidden)]
 pub fn open_partial(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
     let Task { config, archive, colour_transform } = &Task::new(config, archive);
     Plan::new(config, archive, colour_transform.as_ref()).map(|plan| plan.start)

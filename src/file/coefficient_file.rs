@@ -125,6 +125,7 @@ impl CoefficientFile {
     }
 
     /// The type of the source's samples, and what stands for a missing one.
+    #[doc(hidden)]
     pub fn of_source(&self) -> (SampleType, Option<f64>) {
         let plain = (self.sample(), self.metadata().missing_value);
         self.colour_transform
@@ -145,12 +146,14 @@ impl CoefficientFile {
     }
 
     /// The same as far as the source's samples are known to lie within.
+    #[doc(hidden)]
     pub fn source_range(&self) -> (f64, f64) {
         let ((lo, hi), (least, most)) = (self.value_range(), self.metadata().range());
         if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
     }
 
     /// Samples or coefficients, whichever are more, of the largest block.
+    #[doc(hidden)]
     pub fn largest_block(&self) -> usize {
         let windows = &self.metadata().windows;
         let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
@@ -159,7 +162,7 @@ impl CoefficientFile {
 
     /// Bytes that the largest block takes as it is read and refined: payload, codes, coefficients, what is missing, and
     /// what is stored exactly.
-    pub fn block_bytes(&self) -> usize {
+    pub(crate) fn block_bytes(&self) -> usize {
         let payload = 5;
         self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
     }
@@ -176,17 +179,19 @@ impl CoefficientFile {
     }
 
     /// What decoding a window's blocks takes.
+    #[doc(hidden)]
     pub fn codec(&self, window: u32) -> Result<WindowCodec> {
         WindowCodec::of_file(self.metadata(), &self.metadata().windows[window as usize]).map_err(|e| self.failed(e))
     }
 
     /// The directory's leaves of a window, of all channels.
+    #[doc(hidden)]
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
         self.reader.leaves(window)
     }
 
     /// The directory's leaves of one channel of a window.
-    pub fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
+    pub(crate) fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
         let leaves = self.leaves(window);
         let each = leaves.len() / self.channels();
         leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
@@ -230,12 +235,13 @@ impl CoefficientFile {
     }
 
     /// Whether any sample of a window may be missing.
-    pub fn has_missing(&self, window: u32) -> bool {
+    pub(crate) fn has_missing(&self, window: u32) -> bool {
         let record = &self.metadata().windows[window as usize];
         record.missing > 0 || self.skipped().is_some_and(|damage| damage.of_window(window))
     }
 
     /// The entries of a leaf's blocks.
+    #[doc(hidden)]
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
         let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
@@ -247,6 +253,7 @@ impl CoefficientFile {
     }
 
     /// The entries of the blocks of a channel and window that touch a region, in order, a leaf of the directory at a time.
+    #[doc(hidden)]
     pub fn entries<'a>(
         &'a self,
         window: u32,
@@ -260,6 +267,7 @@ impl CoefficientFile {
     }
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
+    #[doc(hidden)]
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         self.block_from(&self.reader, codec, entry, wanted)
     }
@@ -281,12 +289,17 @@ impl CoefficientFile {
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
-    pub fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
+    pub(crate) fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
         self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of a leaf and its blocks, of these entries, that is in no part; `found` is told what is wrong.
-    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+    pub(crate) fn check_leaf(
+        &self,
+        leaf: &LeafEntry,
+        blocks: &[BlockEntry],
+        found: &mut dyn FnMut(Error),
+    ) -> Result<()> {
         self.reader.check_leaf(leaf, blocks, &mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
@@ -305,7 +318,7 @@ impl CoefficientFile {
     }
 
     /// All of its windows, once every byte of them was seen to be whole.
-    pub fn whole_windows(&self) -> Result<CompletePrefix> {
+    pub(crate) fn whole_windows(&self) -> Result<CompletePrefix> {
         let whole = CompletePrefix::read(self.reader.storage()).map_err(|e| self.failed(e))?;
         match whole.metadata() == self.metadata() {
             true => Ok(whole),
@@ -326,7 +339,7 @@ impl CoefficientFile {
     }
 
     /// The error of a file whose parts contradict each other.
-    pub fn contradiction(&self, what: String) -> Error {
+    pub(crate) fn contradiction(&self, what: String) -> Error {
         self.failed(wavesplat_format::Error::Invalid(what))
     }
 

@@ -29,22 +29,22 @@ pub struct ColourTransform {
 
 impl ColourTransform {
     /// The type of a channel's samples: 0 to 1, NaN what is missing.
-    pub const SAMPLE: SampleType = SampleType::F32;
+    pub(crate) const SAMPLE: SampleType = SampleType::F32;
 
     /// The names of its settings in a file of colours, and what messages call them: the transfer function, the type of
     /// the source's samples, and if one was declared the value that means "missing" among these.
-    pub const SETTINGS: [(&'static str, &'static str); 3] =
+    pub(crate) const SETTINGS: [(&'static str, &'static str); 3] =
         [("colours", "transfer function"), ("dtype", "type of samples"), ("missing-value", "missing value")];
 
     /// What a file remembers of it.
-    pub fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
+    pub(crate) fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
         let Self { colours, sample, missing_value } = self;
         let values = [Some(colours.text()), Some(sample.to_string()), missing_value.map(|v| format!("{v:?}"))];
         Self::SETTINGS.into_iter().zip(values).filter_map(|((name, _), value)| Some((name, value?)))
     }
 
     /// From [`Self::settings`], as they are found by their names; none if they are not all there, or no such settings.
-    pub fn of_settings<'a>(find: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
+    pub(crate) fn of_settings<'a>(find: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
         let [colours, sample, missing] = Self::SETTINGS.map(|(name, _)| find(name));
         let missing_value = match missing {
             Some(value) => Some(value.parse().ok()?),
@@ -54,7 +54,7 @@ impl ColourTransform {
     }
 
     /// One channel of the colours of some samples, little-endian as these. `out` has room for as many of [`Self::SAMPLE`].
-    pub fn paint(&self, channel: usize, samples: &[u8], out: &mut [u8]) {
+    pub(crate) fn paint(&self, channel: usize, samples: &[u8], out: &mut [u8]) {
         let first = (0.0_f64, self.component(channel, 0.0));
         let last = Cell::new(first); // neighbours are often equal
         sample::load_as(self.sample, samples, out.as_chunks_mut().0, |value: f64| {

@@ -140,10 +140,10 @@ pub struct Units {
 
 impl Units {
     /// Names of settings that units are kept under.
-    pub const SETTINGS: [&'static str; 4] = ["units", "time-units", "space-units", "calendar"];
+    pub(crate) const SETTINGS: [&'static str; 4] = ["units", "time-units", "space-units", "calendar"];
 
     /// The units that are known, as settings.
-    pub fn settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
+    pub(crate) fn settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let units = [&self.samples, &self.times, &self.space, &self.calendar];
         Self::SETTINGS.into_iter().zip(units).filter_map(|(name, unit)| Some((name, unit.as_deref()?)))
     }

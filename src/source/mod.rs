@@ -26,7 +26,9 @@ pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;
+#[doc(hidden)]
 pub use formats::{ArrayHeader, array_header, extensions};
+#[doc(hidden)]
 pub use inputs::files;
 pub use scan::value_range;
 pub use select::{Selection, select};

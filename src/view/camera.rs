@@ -101,7 +101,7 @@ impl Camera {
     }
 
     /// The change of the projection, [x, y, depth], for a step of `length` along a world axis.
-    pub fn step(&self, axis: usize, length: f64) -> [f64; 3] {
+    pub(crate) fn step(&self, axis: usize, length: f64) -> [f64; 3] {
         let along = |screen: [f64; 3]| screen[axis] * length;
         [self.scale * along(self.right), -self.scale * along(self.up), along(self.forward)]
     }
@@ -117,18 +117,18 @@ impl Camera {
     }
 
     /// The depths of the nearest and of the farthest corner of `grid`, in world units.
-    pub fn depths_of(&self, grid: &Grid) -> [f64; 2] {
+    pub(crate) fn depths_of(&self, grid: &Grid) -> [f64; 2] {
         [self.nearest_of(grid), corners(grid).map(|p| self.project(p)[2]).fold(f64::NEG_INFINITY, f64::max)]
     }
 
     /// The depth of the nearest corner of `grid`, which may be a part of the camera's grid.
-    pub fn nearest_of(&self, grid: &Grid) -> f64 {
+    pub(crate) fn nearest_of(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
     }
 
     /// Bounds of the rounding error in the projection of any voxel of `grid`: pixels along each axis, and world units
     /// of depth.
-    pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
+    pub(crate) fn rounding(&self, grid: &Grid) -> (f64, f64) {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
         let far = corners(grid).map(size).fold(size(self.center), f64::max);
         let depth = 64.0 * f64::EPSILON * far; // some twenty operations on numbers of at most twice this size

@@ -90,7 +90,7 @@ impl Method {
 
 /// The footprint of a view, at any position and depth.
 #[derive(Debug, Clone, Copy)]
-pub struct Footprint {
+pub(crate) struct Footprint {
     /// Pixels from the centre to the cut.
     pub reach: f64,
     /// f at the centre of the footprint.
@@ -104,7 +104,7 @@ pub struct Footprint {
 
 impl Footprint {
     /// The footprint of a kernel seen at `scale` pixels per world unit, splatted by `method` (eq 2).
-    pub fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Result<Self> {
+    pub(crate) fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Result<Self> {
         let Kernel { sigma, tau } = kernel;
         let cell: f64 = grid.spacing.iter().product();
         let in_pixels = sigma * scale;
@@ -121,14 +121,14 @@ impl Footprint {
     }
 
     /// The weight exp(-tau z) f(0, 0) that a voxel at depth `z` has at its centre (eq 3).
-    pub fn at_depth(&self, z: f64) -> f64 {
+    pub(crate) fn at_depth(&self, z: f64) -> f64 {
         self.peak * libm::exp(-self.tau * z)
     }
 
     /// The sum of weights at a point of `count` voxels in a row. The first voxel is `off` pixels from the point at
     /// depth `z`; each next voxel is a `step` in pixels and a step in depth further. The voxels should not lie much
     /// further than the reach.
-    pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
+    pub(crate) fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
         if self.decay > NARROW || exponent(off, z) > DEEP {
@@ -148,30 +148,25 @@ impl Footprint {
     }
 
     /// The weight [x, y] pixels from a voxel, as a share of the weight at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
-    pub fn share(&self, [x, y]: [f64; 2]) -> f64 {
+    pub(crate) fn share(&self, [x, y]: [f64; 2]) -> f64 {
         libm::exp(-self.decay * (x * x + y * y))
     }
 
-    /// The standard deviation of the Gaussian, in pixels.
-    pub fn deviation(&self) -> f64 {
-        (0.5 / self.decay).sqrt()
-    }
-
     /// The sum of a footprint over all pixels, as a multiple of the weight at its centre.
-    pub fn area(&self) -> f64 {
+    pub(crate) fn area(&self) -> f64 {
         std::f64::consts::PI / self.decay
     }
 
     /// Bound of the relative rounding error of a weight, given the errors of its position (in pixels along each axis)
     /// and of its depth (in world units). The depth is at most `depth`.
-    pub fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {
+    pub(crate) fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {
         let across = 2.0 * self.decay * (self.reach + 1.0) * pixels;
         let along = self.tau * (off + 4.0 * f64::EPSILON * depth);
         libm::expm1(2.0 * across + along) + EXPONENTIALS
     }
 
     /// The pixels along one axis whose centres are within reach of `centre`; the axis has `pixels` pixels.
-    pub fn span(&self, centre: f64, pixels: usize) -> Range<usize> {
+    pub(crate) fn span(&self, centre: f64, pixels: usize) -> Range<usize> {
         let first = (centre - self.reach - 0.5).ceil().max(0.0);
         let end = ((centre + self.reach - 0.5).floor() + 1.0).min(pixels as f64);
         if first < end { first as usize..end as usize } else { 0..0 }
@@ -181,7 +176,7 @@ impl Footprint {
     ///
     /// Each factor is the previous one times a quotient, which itself changes by a constant factor. So a run takes two
     /// exponentials.
-    pub fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {
+    pub(crate) fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {
         out.clear();
         let run = if self.decay > STEEP { 1 } else { RUN };
         for first in span.clone().step_by(run) {

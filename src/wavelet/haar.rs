@@ -16,7 +16,7 @@ use super::{LANES, Lane, TimeBasis};
 
 /// The Haar basis for one window.
 #[derive(Debug)]
-pub struct Haar {
+pub(crate) struct Haar {
     frames: usize,
     /// The rotations (a, b) of each step, fine to coarse.
     steps: Vec<Vec<(f64, f64)>>,
@@ -24,7 +24,7 @@ pub struct Haar {
 
 impl Haar {
     /// Creates the basis for windows of `frames` frames, at least 1.
-    pub fn new(frames: usize) -> Self {
+    pub(crate) fn new(frames: usize) -> Self {
         let mut weights = vec![1.0; frames];
         let mut steps = Vec::new();
         while weights.len() > 1 {

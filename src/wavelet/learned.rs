@@ -11,7 +11,7 @@ const UNIT: f64 = 1.0 / 32768.0;
 
 /// Orthonormal functions.
 #[derive(Debug)]
-pub struct Learned {
+pub(crate) struct Learned {
     /// `rows[k][t]`
     rows: Vec<Vec<f64>>,
     /// `columns[t][k]`
@@ -22,7 +22,7 @@ pub struct Learned {
 impl Learned {
     /// Creates a basis from `functions` (`frames` values each, in units of 2^-15), made orthonormal one after another,
     /// and completed by Haar functions.
-    pub fn new(functions: &[i16], frames: usize) -> Self {
+    pub(crate) fn new(functions: &[i16], frames: usize) -> Self {
         let learned = functions.chunks_exact(frames).map(|row| row.iter().map(|v| f64::from(*v) * UNIT).collect());
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(frames);
         let unit = |t| (0..frames).map(|s| if s == t { 1.0 } else { 0.0 }).collect();
@@ -41,7 +41,7 @@ impl Learned {
     }
 
     /// Rounds a function to the numbers that a file stores.
-    pub fn quantise(row: &[f64]) -> impl Iterator<Item = i16> {
+    pub(crate) fn quantise(row: &[f64]) -> impl Iterator<Item = i16> {
         row.iter().map(|v| (v / UNIT).round().clamp(-32767.0, 32767.0) as i16)
     }
 }

@@ -13,11 +13,11 @@ mod learned;
 mod multi;
 mod samples;
 
-pub use haar::Haar;
-pub use learned::Learned;
-pub use multi::Multi;
-pub use samples::Samples;
-pub use wavesplat_format::Basis;
+pub(crate) use haar::Haar;
+pub(crate) use learned::Learned;
+pub(crate) use multi::Multi;
+pub(crate) use samples::Samples;
+pub(crate) use wavesplat_format::Basis;
 
 use crate::base::error::{Error, Result};
 use std::fmt::Debug;
@@ -53,7 +53,7 @@ pub trait TimeBasis: Send + Sync + Debug {
     }
 }
 
-/// Creates the basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
+/// Creates the basis of a window of `frames` frames; `functions` are the learned ones, if any (`Learned::new`).
 pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis> {
     match kind {
         Basis::Haar => Box::new(Haar::new(frames)),
@@ -64,7 +64,7 @@ pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis
 }
 
 /// An error if full windows of `frames` frames do not suit the basis.
-pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
+pub(crate) fn check_window(kind: Basis, frames: usize) -> Result<()> {
     let (fits, rule) = match kind {
         Basis::Haar => (frames.is_power_of_two(), "a power of two, such as 32"),
         Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, such as 33"),
@@ -93,18 +93,18 @@ pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
 
 /// The largest sum over k of |u_k(t)| (eq 25). If every coefficient changes by at most e, a sample moves by at most
 /// gain * e.
-pub fn gain(synthesis: &[Vec<f64>]) -> f64 {
+pub(crate) fn gain(synthesis: &[Vec<f64>]) -> f64 {
     let frames = synthesis.first().map_or(0, Vec::len);
     (0..frames).map(|t| synthesis.iter().map(|u| u[t].abs()).sum()).fold(0.0, f64::max)
 }
 
 /// Which coefficients are needed to decode only `frames` of the window: those whose function is not zero there.
-pub fn needed(synthesis: &[Vec<f64>], frames: &[usize]) -> Vec<bool> {
+pub(crate) fn needed(synthesis: &[Vec<f64>], frames: &[usize]) -> Vec<bool> {
     synthesis.iter().map(|u| frames.iter().any(|t| u[*t] != 0.0)).collect()
 }
 
 /// Splits `0..K` into ranges as long as `lengths`.
-pub fn ranges(lengths: &[usize]) -> Vec<Range<usize>> {
+pub(crate) fn ranges(lengths: &[usize]) -> Vec<Range<usize>> {
     let mut start = 0;
     lengths
         .iter()

@@ -45,14 +45,14 @@ const END_WAVELET: [f64; 4] = [-10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 
 
 /// The multiwavelet basis for one window.
 #[derive(Debug)]
-pub struct Multi {
+pub(crate) struct Multi {
     frames: usize,
     intervals: usize,
 }
 
 impl Multi {
     /// Creates the basis for windows of `frames` frames, at least 1.
-    pub fn new(frames: usize) -> Self {
+    pub(crate) fn new(frames: usize) -> Self {
         Self { frames, intervals: frames.saturating_sub(1).div_ceil(2).max(1).next_power_of_two() }
     }
 }

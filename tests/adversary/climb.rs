@@ -7,8 +7,7 @@ use crate::common::samples::TYPES;
 use crate::common::{times, tried};
 use std::time::Instant;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, Bound};
 
 /// After this many rounds without a better series, a climber restarts elsewhere.
 const PATIENCE: usize = 12;

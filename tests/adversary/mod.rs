@@ -12,8 +12,8 @@ use crate::common::samples::{TYPES, bytes, special};
 use crate::common::series::{Kind, Mask, extremes};
 use proptest::prelude::*;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::wavelet::{Basis, LANES, Lane, TimeBasis, basis};
+use wavesplat::convert::{Basis, Bound};
+use wavesplat::internal::{LANES, Lane, TimeBasis, basis};
 
 /// The attacked encoder: one window in one block, whose first two voxels fix the range.
 #[derive(Debug, Clone)]

@@ -13,10 +13,10 @@ use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
+use wavesplat::convert::Basis;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, SplatSource, render};
 use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
-use wavesplat::wavelet::Basis;
 
 /// A compensated sum, which keeps the rounding errors.
 #[derive(Default)]

@@ -9,9 +9,8 @@ use crate::common::views::{SKEWED, field, rounding, truth, view};
 use crate::common::{Stored, extracted, looking, pictures, settings, stored, windows};
 use crate::images::bits;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
-use wavesplat::wavelet::Basis;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
 const FRAMES: usize = 11;

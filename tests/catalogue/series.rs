@@ -11,10 +11,8 @@ use crate::common::views::{archive, view};
 use crate::common::{direct, extracted, looking, pictures, settings, stored, windows};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, Bound, ConvertConfig};
 use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
-use wavesplat::wavelet::Basis;
 
 #[test]
 fn neighbours_of_a_spike_keep_the_bound_of_the_range() {

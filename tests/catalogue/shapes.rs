@@ -6,8 +6,8 @@ use crate::common::views::{archive, field, rounding, truth, view};
 use crate::common::{extracted, looking, pictures, settings, stored};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
+use wavesplat::convert::Basis;
 use wavesplat::render::{CoefficientScene, Quantity, SplatSource};
-use wavesplat::wavelet::Basis;
 
 #[test]
 fn an_axis_of_length_1_is_like_any_other() {

@@ -5,7 +5,7 @@ use crate::common::random::Random;
 use crate::common::samples::{TYPES, bytes};
 use crate::common::series::{Mask, extremes};
 use wavesplat::base::sample::SampleType;
-use wavesplat::codec::bound::Bound;
+use wavesplat::convert::Bound;
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
 

@@ -5,7 +5,7 @@ use crate::common::memory::Memory;
 use crate::common::{settings, stored_with_a_lie};
 use wavesplat::base::grid::{BlockGrid, Grid};
 use wavesplat::base::sample::SampleType;
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::Basis;
 use wavesplat_format::{Compressor, EncodedBlock, Metadata, PartKind, PartStats, pack_missing};
 
 const MODES: [(&str, &str); 5] = [

@@ -15,15 +15,14 @@ use tempfile::TempDir;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
-use wavesplat::codec::encode::Encoder;
-use wavesplat::convert::{ConvertConfig, ConvertReport, MissingPolicy, convert};
+use wavesplat::convert::{Basis, ConvertConfig, ConvertReport, MissingPolicy, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
+use wavesplat::internal::Encoder;
 use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
-use wavesplat::wavelet::Basis;
 use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord, Writer};
 
 /// A memory budget that suffices for every test.

@@ -9,11 +9,10 @@ use crate::common::views::field;
 use crate::common::{BASES, looking, settings};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::ConvertConfig;
+use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat::render::{Quantity, RenderConfig, SplatSource};
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
-use wavesplat::wavelet::Basis;
 
 /// The ranges from which scenes are drawn.
 #[derive(Debug, Clone, Copy)]

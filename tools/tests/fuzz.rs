@@ -10,9 +10,7 @@ use fuzz::{TARGETS, Target};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::sample::{SampleType, store};
-use wavesplat::codec::bound::Bound;
-use wavesplat::convert::{ConvertConfig, MissingPolicy};
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, Bound, ConvertConfig, MissingPolicy};
 use wavesplat_format::*;
 
 fn folder(name: &str) -> PathBuf {

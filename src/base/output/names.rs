@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Names of numbered files, a frame in each.
 #[derive(Debug)]
-pub struct Numbered {
+pub(crate) struct Numbered {
     before: String,
     after: String,
     /// Digits of the number; none: there is but one file.
@@ -15,7 +15,7 @@ pub struct Numbered {
 
 impl Numbered {
     /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one frame.
-    pub fn new(path: &Path, frames: usize) -> Result<Self> {
+    pub(crate) fn new(path: &Path, frames: usize) -> Result<Self> {
         let name = path.to_string_lossy().into_owned();
         let Some((before, digits, after)) = place_of_number(&name, 'd') else {
             if name.contains('%') {
@@ -35,12 +35,12 @@ impl Numbered {
     }
 
     /// Of files that are named after another, whose name is taken as it is.
-    pub fn after(name: &str, ending: &str) -> Self {
+    pub(crate) fn after(name: &str, ending: &str) -> Self {
         Self { before: format!("{name}_"), after: format!(".{ending}"), digits: Some(4) }
     }
 
     /// The name of a frame's file.
-    pub fn of(&self, frame: usize) -> PathBuf {
+    pub(crate) fn of(&self, frame: usize) -> PathBuf {
         match self.digits {
             Some(digits) => format!("{}{frame:0digits$}{}", self.before, self.after).into(),
             None => PathBuf::from(&self.before),

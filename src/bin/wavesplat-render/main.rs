@@ -28,8 +28,8 @@ use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{
     self, CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share, spare_inputs, transfer_function,
 };
-use wavesplat::codec::bound::range_bound;
 use wavesplat::colour::TransferFunction;
+use wavesplat::convert::range_bound;
 use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::render::annotate::{Annotation, room};
 use wavesplat::render::sink::{Depth, PictureFormat, Provenance, Sink};

@@ -5,15 +5,13 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{CommonArgs, InputArgs, Pair, SelectArgs, share, spare_inputs, transfer_function};
-use wavesplat::codec::bound::Bound;
-use wavesplat::codec::scheme::Stencil;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{
-    ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor, open_partial, resume,
+    Basis, Bound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor,
+    Stencil, open_partial, resume,
 };
 use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{Archive, FrameSource, extensions};
-use wavesplat::wavelet::Basis;
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Args)]

@@ -30,7 +30,7 @@ impl Annotation {
 
     /// Draws the time of `frame` at the top left and, if a `scale` is given, a colour bar at the right edge. A row has
     /// `width` pixels.
-    pub fn draw(&self, pixels: &mut [Rgb], width: usize, frame: usize, background: Rgb, scale: Option<&Scale>) {
+    pub(crate) fn draw(&self, pixels: &mut [Rgb], width: usize, frame: usize, background: Rgb, scale: Option<&Scale>) {
         let mut sheet = Sheet::new(pixels, width, background);
         let below = sheet.stamp(&self.stamps(frame));
         if let Some(scale) = scale {

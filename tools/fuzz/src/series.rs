@@ -7,14 +7,13 @@ use std::path::Path;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::{SampleType, is_missing, load, store};
-use wavesplat::codec::bound::Bound;
-use wavesplat::codec::scheme::Stencil;
-use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor, convert};
+use wavesplat::convert::{
+    Basis, Bound, ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor, Stencil, convert,
+};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
 use wavesplat::source::{FrameSource, OpenOptions, open_stream};
-use wavesplat::wavelet::Basis;
 
 /// Upper bound on the rounding of a sum or a product in the checks here.
 const UP: f64 = 1.0 + 1e-9;

@@ -5,10 +5,9 @@ use clap::ValueEnum;
 use std::fmt;
 use std::iter::successors;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::codec::bound::Bound;
+use wavesplat::convert::{Basis, Bound};
 use wavesplat::render::{Quantity, default_splat_error, splat_method};
 use wavesplat::view::footprint::Method;
-use wavesplat::wavelet::Basis;
 
 /// A basis, and the window it is measured with.
 #[derive(Debug, PartialEq)]

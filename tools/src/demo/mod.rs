@@ -17,13 +17,12 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{ConvertConfig, ConvertReport};
+use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
 use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::View;
-use wavesplat::wavelet::Basis;
 
 /// Frames of the experiment.
 pub const FRAMES: usize = 32;

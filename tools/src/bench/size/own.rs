@@ -13,11 +13,11 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Region;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample;
-use wavesplat::codec::WindowCodec;
-use wavesplat::codec::bound::difference_up;
-use wavesplat::codec::decode::Block;
 use wavesplat::convert::{ConvertReport, convert};
 use wavesplat::file::CoefficientFile;
+use wavesplat::internal::Block;
+use wavesplat::internal::WindowCodec;
+use wavesplat::internal::difference_up;
 use wavesplat::source::{self, OpenOptions, read_frames};
 
 /// The settings of a measurement.

@@ -1,8 +1,7 @@
 //! The measured ways of converting. This benchmark knows only their names and configurations.
 
 use wavesplat::base::error::{Error, Result};
-use wavesplat::convert::ConvertConfig;
-use wavesplat::wavelet::Basis;
+use wavesplat::convert::{Basis, ConvertConfig};
 
 /// A way of converting.
 #[derive(Debug)]

@@ -8,9 +8,8 @@ use std::io::BufWriter;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, convert};
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint, convert};
 use wavesplat::source::{self, OpenOptions};
-use wavesplat::wavelet::Basis;
 
 /// The settings of a conversion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
