@@ -1,68 +1,130 @@
-//! wavesplat: time-varying volumes as few coefficients under a guaranteed error bound, and pictures from them.
+//! wavesplat compresses time-varying volumes under a guaranteed error bound, and renders pictures from the coefficient
+//! file without decompressing it first.
 //!
-//! # The data's path
+//! Convert an array in memory to a coefficient file. No sample changes by more than 1 % of the value range:
 //!
-//! ```text
-//!  frame files, a pipe                      source/     one file per input format behind one trait; mapped.rs
-//!    |  windows of T frames                 scan.rs     value range, missing samples: fixes the window's bound
-//!    |  or the channels of their colours    source/coloured.rs, by a transfer function of colour/
-//!    |  boxes of voxels                     convert/    reader -> workers -> writer, bounded channels, in order
-//!    v
-//!  series, 8 voxels at a time               wavelet/    forward: samples to T coefficients along time (eq 5)
-//!    |                                      codec/      truncate under the bound, quantise, decode again, compare;
-//!    v                                                  what missed the bound is stored exactly
-//!  coded blocks                             format/     parts packed by zstd, directory, checksums (another package)
-//!    |
-//!  ===== the .wspl file: the only meeting point of the two halves =====                          file.rs
-//!    |
-//!    v
-//!  blocks that the picture needs            render/     plan: what fits in memory; reading: what the error allows to
-//!    |                                                  leave out; scene: what is splatted
-//!    |  amounts of voxels, plane by plane   codec/      the same decoder
-//!    v
-//!  planes of cells, then of tiles           render/lattice/ spread and gather on the sheared lattice of the view; or
-//!    |                                      footprint.rs, render/splat.rs (eq 4 and 9); camera.rs, render/canvas.rs;
-//!    |                                      render/slabs/ cuts the volume for what hides and what is largest
-//!    |  per pixel                           wavelet/    inverse: T coefficient images to T frames (eq 8)
-//!    v
-//!  pictures, and what is known of errors    render/finish.rs, weights.rs (eq 12), certificate.rs, expectation.rs,
-//!                                           annotate/, sink/; colour/; output.rs
+//! ```standalone_crate
+//! use wavesplat::convert::{ConvertConfig, convert_to_file};
+//! use wavesplat::source::ArraySource;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(&folder).unwrap();
+//! let (dims, frames) = ([32, 24, 16], 40); // voxels along x, y, z
+//! let samples: Vec<f32> = (0..frames * 32 * 24 * 16).map(|i| (i as f32 * 1e-4).sin()).collect();
+//! let mut source = ArraySource::from_f32(dims, &samples)?;
+//! let report = convert_to_file(&mut source, &ConvertConfig::new(0.01), "run.wspl")?;
+//! assert!(report.output_bytes < report.input_bytes / 10);
+//! # Ok::<(), wavesplat::Error>(())
 //! ```
 //!
-//! `extract/` takes the same file back to samples, in the formats of other programs too, `verify.rs` compares it with its
-//! source, `recover.rs` saves what is whole of a damaged one, and `resume.rs` finds what a conversion can go on with. The
-//! programs in `bin/` turn arguments into configurations and call one function; what they share is `cli/`.
+//! [`source::open`] opens files instead: NRRD, NIfTI, VTK, HDF5, NetCDF, raw bytes and more.
+//!
+//! Render all frames of a view to PNG files:
+//!
+//! ```standalone_crate
+//! use wavesplat::colour::Scale;
+//! use wavesplat::file::CoefficientFile;
+//! use wavesplat::render::{CoefficientScene, RenderConfig, render_png};
+//! use wavesplat::view::camera::View;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(&folder).unwrap();
+//! # let samples: Vec<f32> = (0..8 * 8 * 8 * 4).map(|i| (i as f32 * 0.01).sin()).collect();
+//! # let mut source = wavesplat::source::ArraySource::from_f32([8, 8, 8], &samples)?;
+//! # wavesplat::convert::convert_to_file(&mut source, &wavesplat::convert::ConvertConfig::new(0.01), "run.wspl")?;
+//! let file = CoefficientFile::open("run.wspl")?;
+//! let colours = Scale::named("viridis", file.value_range())?;
+//! let mut scene = CoefficientScene::from(file);
+//! let config = RenderConfig::new(&scene, View::new(30.0, 20.0)); // azimuth and elevation in degrees
+//! render_png(&mut scene, &config, &colours, "frame_%04d.png")?;
+//! # assert!(std::path::Path::new("frame_0003.png").exists());
+//! # Ok::<(), wavesplat::Error>(())
+//! ```
+//!
+//! [`render::render`] gives pictures as numbers, [`render::sink`] writes other formats and videos.
+//!
+//! Read one region of some frames:
+//!
+//! ```standalone_crate
+//! use wavesplat::Region;
+//! use wavesplat::extract::read_region;
+//! use wavesplat::file::CoefficientFile;
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # std::env::set_current_dir(&folder).unwrap();
+//! # let samples: Vec<f32> = (0..32 * 24 * 16 * 12).map(|i| (i as f32 * 0.01).sin()).collect();
+//! # let mut source = wavesplat::source::ArraySource::from_f32([32, 24, 16], &samples)?;
+//! # wavesplat::convert::convert_to_file(&mut source, &wavesplat::convert::ConvertConfig::new(0.01), "run.wspl")?;
+//! let file = CoefficientFile::open("run.wspl")?;
+//! let region = Region { start: [10, 0, 4], end: [20, 24, 5] };
+//! let samples: Vec<f32> = read_region(&file, 7..9, &region)?;
+//! assert_eq!(samples.len(), 2 * 10 * 24 * 1); // frames, x, y, z; x is fastest
+//! # Ok::<(), wavesplat::Error>(())
+//! ```
+//!
+//! [`file::CoefficientFile::from_storage`] opens a file that is not on a local disk. [`extract::extract`] and
+//! [`extract::Sink`] write the formats of other programs.
+//!
+//! # Folders
+//!
+//! The folders below `src/` follow the path of the data:
+//!
+//! | folder | content |
+//! |---|---|
+//! | `base` | errors, grids, samples, mapped files, output files |
+//! | `source` | input formats behind one trait: frames in order, a window at a time |
+//! | `colour` | transfer functions, and the colours of pixels |
+//! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
+//! | `codec` | one block: samples to codes under the error bound, and back |
+//! | `file` | the coefficient file: open, verify, recover, continue |
+//! | `convert` | frames to a coefficient file: reader, workers and writer |
+//! | `view` | cameras and footprints (eq 4) |
+//! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
+//! | `extract` | a coefficient file back to samples and to files of other programs |
+//! | `cli` | what the programs in `bin/` share |
+//!
+//! The bytes of a coefficient file are a package of their own, `wavesplat-format`. [`method`] explains the mathematics.
 //!
 //! # Words
 //!
-//! *frame* one time step of the whole grid; *voxel* a lattice point; *series* one voxel over time; *window* T
-//! consecutive frames; *block* a box of voxels over one window; *coefficient* c_{i,k} of voxel i and basis function k;
-//! *channel* the samples, or red, green or blue of the colours that they were turned into, coded like samples;
-//! *code* a quantised coefficient; *part* a piece of a block with its own zstd frame: a group of temporal *levels*,
-//! coarse to fine, or what overrides them (*outliers*, *missing* samples, an *exact* block); *plane* a sum of splats
-//! over pixels, or over the *cells* of the lattice that a view shears the volume's into; *footprint* the projected kernel; *tolerance* what the user allows, *bound* (delta) what is guaranteed,
-//! *share* how much of its bound a sample or series uses, *reached* the largest error found.
-//! Triples are x, y, z; arrays have x fastest, then y, z, and time slowest.
+//! - A *frame* is one time step of the whole grid. A *voxel* is a point of the grid. A *series* is one voxel over time.
+//! - A *window* is a number of consecutive frames that are coded together. A *block* is a box of voxels over one window.
+//! - A *channel* is one number per voxel: the samples, or red, green or blue if samples were converted to colours.
+//! - A *coefficient* c_{i,k} belongs to voxel i and basis function k. A *code* is a quantised coefficient.
+//! - A *part* is a piece of a block that is compressed alone: a group of temporal *levels* from coarse to fine, or what
+//!   replaces decoded samples: *outliers*, *missing* samples, or all samples of an *exact* block.
+//! - A *footprint* is the projected kernel of a voxel. A *plane* is a sum of footprints over the pixels of a picture, or over
+//!   the *cells* of a lattice from which the pixels are computed.
+//! - The *tolerance* is the error that the user allows. The *bound* (delta) is the error that is guaranteed. The *share* is
+//!   how much of its bound a sample or series uses. *Reached* is the largest error found.
+//! - Triples are in the order x, y, z. In arrays x is fastest, then y, z, and time is slowest.
 //!
-//! # Who may call whom
+//! # Rules
 //!
-//! `bin, cli, tools -> convert | render | extract | verify | recover | resume | report -> source, scan, codec, file, camera, footprint
-//! -> wavelet, bound, sample, volume, mapped, npy, output, error -> format`. A test reads the sources and holds this.
+//! A test reads the sources and checks these rules.
 //!
-//! 1. `convert` and `render` never name each other; the file is their only meeting point.
-//! 2. `format` knows bytes: it starts no thread, opens no path, maps no memory.
-//! 3. Kernels (`wavelet`, `bound`, `codec`, `camera`, `footprint`, `render/splat`, `render/lattice`) are pure functions
-//!    over slices: no I/O, no threads, no clocks; `codec/buffer.rs` alone remembers anything: memory that is free. Threads
-//!    live in `convert/mod.rs`, `convert/choose.rs`, `convert/sampled.rs`, `scan.rs`, `render/canvas.rs`,
-//!    `render/weights.rs`, `extract/mod.rs`, `verify.rs` and, to find damage, `file.rs`; `render/plan.rs` asks how many there are.
-//!    In `mapped.rs` one waits for signals, and `source/formats/arrays` may decode chunks on the workers that read.
-//! 4. `unsafe` is in `mapped.rs` alone. Bytes are copied out of a map before anyone looks at them.
-//! 5. The encoder decides by the decoder: what [`codec`] decodes is what was compared with the source.
-//! 6. No result depends on the number of threads, on the memory budget or on the machine: sums have a fixed order, and
-//!    only correctly rounded operations and `libm` are used.
-//! 7. Nothing is ever loaded whole: memory follows the budget and not the archive.
-//! 8. A transform is one replaceable part: [`wavelet::TimeBasis`] is all that the rest knows of it, and a
-//!    [`render::Scene`] turns blocks into amounts of voxels and planes into frames, whatever they are made of.
+//! - A folder uses only folders below it: `base`; then `colour`, `wavelet` and `view`; then `source`; then `codec`; then
+//!   `file`; then `convert`, `render` and `extract`; then `cli`; then the programs.
+//! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
+//! - Each crate from outside is used in the files listed in `tests/layering.rs` only. So threads start in few places.
+//! - All `unsafe` code is in `base/mapped.rs`.
+//!
+//! These rules are not checked by that test:
+//!
+//! - `wavesplat-format` knows bytes only. It starts no thread, opens no path and maps no memory.
+//! - `wavelet`, `codec` and `view`, and the kernels in `render/splat`, are pure functions over slices: no files, no clocks.
+//!   `codec/buffer.rs` reuses memory and is the only module with a state.
+//! - Bytes are copied out of a memory map before they are parsed.
+//! - The encoder compares the source with the output of the decoder that readers use.
+//! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all
+//!   operations are correctly rounded or come from `libm`.
+//! - Memory use follows the budget, not the size of the archive.
+//! - A transform can be replaced: other folders use it through the trait `wavelet::TimeBasis` only. A data source of the
+//!   renderer can be replaced, too: see [`render::Scene`].
+
+pub use base::error::{Error, Result};
+pub use base::grid::{Grid, Region};
+pub use base::sample::SampleType;
 
 pub mod base;
 pub mod source;

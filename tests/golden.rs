@@ -34,7 +34,7 @@ fn digests() -> Vec<(String, u64)> {
 }
 
 fn open(path: &Path) -> CoefficientFile {
-    CoefficientFile::open(path, Access::Read).unwrap()
+    CoefficientFile::open_with(path, Access::Read).unwrap()
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn features_of_later_versions_are_refused_by_name() {
         file[120..128].copy_from_slice(&checksum);
         let path = work.path().join("later.wspl");
         fs::write(&path, file).unwrap();
-        CoefficientFile::open(&path, Access::Read).err().map(|e| (e.exit_code(), e.to_string()))
+        CoefficientFile::open_with(&path, Access::Read).err().map(|e| (e.exit_code(), e.to_string()))
     };
     file[10] = 7; // the minor version
     file[24] = 0xFF; // optional features

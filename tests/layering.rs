@@ -33,6 +33,7 @@ const HOMES: [(&str, &[&str]); 21] = [
             "render/plan.rs",
             "render/weigh.rs",
             "extract/mod.rs",
+            "file/batch.rs",
             "file/coefficient_file.rs",
             "file/verify.rs",
             "cli/mod.rs",

@@ -27,6 +27,7 @@ mod recovery;
 mod sample;
 mod section;
 mod segments;
+mod storage;
 mod structure;
 #[cfg(test)]
 mod testing;
@@ -53,57 +54,6 @@ pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
 pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
+pub use storage::{ReadAhead, Storage, read_joined};
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};
-
-use std::io;
-
-/// The bytes of a file: a source of known length that can be read at any offset.
-pub trait Storage {
-    /// Length in bytes.
-    fn len(&self) -> u64;
-
-    /// Whether there are no bytes.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Copies `out.len()` bytes starting at `offset`.
-    ///
-    /// # Errors
-    /// The bytes end before `offset + out.len()`, or the storage fails.
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
-}
-
-impl Storage for [u8] {
-    fn len(&self) -> u64 {
-        <[u8]>::len(self) as u64
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        let bytes = usize::try_from(offset).ok().and_then(|o| self.get(o..)?.get(..out.len()));
-        let Some(bytes) = bytes else { return Err(io::ErrorKind::UnexpectedEof.into()) };
-        out.copy_from_slice(bytes);
-        Ok(())
-    }
-}
-
-impl Storage for Vec<u8> {
-    fn len(&self) -> u64 {
-        Storage::len(self.as_slice())
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        self.as_slice().read_at(offset, out)
-    }
-}
-
-impl<S: Storage + ?Sized> Storage for &S {
-    fn len(&self) -> u64 {
-        S::len(self)
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        S::read_at(self, offset, out)
-    }
-}

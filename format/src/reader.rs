@@ -14,13 +14,20 @@ use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::section::{FRAME, SectionId, decompress, read_section};
-use crate::{Error, Result, Storage};
+use crate::{Error, ReadAhead, Result, Storage};
+use std::sync::Arc;
 
 /// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
 #[derive(Debug)]
 pub struct Reader<S: Storage> {
     storage: S,
-    pub(crate) footer: Footer,
+    index: Arc<Index>,
+}
+
+/// What is read when a file is opened.
+#[derive(Debug)]
+struct Index {
+    footer: Footer,
     metadata: Metadata,
     leaves: Vec<LeafEntry>,
 }
@@ -36,17 +43,29 @@ impl<S: Storage> Reader<S> {
         let footer = read_footer(&storage, id)?;
         let metadata = read_metadata(&storage, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;
-        Ok(Self { storage, footer, metadata, leaves })
+        Ok(Self { storage, index: Arc::new(Index { footer, metadata, leaves }) })
+    }
+
+    /// A reader of the same file that holds the bytes of some parts already: they are read in one call of
+    /// [`Storage::read_many`]. Parts that reach beyond the storage are left out, and are errors when they are asked for.
+    pub fn read_ahead<'a>(&self, parts: impl IntoIterator<Item = &'a PartEntry>) -> Result<Reader<ReadAhead<'_, S>>> {
+        let ranges = parts.into_iter().map(|part| part.offset..part.offset.saturating_add(part.stored_len.into()));
+        let storage = ReadAhead::new(&self.storage, ranges.collect())?;
+        Ok(Reader { storage, index: self.index.clone() })
+    }
+
+    pub(crate) fn footer(&self) -> &Footer {
+        &self.index.footer
     }
 
     /// The archive's metadata.
     pub fn metadata(&self) -> &Metadata {
-        &self.metadata
+        &self.index.metadata
     }
 
     /// The file's identity.
     pub fn id(&self) -> FileId {
-        self.footer.id
+        self.index.footer.id
     }
 
     /// The storage that holds the file's bytes.
@@ -56,9 +75,9 @@ impl<S: Storage> Reader<S> {
 
     /// The leaves of a window, ordered by channel and block; empty if the archive has no such window.
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
-        let count = self.metadata.leaves_per_window() as usize;
+        let count = self.index.metadata.leaves_per_window() as usize;
         let start = count.saturating_mul(window as usize);
-        start.checked_add(count).and_then(|end| self.leaves.get(start..end)).unwrap_or(&[])
+        start.checked_add(count).and_then(|end| self.index.leaves.get(start..end)).unwrap_or(&[])
     }
 
     /// Reads the entries of a leaf's blocks, in order.
@@ -92,7 +111,7 @@ impl<S: Storage> Reader<S> {
     }
 
     fn check_entry(&self, entry: &BlockEntry) -> ParseResult {
-        let geometry = self.metadata.geometry(entry.id).ok_or("no such block")?;
+        let geometry = self.index.metadata.geometry(entry.id).ok_or("no such block")?;
         entry.check()?;
         entry.parts.iter().try_for_each(|part| geometry.check(part))
     }
@@ -103,7 +122,7 @@ impl<S: Storage> Reader<S> {
     /// [`Error::Invalid`] if the archive has no such block; otherwise as [`Self::leaf`].
     pub fn entry(&self, id: BlockId) -> Result<BlockEntry> {
         self.geometry(id)?;
-        let per_channel = self.metadata.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF) as usize;
+        let per_channel = self.index.metadata.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF) as usize;
         let number = per_channel * usize::from(id.channel) + (id.block / BLOCKS_PER_LEAF) as usize;
         let found = self.leaves(id.window).get(number).map(|leaf| self.leaf(leaf)).transpose()?;
         let entry = found.and_then(|entries| entries.into_iter().nth((id.block % BLOCKS_PER_LEAF) as usize));
@@ -115,7 +134,7 @@ impl<S: Storage> Reader<S> {
     /// # Errors
     /// [`Error::Invalid`] if the archive has no such block.
     pub fn geometry(&self, id: BlockId) -> Result<BlockGeometry<'_>> {
-        self.metadata.geometry(id).ok_or_else(|| no_block(id))
+        self.index.metadata.geometry(id).ok_or_else(|| no_block(id))
     }
 
     /// Reads the payload of a part, checks its checksum and decompresses it to exactly the length that the entry declares

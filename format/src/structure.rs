@@ -27,8 +27,8 @@ impl<S: Storage> Reader<S> {
             note(self.check_section(SectionId::Window(window), at, &begin), found)?;
             note(self.check_section(SectionId::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
-        note(check_padding(self.storage(), self.footer.metadata.end()), found)?;
-        note(check_padding(self.storage(), self.footer.root.end()), found)
+        note(check_padding(self.storage(), self.footer().metadata.end()), found)?;
+        note(check_padding(self.storage(), self.footer().root.end()), found)
     }
 
     /// Checks the headers of a leaf's blocks against the entries `blocks`, and all padding between them. Calls `found` for

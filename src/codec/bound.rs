@@ -1,6 +1,6 @@
-//! Error bounds: what a file promises, and exact arithmetic to decide whether a block keeps it.
+//! Error bounds: what a file guarantees, and exact arithmetic to decide whether a block meets its bound.
 //!
-//! A file promises one of these for all its samples v, decoded to v^:
+//! A file guarantees one of these for all its samples v, decoded to v^:
 //!
 //! ```text
 //! pointwise    |v^ - v| <= delta = tolerance * (largest sample - least sample)                            (eq 21)
@@ -25,18 +25,18 @@
 //! step = 2 delta / gain        gain = max over t of the sum over k of |u_k(t)|                            (eq 25)
 //! ```
 //!
-//! A bound is decided by one comparison, `!(error <= allowed)`. The error is rounded up and the allowed value is
-//! rounded down, so rounding never makes a promise look kept. No slack is added anywhere. The *share* of a sample is
-//! its error divided by what it is allowed. The share of a series is the largest, or the root mean square, of its
-//! samples' shares. A bound holds where shares are at most 1.
+//! One comparison decides a bound: `!(error <= allowed)`. The error is rounded up and the allowed value down, so
+//! rounding never hides a violation. No slack is added anywhere. The *share* of a sample is its error divided by its
+//! allowed error. The share of a series is the largest, or the root mean square, of its samples' shares. A bound holds
+//! if all shares are at most 1.
 
 pub use wavesplat_format::Bound;
 
 use crate::base::sample::SampleType;
 use half::f16;
 
-/// x - y and what rounding took from it: the exact difference is their sum ([Knuth](crate::bibliography)). Not numbers if
-/// x - y overflows.
+/// x - y, and its rounding error: the exact difference is their sum ([Knuth](crate::bibliography)). NaN if x - y
+/// overflows.
 fn difference(x: f64, y: f64) -> (f64, f64) {
     let d = x - y;
     let y_used = x - d;
@@ -44,7 +44,7 @@ fn difference(x: f64, y: f64) -> (f64, f64) {
     (d, (x - x_used) + (y_used - y))
 }
 
-/// |x - y|, rounded up if it is not exact; not a number if either is not finite or the difference overflows.
+/// x - y|, rounded up if it is not exact; NaN if x or y is not finite or the difference overflows.
 pub fn difference_up(x: f64, y: f64) -> f64 {
     match difference(x, y) {
         (d, 0.0) => d.abs(),
@@ -74,41 +74,42 @@ fn product_down(a: f64, b: f64) -> f64 {
     if rounded_up { product.next_down().max(0.0) } else { product }
 }
 
-/// What rounding took from a product below this may itself underflow.
+/// The rounding error of a product below this may underflow.
 const UNDERFLOW: f64 = 1e-280;
 
 /// `tolerance` times the length of a range, rounded down: the delta of [`Bound::Pointwise`] and [`Bound::Rms`] (eq 21).
 pub fn range_bound(tolerance: f64, range: (f64, f64)) -> f64 {
-    if range.0 <= range.1 { product_down(tolerance, length_down(range)) } else { 0.0 } // all missing so far
+    if range.0 <= range.1 { product_down(tolerance, length_down(range)) } else { 0.0 } // no samples yet
 }
 
-/// `tolerance` times |`value`|, or times `floor` if that is more, rounded down: what [`Bound::Relative`] allows (eq 22).
+/// `tolerance` times the larger of |`value`| and `floor`, rounded down: the error that [`Bound::Relative`] allows (eq
+/// 22).
 pub fn relative_bound(tolerance: f64, floor: f64, value: f64) -> f64 {
     product_down(tolerance, value.abs().max(floor))
 }
 
-/// What is promised of the samples of one window.
+/// The error bound of the samples of one window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBound {
-    /// Of which kind.
+    /// The kind of bound.
     pub bound: Bound,
-    /// As asked for: the share of the value range, or of the magnitude of each sample.
+    /// The tolerance asked for: a share of the value range, or of each sample's magnitude.
     pub tolerance: f64,
-    /// The largest error allowed to any sample, or root mean square to any series; 0 asks for the very bits.
+    /// The largest error allowed to any sample, or root mean square error allowed to any series; 0 means bit-exact.
     pub delta: f64,
 }
 
-/// How the shares of a series' samples make up its own.
+/// How the share of a series follows from the shares of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
     /// The largest.
     Largest,
-    /// The root of the mean of their squares.
+    /// The root mean square.
     RootMeanSquare,
 }
 
 impl ErrorBound {
-    /// How the shares of samples make up that of a series.
+    /// How the share of a series follows from the shares of its samples.
     pub fn measure(&self) -> Measure {
         match self.bound {
             Bound::Pointwise | Bound::Relative { .. } => Measure::Largest,
@@ -116,7 +117,8 @@ impl ErrorBound {
         }
     }
 
-    /// The error allowed to a sample that is `value`, rounded down; where means are bounded, that of the mean.
+    /// The error allowed to a sample of this value, rounded down. For a bound of the mean, the allowed root mean
+    /// square.
     pub fn allowed(&self, value: f64) -> f64 {
         match self.bound {
             Bound::Relative { floor } => relative_bound(self.tolerance, floor, value),
@@ -124,7 +126,8 @@ impl ErrorBound {
         }
     }
 
-    /// Whether the errors of one series keep the promise (eq 21-23): for each frame the error, rounded up, and what is allowed.
+    /// Whether the errors of one series are within the bound (eq 21-23). For each frame: the error, rounded up, and the
+    /// allowed error.
     pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
         match self.measure() {
             Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
@@ -134,13 +137,14 @@ impl ErrorBound {
                     ((sum + (e * e).next_up()).next_up(), each && e <= allowed)
                 };
                 let (squares, each) = errors.fold((0.0, true), add);
-                // Each within delta is enough; squares alone are rounded too far against us at delta itself, and underflow.
+                // It suffices that each error is within delta. The squares alone would fail by rounding at delta itself, or
+                // underflow.
                 each || squares <= (frames * self.delta * self.delta).next_down().next_down()
             }
         }
     }
 
-    /// The share of its bound that a series uses, rounded up; `errors` are as for [`Self::holds`].
+    /// The share of a series, rounded up; `errors` are as for [`Self::holds`].
     pub fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
         let frames = errors.len() as f64;
         let add = |(largest, squares): (f64, f64), (e, allowed)| {
@@ -150,13 +154,13 @@ impl ErrorBound {
         let (largest, squares) = errors.fold((0.0, 0.0), add);
         match self.measure() {
             Measure::Largest => largest,
-            // The mean is no more than the largest; what underflows adds less than the least number.
+            // The mean is at most the largest; underflow loses less than the smallest positive number.
             Measure::RootMeanSquare => largest.min((squares / frames * UP + f64::MIN_POSITIVE).sqrt()),
         }
     }
 
-    /// Adds the errors of the next frame of `N` series, whose samples are `values`, to what [`Self::largest_share`] makes
-    /// shares of. Vector code, and so without care for rounding.
+    /// Adds the errors of the next frame of `N` series with samples `values` to the sums for [`Self::largest_share`].
+    /// This is vector code without directed rounding.
     pub fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
         for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
             match self.bound {
@@ -173,14 +177,14 @@ impl ErrorBound {
         }
     }
 
-    /// No less than the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
+    /// An upper bound of the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
     pub fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         match self.bound {
             Bound::Pointwise if largest > 0.0 => share(largest.next_up(), self.delta),
             Bound::Relative { .. } if largest > 0.0 => (largest * UP).next_up(),
             Bound::Pointwise | Bound::Relative { .. } => 0.0,
-            Bound::Rms | Bound::Sampled { .. } if !(1e-140..1e140).contains(&self.delta) => f64::INFINITY, // of squares
+            Bound::Rms | Bound::Sampled { .. } if !(1e-140..1e140).contains(&self.delta) => f64::INFINITY, // squares would overflow or underflow
             Bound::Rms | Bound::Sampled { .. } if largest == 0.0 => 0.0,
             Bound::Rms | Bound::Sampled { .. } => {
                 let mean = largest / frames as f64 / (self.delta * self.delta);
@@ -189,29 +193,29 @@ impl ErrorBound {
         }
     }
 
-    /// The largest quantisation step with which rounding alone keeps the promise (eq 25), for samples that are allowed `error`.
+    /// The largest quantisation step for which rounding alone stays within the allowed `error` (eq 25).
     ///
-    /// `gain` is the largest sum of |u_k(t)| over k ([`crate::wavelet::gain`]). Where means are bounded, it does not matter.
+    /// `gain` is the largest sum of |u_k(t)| over k ([`crate::wavelet::gain`]). Bounds of the mean ignore it.
     pub fn step(&self, error: f64, gain: f64) -> f64 {
         match self.measure() {
             Measure::Largest => 2.0 * error / gain,
-            // Rounding moves a sample by step / sqrt 12 rms; the rest of the budget is left for dropping coefficients.
+            // Rounding has a root mean square of step / sqrt 12; the rest of the budget is for dropped coefficients.
             Measure::RootMeanSquare => error,
         }
     }
 }
 
-/// More than what rounding takes from a mean of as many squares as a window has frames.
+/// A factor that covers the rounding error of a mean of as many squares as a window has frames.
 const UP: f64 = 1.0 + 1e-12;
 
-/// An error, rounded up, in units of what is allowed, rounded down; rounded up.
+/// The share: an error, rounded up, divided by the allowed error, rounded down. The result is rounded up.
 pub fn share(error: f64, allowed: f64) -> f64 {
     if error > 0.0 { (error / allowed).next_up() } else { 0.0 }
 }
 
-/// The largest error before rounding to the sample type that still leaves `delta` after it; 0 or less if there is none.
+/// The largest error before rounding to the sample type that stays within `delta` after it; 0 or less if none does.
 ///
-/// `magnitude` is the largest absolute sample nearby.
+/// `magnitude` is the largest absolute value of the samples.
 pub fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64 {
     match ty {
         SampleType::F64 => delta,
@@ -283,7 +287,7 @@ mod tests {
     }
 
     proptest! {
-        /// In 128-bit integers: no difference comes out below the truth.
+        /// Against 128-bit integers: no difference is below the true one.
         #[test]
         fn differences_are_never_below_the_truth(a in -(1i64 << 52)..(1i64 << 52), b in -(1i64 << 52)..(1i64 << 52), shift in 0u32..40) {
             let x = a as f64 * f64::from(2u32.pow(shift.min(31)));
@@ -292,7 +296,7 @@ mod tests {
             prop_assert!(difference_up(x, y) as u128 >= truth);
         }
 
-        /// In 128-bit integers: what is allowed never exceeds the product, nor lacks more than rounding takes.
+        /// Against 128-bit integers: the allowed error never exceeds the product, and is less by no more than rounding.
         #[test]
         fn what_is_allowed_never_exceeds_the_product(
             t in 0..=1u64 << 53, v in -(1i64 << 53)..(1i64 << 53), floor in 0..1u64 << 53, down in 0..900_i32,
@@ -309,7 +313,7 @@ mod tests {
             prop_assert!(truth - found <= truth >> 51, "{found} {truth}");
         }
 
-        /// Vector code never finds less than the share that exact steps do, and that only where it is near.
+        /// The vector code's share is at least the exact share, and close to it.
         #[test]
         fn shares_of_many_are_no_less_than_those_of_each(
             values in proptest::collection::vec((-1e3..1e3, 0.0..30.0), 1..40), kind in 0..3_usize, floor in 0.0..10.0,

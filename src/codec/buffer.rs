@@ -1,19 +1,20 @@
-//! Large buffers that are used again: memory fresh from the system costs about as much as decoding a block into it.
+//! Large buffers that are reused: fresh memory from the system costs about as much as decoding a block into it.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// A slice whose memory the next one of its type takes over when it is dropped, whichever thread that is on. So no more
-/// of them are kept than were in use at one time; only blocks have any, so that none is much larger than the others.
+/// A slice that returns its memory to a pool when dropped, for the next buffer of its type on any thread. So the pool
+/// never holds more buffers than were in use at one time. Only blocks use buffers, so none is much larger than the
+/// others.
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled>(Vec<T>);
 
 impl<T: Pooled> Buffer<T> {
-    /// A slice of so many, each with any value.
+    /// Creates a slice of `len` entries with arbitrary values.
     pub fn of(len: usize) -> Self {
         let mut values = spare::<T>().pop().unwrap_or_default();
         if values.capacity() < len {
-            values = Vec::new(); // nothing of it is worth copying
+            values = Vec::new(); // avoids copying old values
         }
         values.resize(len, T::default());
         Self(values)
@@ -52,15 +53,15 @@ fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Vec<T>>> {
     T::spare().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Without what it held.
+/// Empties a buffer and keeps its memory.
 pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
     buffer.clear();
     buffer
 }
 
-/// A type of which there are buffers.
+/// A type that buffers can hold.
 pub trait Pooled: Copy + Default + 'static {
-    /// The buffers that nobody uses.
+    /// The unused buffers.
     fn spare() -> &'static Mutex<Vec<Vec<Self>>>;
 }
 
@@ -85,12 +86,12 @@ mod tests {
 
     #[test]
     fn memory_is_used_again_and_grows() {
-        let place = |buffer: &Buffer<u64>| buffer.as_ptr();
+        let address = |buffer: &Buffer<u64>| buffer.as_ptr();
         let first = Buffer::of(1 << 12);
-        let memory = place(&first);
+        let memory = address(&first);
         drop(first);
         let again = Buffer::of(1 << 10);
-        assert_eq!((place(&again), again.len()), (memory, 1 << 10));
+        assert_eq!((address(&again), again.len()), (memory, 1 << 10));
         assert_eq!(Buffer::<u64>::of(1 << 14).len(), 1 << 14);
     }
 }

@@ -1,4 +1,4 @@
-//! What the decoder gives, compared with the source: errors, range, and the samples that miss the bound.
+//! Compares decoded samples with the source: errors, range, and the samples that miss the bound.
 
 use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
@@ -6,32 +6,32 @@ use crate::codec::bound::Bound;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
 
-/// Samples that are compared, [`LANES`] series together; one lane for each frame.
+/// The compared samples of [`LANES`] series; one lane for each frame.
 #[derive(Debug)]
 pub(super) struct Compared<'a> {
-    /// The samples, missing ones filled.
+    /// The source samples, with missing ones filled.
     pub(super) source: &'a [Lane],
-    /// What the decoder gives.
+    /// The decoded samples.
     pub(super) decoded: &'a [Lane],
 }
 
-/// Errors and range of what the decoder gives back, and where it misses the bound.
+/// The errors and the range of decoded samples, and those that miss the bound.
 #[derive(Debug, Clone)]
 pub(super) struct Tally {
     pub(super) min: f64,
     pub(super) max: f64,
     pub(super) reached: f64,
     pub(super) squared_error: f64,
-    /// The largest share of its bound that a series uses.
+    /// The largest share of a series.
     pub(super) share: f64,
-    /// Samples that must be stored exactly.
-    pub(super) places: Vec<u32>,
+    /// The indices of samples that must be stored exactly.
+    pub(super) outliers: Vec<u32>,
 }
 
 impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, places: Vec::new() }
+        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new() }
     }
 
     pub(super) fn add(&mut self, decoded: f64, error: f64) {
@@ -41,73 +41,74 @@ impl Tally {
         self.squared_error += error * error;
     }
 
-    /// Adds `count` series; `whole` if none of them is missing a sample. The sample of a frame and lane is at
-    /// `place(frame, lane)` of the block; none if it is missing.
+    /// Adds `count` series; `whole` means that none of their samples is missing. `index(frame, lane)` is the index of a
+    /// sample in the block, or none if it is missing.
     pub(super) fn add_series(
         &mut self,
         codec: &WindowCodec,
         compared: &Compared<'_>,
         count: usize,
         whole: bool,
-        place: impl Fn(usize, usize) -> Option<usize>,
+        index: impl Fn(usize, usize) -> Option<usize>,
     ) {
         let clear = if whole { self.add_clearly_within(codec, compared, count) } else { [false; LANES] };
         let unclear = (0..count).filter(|l| !clear[*l]);
-        unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| place(t, lane)));
+        unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| index(t, lane)));
     }
 
-    /// Adds those of the first `count` series, without a missing sample, whose errors are clearly within the bound: by
-    /// vector code and with one rounding up at the end. Returns which they are; each sample of the others must be looked at.
+    /// Adds those of the first `count` series that are clearly within the bound and have no missing sample. This is
+    /// vector code that rounds up once at the end. Returns which series were added; the others need a check of each
+    /// sample.
     fn add_clearly_within(&mut self, codec: &WindowCodec, compared: &Compared<'_>, count: usize) -> [bool; LANES] {
-        let seen = Seen::of(codec, compared);
+        let stats = LaneStats::of(codec, compared);
         std::array::from_fn(|l| {
-            let share = codec.promise.largest_share(&[seen.sums[l]], compared.source.len());
-            let clear = l < count && share <= 1.0 && !seen.missing[l].is_nan();
+            let share = codec.promise.largest_share(&[stats.sums[l]], compared.source.len());
+            let clear = l < count && share <= 1.0 && !stats.missing[l].is_nan();
             if clear {
-                let largest = if seen.largest[l] > 0.0 { seen.largest[l].next_up() } else { 0.0 };
+                let largest = if stats.largest[l] > 0.0 { stats.largest[l].next_up() } else { 0.0 };
                 self.reached = self.reached.max(largest);
                 self.share = self.share.max(share);
-                self.squared_error += seen.squares[l];
-                (self.min, self.max) = (self.min.min(seen.lo[l]), self.max.max(seen.hi[l]));
+                self.squared_error += stats.squares[l];
+                (self.min, self.max) = (self.min.min(stats.lo[l]), self.max.max(stats.hi[l]));
             }
             clear
         })
     }
 
-    /// Adds one series, sample by sample, and notes the places of those that miss the bound.
+    /// Adds one series, sample by sample, and notes the outliers.
     fn add_one(
         &mut self,
         codec: &WindowCodec,
         compared: &Compared<'_>,
         lane: usize,
-        place: impl Fn(usize) -> Option<usize>,
+        index: impl Fn(usize) -> Option<usize>,
     ) {
         let error = |t: usize| {
             let (decoded, source) = (compared.decoded[t][lane], compared.source[t][lane]);
             let rounded = sample::round_to(codec.sample, decoded);
-            let found = if place(t).is_some() { codec.error(decoded, rounded, source) } else { 0.0 };
+            let found = if index(t).is_some() { codec.error(decoded, rounded, source) } else { 0.0 };
             (found, codec.promise.allowed(source))
         };
-        let mut errors: Vec<(f64, f64)> = (0..compared.source.len()).map(error).collect(); // each with what is allowed
+        let mut errors: Vec<(f64, f64)> = (0..compared.source.len()).map(error).collect(); // (error, allowed)
         let holds = codec.promise.holds(errors.iter().copied());
         for (t, (error, allowed)) in errors.iter_mut().enumerate() {
-            let Some(place) = place(t) else { continue };
+            let Some(index) = index(t) else { continue };
             if holds || *error <= *allowed {
                 self.add(sample::round_to(codec.sample, compared.decoded[t][lane]), *error);
             } else {
                 *error = 0.0;
                 self.add(compared.source[t][lane], 0.0);
-                self.places.push(place as u32);
+                self.outliers.push(index as u32);
             }
         }
         let share = codec.promise.share(errors.iter().copied());
-        self.share = self.share.max(share.min(1.0)); // rounded up beyond what holds
+        self.share = self.share.max(share.min(1.0)); // rounding up may exceed 1 although the bound holds
     }
 
-    /// The samples that must be stored exactly.
+    /// Takes the samples that must be stored exactly.
     pub(super) fn take_outliers(&mut self, codec: &WindowCodec, samples: &[u8]) -> Outliers {
         let size = codec.sample.size();
-        let mut positions = std::mem::take(&mut self.places);
+        let mut positions = std::mem::take(&mut self.outliers);
         positions.sort_unstable();
         let bytes = |p: &u32| &samples[*p as usize * size..(*p as usize + 1) * size];
         let samples = positions.iter().flat_map(bytes).copied().collect();
@@ -115,43 +116,43 @@ impl Tally {
     }
 }
 
-/// What vector code sees of [`LANES`] series, each by itself.
-struct Seen {
-    /// Range of what is extracted.
+/// Statistics of [`LANES`] series, one entry for each.
+struct LaneStats {
+    /// The range of the extracted samples.
     lo: Lane,
     hi: Lane,
-    /// Not a number where something would be taken for missing.
+    /// NaN in lanes with a value that would be read as missing.
     missing: Lane,
     largest: Lane,
     squares: Lane,
-    /// Of [`crate::codec::bound::ErrorBound::add`].
+    /// Sums of [`crate::codec::bound::ErrorBound::add`].
     sums: Lane,
 }
 
-impl Seen {
+impl LaneStats {
     fn of(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
-        let mut seen = Self::nothing();
-        let declared = codec.missing_value.unwrap_or(f64::NAN); // equal to nothing
+        let mut stats = Self::empty();
+        let declared = codec.missing_value.unwrap_or(f64::NAN); // NaN equals no value
         match (codec.sample, codec.promise.bound) {
-            (SampleType::F32, Bound::Pointwise) => look_at_singles(&mut seen, compared, declared),
-            (SampleType::F64, Bound::Pointwise) => look_at_doubles(&mut seen, compared, declared),
+            (SampleType::F32, Bound::Pointwise) => compare_singles(&mut stats, compared, declared),
+            (SampleType::F64, Bound::Pointwise) => compare_doubles(&mut stats, compared, declared),
             _ => return Self::under_any_bound(codec, compared, declared),
         }
-        seen.sums = seen.largest;
-        seen
+        stats.sums = stats.largest;
+        stats
     }
 
-    /// Any type under any bound; the slow twin of the vector code for floats.
+    /// The general version for any type and bound; slower than the vector code for floats.
     fn under_any_bound(codec: &WindowCodec, compared: &Compared<'_>, declared: f64) -> Self {
-        let mut seen = Self::nothing();
+        let mut stats = Self::empty();
         for (decoded, source) in compared.decoded.iter().zip(compared.source) {
-            let errors = seen.add(decoded, &sample::round_all(codec.sample, decoded), source, declared);
-            codec.promise.add(&errors, source, &mut seen.sums);
+            let errors = stats.add(decoded, &sample::round_all(codec.sample, decoded), source, declared);
+            codec.promise.add(&errors, source, &mut stats.sums);
         }
-        seen
+        stats
     }
 
-    fn nothing() -> Self {
+    fn empty() -> Self {
         let zero = Lane::default();
         let (lo, hi) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         Self { lo, hi, missing: zero, largest: zero, squares: zero, sums: zero }
@@ -176,17 +177,17 @@ impl Seen {
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn look_at_singles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
+fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
-        seen.add(decoded, &rounded, source, declared);
+        stats.add(decoded, &rounded, source, declared);
     }
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn look_at_doubles(seen: &mut Seen, compared: &Compared<'_>, declared: f64) {
+fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
-        seen.add(decoded, decoded, source, declared);
+        stats.add(decoded, decoded, source, declared);
     }
 }
 
@@ -198,7 +199,7 @@ mod tests {
     use crate::wavelet::Basis;
 
     #[test]
-    fn vector_code_sees_what_its_slow_twin_does() {
+    fn vector_code_agrees_with_the_general_code() {
         let number = |i: usize| ((i * 7919) % 1013) as f64 / 7.0 - 50.0;
         let lanes = |first: usize| (0..40).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
         let (source, mut decoded): (Vec<Lane>, Vec<Lane>) = (lanes(0), lanes(5));
@@ -209,8 +210,8 @@ mod tests {
             codec.missing_value = Some(-9.5);
             let compared = Compared { source: &source, decoded: &decoded };
             let bit = |v: f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
-            let bits = |s: Seen| [s.lo, s.hi, s.missing, s.largest, s.squares, s.sums].map(|lane| lane.map(bit));
-            let (fast, slow) = (Seen::of(&codec, &compared), Seen::under_any_bound(&codec, &compared, -9.5));
+            let bits = |s: LaneStats| [s.lo, s.hi, s.missing, s.largest, s.squares, s.sums].map(|lane| lane.map(bit));
+            let (fast, slow) = (LaneStats::of(&codec, &compared), LaneStats::under_any_bound(&codec, &compared, -9.5));
             assert!([1, 4, 6].into_iter().all(|l| fast.missing[l].is_nan()));
             assert_eq!(bits(fast), bits(slow), "{ty}");
         }

@@ -1,8 +1,8 @@
-//! A coded block back to samples: the one decoder of the project.
+//! Decodes a block to samples: the only decoder of the project.
 //!
-//! Codes times the step are coefficients, refined by the pyramid if there is one (eq 32). The inverse transform of each
-//! voxel's coefficients gives its frames (eq 7). Outliers and missing samples, stored exactly, then replace their
-//! samples.
+//! A coefficient is its code times the step, refined by the pyramid if there is one (eq 32). The inverse transform of
+//! each voxel's coefficients gives its series (eq 7). Then outliers and missing samples, stored exactly, replace
+//! decoded samples.
 
 use super::WindowCodec;
 use super::buffer::Buffer;
@@ -15,26 +15,26 @@ use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, R
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
 pub struct Block {
-    /// Voxels of the block along x, y, z.
+    /// The number of voxels along x, y, z.
     pub size: [usize; 3],
-    /// Voxels of the block.
+    /// The number of voxels.
     pub voxels: usize,
-    /// What codes count.
+    /// The quantisation step.
     pub step: f64,
-    /// Codes, `k * voxels + voxel`, or with a pyramid pass after pass; empty if no level part was read.
+    /// The codes: at `k * voxels + voxel`, or with a pyramid pass after pass; empty if no level part was read.
     pub codes: Buffer<i32>,
-    /// Samples stored exactly because the coefficients miss them.
+    /// Samples stored exactly because their decoded values miss the bound.
     pub outliers: Outliers,
-    /// Which samples are missing (`frame * voxels + voxel`), and their bytes one after another; empty if none is.
+    /// Which samples are missing (`frame * voxels + voxel`), and the bytes of those in order; empty if none is missing.
     pub missing: (Vec<bool>, Vec<u8>),
     /// All samples, if the block is stored exactly.
     pub exact: Option<Vec<u8>>,
-    /// Stored bytes that were read.
+    /// The number of stored bytes read.
     pub bytes_read: u64,
 }
 
 impl Block {
-    /// Reads what a block holds of the coefficients that `wanted` marks, and all that overrides them.
+    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples.
     pub fn read<S: Storage>(
         reader: &Reader<S>,
         codec: &WindowCodec,
@@ -57,7 +57,19 @@ impl Block {
         Ok(block)
     }
 
-    /// Of which every sample is missing: not a number where the type has that, or the declared value, or 0.
+    /// The parts that [`Self::read`] reads.
+    pub(crate) fn parts<'a>(
+        codec: &'a WindowCodec,
+        entry: &'a BlockEntry,
+        wanted: &'a [bool],
+    ) -> impl Iterator<Item = &'a PartEntry> {
+        entry.parts.iter().filter(|part| match part.kind {
+            PartKind::Level(level) => codec.needs_part(level.into(), wanted),
+            _ => true,
+        })
+    }
+
+    /// A block with every sample missing: NaN for float types, else the declared value, or 0 without one.
     pub fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
         let voxels: usize = size.iter().product();
         let samples = codec.frames() * voxels;
@@ -68,7 +80,7 @@ impl Block {
         Self { size, voxels, step: 0.0, codes: Buffer::default(), outliers, missing, exact: None, bytes_read: 0 }
     }
 
-    /// Reads the level parts that there are and that `wanted` needs; the codes of others are zero.
+    /// Reads the level parts that exist and that `wanted` needs; the codes of others are zero.
     fn read_codes<S: Storage>(
         &mut self,
         reader: &Reader<S>,
@@ -94,31 +106,36 @@ impl Block {
         Ok(())
     }
 
-    /// What the codes give.
+    /// Decodes the codes to coefficients.
     pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
         Field::decode(codec, self.size, self.step, &self.codes)
     }
 
-    /// What the codes of a pyramid give, where it is needed at once: if one k says nothing without the others, or if any
-    /// sample is overridden.
+    /// Decodes all codes of a pyramid, if that is needed at once: because one k cannot be decoded without the others,
+    /// or because some samples are overridden.
     pub fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
         at_once.then(|| Field::refined(codec, self.size, self.step, &self.codes))
     }
 
-    /// Whether any sample is not what the coefficients give.
+    /// Whether any sample is stored exactly, and overrides the coefficients.
     pub fn overrides(&self) -> bool {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
-    /// What the codes of one k give; `room` is for that.
-    pub fn plane<'a>(&'a self, codec: &WindowCodec, k: usize, room: (&'a mut Vec<f32>, &'a mut Vec<f64>)) -> Plane<'a> {
-        Plane::decode(codec, self.size, self.step, (&self.codes, k), room)
+    /// Decodes the codes of one k into `scratch`.
+    pub fn plane<'a>(
+        &'a self,
+        codec: &WindowCodec,
+        k: usize,
+        scratch: (&'a mut Vec<f32>, &'a mut Vec<f64>),
+    ) -> Plane<'a> {
+        Plane::decode(codec, self.size, self.step, (&self.codes, k), scratch)
     }
 
-    /// What the directory should say of each level part: its largest coefficient, or with a pyramid the largest change
-    /// where it and all finer ones are left out.
+    /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
+    /// largest change from leaving out this part and all finer ones.
     pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
@@ -134,8 +151,8 @@ impl Block {
         self.missing.0.get(index).copied().unwrap_or(false)
     }
 
-    /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients give:
-    /// outliers and missing samples not yet in place.
+    /// Calls `visit(index of the first, values)` for all samples decoded from coefficients, a run of voxels at a time.
+    /// Outliers and missing samples are not yet in place.
     pub fn for_each_run(&self, codec: &WindowCodec, visit: impl FnMut(usize, &[f64])) {
         let field = self.field(codec);
         if codec.scheme.basis == Basis::Samples {
@@ -145,7 +162,7 @@ impl Block {
         }
     }
 
-    /// The series of one voxel as the coefficients give it.
+    /// The series of one voxel, decoded from the coefficients.
     pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
         field.series(codec.basis.as_ref(), self.voxels, voxel)
     }
@@ -155,7 +172,7 @@ impl Block {
         self.decode(codec, |_, _| {})
     }
 
-    /// What [`Self::samples`] gives, and the numbers that are splatted, not rounded to the samples' type.
+    /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.
     pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
         let mut values = Buffer::of(codec.frames() * self.voxels);
         let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
@@ -169,7 +186,7 @@ impl Block {
         (samples, values)
     }
 
-    /// All samples; `visit(index of the first, values)` sees what coefficients give before it is rounded.
+    /// Decodes all samples; `visit(index of the first, values)` gets values before they are rounded.
     fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
         let size = codec.sample.size();
         let mut out = Buffer::of(codec.frames() * self.voxels * size);
@@ -184,12 +201,12 @@ impl Block {
         out
     }
 
-    /// Puts outliers and missing samples in their places.
+    /// Replaces samples by outliers and missing samples.
     fn put_overrides(&self, size: usize, out: &mut [u8]) {
         let outliers =
             self.outliers.positions.iter().map(|p| *p as usize).zip(self.outliers.samples.chunks_exact(size));
-        let places = self.missing.0.iter().enumerate().filter(|(_, missing)| **missing).map(|(i, _)| i);
-        for (index, bytes) in outliers.chain(places.zip(self.missing.1.chunks_exact(size))) {
+        let positions = self.missing.0.iter().enumerate().filter(|(_, missing)| **missing).map(|(i, _)| i);
+        for (index, bytes) in outliers.chain(positions.zip(self.missing.1.chunks_exact(size))) {
             out[index * size..(index + 1) * size].copy_from_slice(bytes);
         }
     }

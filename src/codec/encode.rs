@@ -1,15 +1,15 @@
-//! Samples of one block to a coded block that keeps its promise.
+//! Encodes the samples of one block within its error bound.
 //!
 //! 1. Transform along time (eq 5).
-//! 2. Without a pyramid, quantise and drop the smallest coefficients of each series (eq 7); with one, code the field
-//!    pass by pass (eq 32).
-//! 3. Decode again with the arithmetic of [`super::decode`], and compare with the source in the measure of the bound
+//! 2. Without a pyramid, quantise, then drop the smallest coefficients of each series (eq 7). With a pyramid, code the
+//!    field pass by pass (eq 32).
+//! 3. Decode with the arithmetic of [`super::decode`], and compare with the source in the measure of the bound
 //!    (eq 21-23).
-//! 4. Store the samples that miss the bound exactly. If they are too many, or if that is smaller, store all samples
-//!    exactly.
+//! 4. Store the samples that miss the bound exactly. Store all samples exactly if too many miss it, or if that is
+//!    smaller.
 //!
-//! So a promise holds for any finite input, whatever the basis, and rounding and quantisation count against it. Missing
-//! samples are stored as a lossless mask with their own bytes.
+//! So the bound holds for any finite input and any basis, and includes rounding and quantisation errors. Missing
+//! samples are stored without loss: a mask, and their own bytes.
 
 use super::buffer::clear;
 use super::check::Tally;
@@ -24,34 +24,35 @@ use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 use wavesplat_format::{pack_cells, pack_codes, pack_exact, pack_missing, pack_outliers};
 
-/// One worker's encoder: scratch that is reused from block to block.
+/// The encoder of one worker; its scratch is reused from block to block.
 #[derive(Debug)]
 pub struct Encoder {
     compressor: Compressor,
     codes: Vec<i32>,
-    /// The coefficients that a pyramid refines, in either precision, and room for as many.
+    /// The coefficients that a pyramid refines, in either precision, and scratch of the same size.
     single: [Vec<f32>; 2],
     double: [Vec<f64>; 2],
     raw: Vec<u8>,
 }
 
-/// A coded block, and what it does not tell itself.
+/// A coded block, and what its bytes do not contain.
 #[derive(Debug)]
 pub struct Encoded {
     /// What the file stores.
     pub block: EncodedBlock,
-    /// The largest share of its bound that a series uses, rounded up.
+    /// The largest share of a series, rounded up: its error divided by its bound.
     pub share: f64,
 }
 
 impl Encoder {
-    /// With a zstd level.
+    /// Creates an encoder with a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
         let (codes, raw, single, double) = Default::default();
         Ok(Self { compressor: Compressor::new(level)?, codes, single, double, raw })
     }
 
-    /// Codes a block of `size` voxels from its little-endian samples, frame by frame: `frames * voxels * sample size` bytes.
+    /// Encodes a block of `size` voxels. `samples` are little-endian, frame by frame: `frames * voxels * sample size`
+    /// bytes.
     pub fn block(
         &mut self,
         codec: &WindowCodec,
@@ -64,7 +65,7 @@ impl Encoder {
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
-                self.double = Default::default(); // of a window before, if any
+                self.double = Default::default(); // an earlier window may have used it
                 block.refine(pyramid, &mut self.single, &mut self.codes)
             }
             Some(pyramid) => {
@@ -81,12 +82,12 @@ impl Encoder {
             pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
-            parts.sort_by_key(|part| part.kind); // an exact part stands after it
+            parts.sort_by_key(|part| part.kind); // exact parts come after it
         }
         Ok(Encoded { block: EncodedBlock { id, stats, parts }, share })
     }
 
-    /// Codes every series by itself. None if the block must be stored exactly.
+    /// Encodes every series by itself. None if the block must be stored exactly.
     fn series(&mut self, block: &Source<'_>) -> Option<Coded> {
         let &Source { codec, samples, missing, .. } = block;
         let voxels = block.voxels();
@@ -107,7 +108,7 @@ impl Encoder {
         Some(Coded { step, changes: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
     }
 
-    /// Writes a group's kept codes, k-major, and returns the energy that dropping and rounding cost.
+    /// Writes a group's kept codes, k-major. Returns the energy lost by dropping and rounding.
     fn keep_codes(&mut self, group: &Group, step: f64, voxels: usize, first: usize, count: usize) -> f64 {
         let mut lost = 0.0;
         for (k, coefficients) in group.coefficients.iter().enumerate() {
@@ -168,7 +169,7 @@ impl Encoder {
         Ok(Parts::new(&tally, 0.0, 0.0, vec![part]))
     }
 
-    /// The block as coded, or stored exactly if it hardly shrank and that is smaller.
+    /// The coded parts, or exact ones if those are smaller. Exact storage is tried only if coding saved less than half.
     fn smaller(
         &mut self,
         codec: &WindowCodec,
@@ -185,7 +186,7 @@ impl Encoder {
     }
 }
 
-/// The parts of a block, and what the directory and the window's record say of them.
+/// The parts of a block, with its statistics for the directory and the window's record.
 struct Parts {
     stats: BlockStats,
     share: f64,
@@ -199,7 +200,7 @@ impl Parts {
     }
 }
 
-/// The count, energy and largest of coefficients.
+/// The count, energy and largest of the coefficients that codes stand for.
 fn code_stats(codes: &[i32], step: f64) -> PartStats {
     let mut stats = PartStats { count: 0, energy: 0.0, largest: 0.0 };
     for code in codes.iter().filter(|c| **c != 0) {
@@ -211,7 +212,7 @@ fn code_stats(codes: &[i32], step: f64) -> PartStats {
     stats
 }
 
-/// The count of codes, and the energy and largest of the changes where they and all finer ones are left out.
+/// The count of codes, with the energy and the largest of the changes from leaving out this part and all finer ones.
 fn change_stats(change: &Change, codes: &[i32]) -> PartStats {
     let count = codes.iter().filter(|c| **c != 0).count() as u64;
     PartStats { count, energy: change.energy(), largest: change.largest() }

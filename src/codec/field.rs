@@ -1,4 +1,4 @@
-//! The coefficients of a block, whatever scheme they were coded with.
+//! The decoded coefficients of a block, for every scheme.
 
 use super::WindowCodec;
 use super::buffer::{Buffer, Pooled};
@@ -8,11 +8,11 @@ use super::rows::{self, Change};
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use wavesplat_format::Pyramid;
 
-/// Decoded coefficients of a block.
+/// The decoded coefficients of a block.
 #[derive(Debug)]
 pub struct Field<'a> {
     values: Values<'a>,
-    /// Which k have any that are not zero, as far as that is known.
+    /// Whether each k may have coefficients that are not zero.
     marked: Vec<bool>,
 }
 
@@ -28,9 +28,9 @@ enum Values<'a> {
         /// `k * voxels + voxel`.
         codes: &'a [i32],
     },
-    /// What a pyramid in 32-bit floats gives.
+    /// Decoded by a pyramid in 32-bit floats.
     Single(Buffer<f32>),
-    /// What a pyramid in 64-bit floats gives.
+    /// Decoded by a pyramid in 64-bit floats.
     Double(Buffer<f64>),
 }
 
@@ -46,7 +46,7 @@ pub enum Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
-    /// From the codes of a block of `size` voxels, where every k is coded by itself.
+    /// Decodes one k of a block of `size` voxels. Each k must be coded by itself.
     pub(super) fn decode(
         codec: &WindowCodec,
         size: [usize; 3],
@@ -67,18 +67,18 @@ impl<'a> Plane<'a> {
         }
     }
 
-    fn scaled(step: f64, codes: &[i32], room: &'a mut Vec<f64>) -> Self {
+    fn scaled(step: f64, codes: &[i32], scratch: &'a mut Vec<f64>) -> Self {
         if rows::all_zero(codes) {
             return Self::Zero;
         }
-        room.resize(codes.len(), 0.0);
-        scale(step, codes, room);
-        Self::Double(room)
+        scratch.resize(codes.len(), 0.0);
+        scale(step, codes, scratch);
+        Self::Double(scratch)
     }
 }
 
 impl Field<'static> {
-    /// From all codes of a block of `size` voxels that a pyramid refines.
+    /// Decodes all codes of a block of `size` voxels that a pyramid refines.
     pub(super) fn refined(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
         let (values, marked) = match &codec.scheme.pyramid {
             _ if codes.is_empty() => (Values::Zero, vec![false; codec.basis.coefficients()]),
@@ -91,7 +91,7 @@ impl Field<'static> {
 }
 
 impl<'a> Field<'a> {
-    /// From all codes of a block of `size` voxels; none: all are zero.
+    /// Decodes all codes of a block of `size` voxels. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a [i32]) -> Self {
         if codec.scheme.pyramid.is_some() || codes.is_empty() {
             return Field::refined(codec, size, step, codes);
@@ -104,7 +104,7 @@ impl<'a> Field<'a> {
         !self.marked.contains(&true)
     }
 
-    /// A coefficient.
+    /// The coefficient at `k * voxels + voxel`.
     pub fn at(&self, index: usize) -> f64 {
         match &self.values {
             Values::Zero => 0.0,
@@ -114,7 +114,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// What leaving out each level part of a pyramid and all finer ones changes.
+    /// The change from leaving out each level part of a pyramid and all finer ones.
     pub(super) fn changes(&self, passes: &PredictionPasses<'_>) -> Vec<Change> {
         match &self.values {
             Values::Single(field) => passes.changes(field, &mut Vec::new()),
@@ -123,7 +123,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Some coefficients from `first` on.
+    /// Copies coefficients from index `first` on.
     fn load(&self, first: usize, out: &mut [f64]) {
         match &self.values {
             Values::Zero => out.fill(0.0),
@@ -133,8 +133,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Calls `visit(index of the first, values)` for all samples, a run of voxels at a time, with what the coefficients
-    /// give.
+    /// Calls `visit(index of the first, values)` for all decoded samples, a run of voxels at a time.
     pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
         let used = Used::of(basis, &self.marked);
         let basis = used.basis(basis);
@@ -147,7 +146,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The same where coefficients are samples.
+    /// As [`Self::for_each_run`], if the coefficients are the samples.
     pub(super) fn for_each_run_of_samples(&self, count: usize, mut visit: impl FnMut(usize, &[f64])) {
         let mut run = [0.0; 8 * RUN];
         for first in (0..count).step_by(run.len()) {
@@ -157,19 +156,19 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The coefficients of one k; `room` is for those.
-    pub fn plane<'p>(&'p self, k: usize, voxels: usize, room: &'p mut Vec<f64>) -> Plane<'p> {
+    /// The coefficients of one k, converted into `scratch` if needed.
+    pub fn plane<'p>(&'p self, k: usize, voxels: usize, scratch: &'p mut Vec<f64>) -> Plane<'p> {
         let range = k * voxels..(k + 1) * voxels;
         match &self.values {
             _ if !self.marked[k] => Plane::Zero,
             Values::Zero => Plane::Zero,
-            Values::Codes { step, codes } => Plane::scaled(*step, &codes[range], room),
+            Values::Codes { step, codes } => Plane::scaled(*step, &codes[range], scratch),
             Values::Single(values) => Plane::Single(&values[range]),
             Values::Double(values) => Plane::Double(&values[range]),
         }
     }
 
-    /// The series of a voxel.
+    /// The decoded series of a voxel.
     pub(super) fn series(&self, basis: &dyn TimeBasis, voxels: usize, voxel: usize) -> Vec<f64> {
         let mut work = vec![Lane::default(); basis.coefficients()];
         let mut series = vec![Lane::default(); basis.frames()];
@@ -179,14 +178,14 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The coefficients that a block uses, and what gives series from them.
+/// The coefficients that a block uses, and the basis restricted to them.
 pub(super) struct Used {
     pub(super) ks: Vec<usize>,
     basis: Option<Box<dyn TimeBasis>>,
 }
 
 impl Used {
-    /// All coefficients of unmarked k are zero.
+    /// Creates it from marks. All coefficients of unmarked k must be zero.
     pub(super) fn of(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
         let basis = basis.only(marked);
         let ks = (0..marked.len()).filter(|k| basis.is_none() || marked[*k]).collect();
@@ -198,18 +197,18 @@ impl Used {
     }
 }
 
-/// Voxels whose series are decoded together: so many that what they need of each plane are whole cache lines.
+/// The number of voxels decoded together. Their part of each plane fills whole cache lines.
 const RUN: usize = 128;
 
-/// The series of a run of voxels, [`LANES`] by [`LANES`].
+/// The series of a run of voxels, in groups of [`LANES`].
 struct Run<'a> {
-    /// Which coefficients.
+    /// The coefficients used.
     ks: &'a [usize],
-    /// `[voxels / LANES][of ks]`
+    /// `[voxels / LANES][index in ks]`
     coefficients: Vec<Lane>,
     /// `[voxels / LANES][frame]`
     series: Vec<Lane>,
-    /// Of one k or frame.
+    /// The values of one k or one frame.
     row: [f64; RUN],
 }
 

@@ -1,7 +1,7 @@
-//! The samples of a block, loaded a few series at a time; missing ones are found, and filled.
+//! Loads the samples of a block, a few series at a time. Finds missing samples and fills them.
 //!
-//! A block's samples stay bytes: finding, loading and checking make numbers of a few at a time, which costs less than eight
-//! bytes of memory for every sample.
+//! A block's samples stay bytes. Finding, loading and checking turn a few of them into numbers at a time, which takes less
+//! memory than eight bytes for every sample.
 
 use super::WindowCodec;
 use super::truncate::Group;
@@ -27,14 +27,15 @@ impl Missing {
         Self { mask, count, magnitude: 0.0_f64.max(-lo).max(hi) }
     }
 
-    /// The very bytes of the missing samples.
+    /// The bytes of the missing samples, in order.
     pub(super) fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
         let each = samples.chunks_exact(codec.sample.size());
         each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
     }
 }
 
-/// Loads the series of a group of voxels, missing samples filled with the last present one (or the next, or zero).
+/// Loads the series of a group of voxels. Missing samples are filled with the last present one, else the next, else
+/// zero.
 pub(super) fn load_group(
     codec: &WindowCodec,
     weighing: &QuantizerSetup,
@@ -58,7 +59,7 @@ pub(super) fn load_group(
     }
 }
 
-/// The samples of `count` of `voxels` voxels, frame by frame, and zeros.
+/// Loads the samples of `count` of `voxels` voxels, frame by frame; unused lanes are zero.
 fn load_lanes(codec: &WindowCodec, samples: &[u8], (first, count): (usize, usize), voxels: usize, out: &mut [Lane]) {
     let size = codec.sample.size();
     if count == LANES {

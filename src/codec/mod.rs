@@ -1,8 +1,8 @@
-//! One block: samples to a coded block under a bound, and back. Pure functions over slices; no I/O, no threads.
+//! Codes and decodes one block within an error bound. Pure functions over slices; no I/O, no threads.
 //!
-//! [`encode`] transforms, truncates, quantises, decodes again and stores exactly what missed the bound. [`decode`] is
-//! the one decoder that the encoder checks with, and that `extract`, `verify` and the renderer use. A scheme beyond a
-//! transform along time replaces this folder's use of [`crate::wavelet`] and nothing else.
+//! [`encode`] transforms, truncates and quantises samples, decodes the result, and stores the samples that miss the
+//! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
+//! renderer use it. To change the transform along time, only this folder's use of [`crate::wavelet`] must change.
 
 pub mod bound;
 pub mod buffer;
@@ -29,29 +29,29 @@ use scheme::Scheme;
 use std::ops::Range;
 use wavesplat_format::{Metadata, Pyramid, Window};
 
-/// Everything that coding and decoding the blocks of one window share.
+/// What coding and decoding share for all blocks of one window.
 #[derive(Debug)]
 pub struct WindowCodec {
     /// How blocks are coded.
     pub scheme: Scheme,
     /// The temporal basis.
     pub basis: Box<dyn TimeBasis>,
-    /// The basis as numbers: `synthesis[k][t]` is u_k(t).
+    /// The basis functions: `synthesis[k][t]` is u_k(t).
     pub synthesis: Vec<Vec<f64>>,
     /// The largest sum over k of |u_k(t)| (eq 25).
     pub gain: f64,
     /// The type of the samples.
     pub sample: SampleType,
-    /// What is promised.
+    /// The guaranteed error bound.
     pub promise: ErrorBound,
-    /// The sample that stands for "missing" besides NaN and infinities.
+    /// The sample value that means "missing", besides NaN and infinities.
     pub missing_value: Option<f64>,
-    /// Without a pyramid: the coefficients in each level part of a block, coarse to fine.
+    /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
 }
 
 impl WindowCodec {
-    /// The codec of a window of `frames` frames whose blocks are at most `edge` voxels a side.
+    /// Creates the codec of a window of `frames` frames. Blocks have at most `edge` voxels a side.
     pub fn new(scheme: Scheme, frames: usize, sample: SampleType, promise: ErrorBound, edge: usize) -> Self {
         let basis = scheme.time_basis(frames);
         let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
@@ -71,7 +71,7 @@ impl WindowCodec {
         Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, levels }
     }
 
-    /// The codec of a window as a coefficient file describes it; says what contradicts the basis.
+    /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
     pub fn of_file(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
         let scheme = Scheme::of_window(window);
         let basis = scheme.time_basis(window.frames as usize);
@@ -86,27 +86,27 @@ impl WindowCodec {
         Ok(Self { missing_value: file.missing_value, ..codec })
     }
 
-    /// The number of level parts that a block can have.
+    /// The largest number of level parts of a block.
     pub fn parts(&self) -> usize {
         if self.scheme.pyramid.is_some() { usize::from(Pyramid::PARTS) } else { self.levels.len() }
     }
 
-    /// Whether a level part says anything about the coefficients that `wanted` marks.
+    /// Whether a level part affects the coefficients that `wanted` marks.
     pub(crate) fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
         match &self.scheme.pyramid {
             None => wanted[self.levels[part].clone()].contains(&true),
-            // Along time, the last pass adds the odd frames alone.
+            // The last pass, along time, adds only the odd frames.
             Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
             Some(_) => true,
         }
     }
 
-    /// Nodes of a block of `size` voxels along x, y, z and k.
+    /// The numbers of nodes along x, y, z and k in a block of `size` voxels.
     pub(crate) fn shape(&self, [x, y, z]: [usize; 3]) -> [usize; 4] {
         [x, y, z, self.basis.coefficients()]
     }
 
-    /// The codes of each level part of a block of `size` voxels.
+    /// The range of codes in each level part of a block of `size` voxels.
     fn part_ranges(&self, size: [usize; 3]) -> Vec<Range<usize>> {
         let voxels: usize = size.iter().product();
         match &self.scheme.pyramid {
@@ -115,18 +115,18 @@ impl WindowCodec {
         }
     }
 
-    /// Frames of the window.
+    /// The number of frames in the window.
     pub fn frames(&self) -> usize {
         self.basis.frames()
     }
 
-    /// Whether a sample is missing: not finite, or the declared value.
+    /// Whether a sample is missing: not finite, or equal to the declared value.
     pub fn is_missing(&self, value: f64) -> bool {
         sample::is_missing(value, self.missing_value)
     }
 
-    /// The larger error of a decoded value as it is splatted and as it is extracted; rounded up. Infinite if it would be
-    /// taken for a missing one.
+    /// The larger of the errors of the splatted and the extracted value, rounded up. Infinite if the extracted value
+    /// would be read as missing.
     pub fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
         let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
@@ -134,10 +134,10 @@ impl WindowCodec {
     }
 }
 
-/// The level part of a pyramid that holds the last pass along time.
+/// The level part of a pyramid with the last pass along time.
 const ODD_FRAMES: usize = Pyramid::PARTS as usize - 1;
 
-/// Joins the small coarse levels, so that a part of a whole block holds at least this many coefficients.
+/// Small coarse levels are joined until a part of a whole block holds at least this many coefficients.
 const PART_COEFFICIENTS: usize = 1 << 17;
 
 fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
@@ -157,7 +157,7 @@ fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
     parts
 }
 
-/// Voxels in groups of [`LANES`]: (first voxel, number in the group).
+/// Splits voxels into groups of [`LANES`]: (first voxel, number in the group).
 fn lane_groups(voxels: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..voxels).step_by(LANES).map(move |first| (first, LANES.min(voxels - first)))
 }

@@ -1,6 +1,6 @@
-//! The pyramid of a block: nodes predicted from coarser ones, and codes for what is missing.
+//! The pyramid of a block: nodes are predicted from coarser ones, and codes store the difference.
 //!
-//! Interpolation on nested lattices with a quantised correction in a closed loop is the principle of
+//! Interpolation on nested lattices, with quantised corrections in a closed loop, is the principle of
 //! [SZ3](crate::bibliography) and [Zhao](crate::bibliography). Pass j refines one axis by two. Even nodes keep their
 //! value. U_j predicts odd nodes along that axis, and a code q times the step of its level l is added:
 //!
@@ -10,13 +10,13 @@
 //! step_l = step / min(growth^l, most)        |v^ - v| <= step_l / 2                                       (eq 34)
 //! ```
 //!
-//! The encoder predicts from what the decoder has. So errors do not add up from pass to pass: a node is off by the
-//! rounding of its own code, which is at most half a step of its level. Where nodes are samples, gain is 1 and step = 2
-//! delta (eq 25). Where nodes are coefficients of a transform along time, each k has a pyramid in space of its own, and
-//! eq 25 gives the step.
+//! The encoder predicts from decoded nodes. So errors do not add up from pass to pass: a node's only error is the
+//! rounding of its own code, at most half a step of its level. If nodes are samples, gain is 1 and step = 2 delta (eq
+//! 25). If nodes are coefficients of a transform along time, each k has its own pyramid in space, and eq 25 gives the
+//! step.
 //!
-//! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So the
-//! coefficients of one k can be decoded, and splatted, without the others.
+//! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So one
+//! k can be decoded and splatted without the others.
 
 use super::real::Real;
 use super::rows::{self, Change};
@@ -24,16 +24,16 @@ use crate::wavelet;
 use std::ops::Range;
 use wavesplat_format::{Axis, Pass, Pyramid, Stencil};
 
-/// Level parts of a block.
+/// The number of level parts of a block.
 const PARTS: usize = Pyramid::PARTS as usize;
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
 pub(crate) struct PredictionPasses<'a> {
     pyramid: &'a Pyramid,
-    /// Nodes that are refined together: all, or those of one k where k is not refined.
+    /// The nodes of one slice, refined together: all nodes, or those of one k if k is not refined.
     shape: [usize; 4],
-    /// How many times there are so many.
+    /// The number of slices.
     slices: usize,
     passes: Vec<Pass>,
 }
@@ -57,8 +57,8 @@ impl<'a> PredictionPasses<'a> {
         self.passes.iter().filter(|p| p.part == part).map(|p| of_all(p.extent(self.shape))).collect()
     }
 
-    /// Codes to the field; `codes` are all of the block's, pass after pass. Returns of which k some node is not zero, or
-    /// true for all of them where k is refined.
+    /// Decodes codes to the field; `codes` are all codes of the block, pass after pass. Returns for each k whether some
+    /// node is not zero; where k is refined, true for all or none.
     pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) -> Vec<bool> {
         let marked = self.marked(codes);
         for (slice, nodes) in self.slices(field).enumerate() {
@@ -71,13 +71,13 @@ impl<'a> PredictionPasses<'a> {
         marked
     }
 
-    /// Of which k some code is not zero, or of all of them where k is refined.
+    /// For each k, whether some code is not zero; if k is refined, the same for all of them.
     pub(crate) fn marked(&self, codes: &[i32]) -> Vec<bool> {
         let some = |slice| self.of_slice(slice).any(|(_, range)| !rows::all_zero(&codes[range]));
         (0..self.slices).flat_map(|slice| std::iter::repeat_n(some(slice), self.shape[3])).collect()
     }
 
-    /// As [`Self::decode`], of one k that is not refined with others; false if all of it is zero.
+    /// As [`Self::decode`], for one k that is not refined with others. False if all its nodes are zero.
     pub(crate) fn decode_one<R: Real>(&self, k: usize, step: f64, codes: &[i32], nodes: &mut Vec<R>) -> bool {
         let some = self.of_slice(k).any(|(_, range)| !rows::all_zero(&codes[range]));
         if some {
@@ -94,8 +94,7 @@ impl<'a> PredictionPasses<'a> {
         }
     }
 
-    /// Codes the field, in the place of which is then what the decoder makes of the codes. Nodes that are not a number get
-    /// the code 0. False if a code does not fit.
+    /// Encodes the field and replaces it by the decoded field. NaN nodes get the code 0. False if a code does not fit.
     pub(crate) fn encode<R: Real>(&self, step: f64, field: &mut [R], codes: &mut [i32]) -> bool {
         let mut fits = true;
         for (slice, nodes) in self.slices(field).enumerate() {
@@ -107,12 +106,12 @@ impl<'a> PredictionPasses<'a> {
         fits
     }
 
-    /// What leaving out each level part and all finer ones changes in a decoded field; `rest` is scratch.
+    /// The change of a decoded field from leaving out each level part and all finer ones; `rest` is scratch.
     pub(crate) fn changes<R: Real>(&self, field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
         self.changes_of(&[true; PARTS], field, rest)
     }
 
-    /// As [`Self::changes`], for parts with a code that is not zero alone: the directory says nothing of the others.
+    /// As [`Self::changes`], only for parts with a code that is not zero; the directory does not list others.
     pub(crate) fn changes_of_coded<R: Real>(&self, codes: &[i32], field: &[R], rest: &mut Vec<R>) -> Vec<Change> {
         let ranges = wavelet::ranges(&self.part_lengths());
         let coded: Vec<bool> = ranges.into_iter().map(|range| !rows::all_zero(&codes[range])).collect();
@@ -129,7 +128,7 @@ impl<'a> PredictionPasses<'a> {
         changes
     }
 
-    /// Adds what leaving out a level part and all finer ones changes in a slice.
+    /// Adds the change of a slice from leaving out a level part and all finer ones.
     fn leave_out<R: Real>(&self, part: usize, nodes: &[R], rest: &mut Vec<R>, change: &mut Change) {
         if part == 0 {
             return rows::add_changes_to_zero(change, nodes);
@@ -140,7 +139,7 @@ impl<'a> PredictionPasses<'a> {
         finer.for_each(|(refined, _)| leave_out_pass(&refined, change, rest));
     }
 
-    /// Nodes of a slice.
+    /// The number of nodes in a slice.
     fn slice(&self) -> usize {
         self.shape.iter().product()
     }
@@ -149,7 +148,7 @@ impl<'a> PredictionPasses<'a> {
         field.chunks_exact_mut(self.slice())
     }
 
-    /// The passes over a slice, and where its codes are among those of the block.
+    /// The passes over a slice, each with the range of its codes in the block.
     fn of_slice(&self, slice: usize) -> impl Iterator<Item = (Refined<'_>, Range<usize>)> {
         let mut start = 0;
         self.passes.iter().map(move |pass| {
@@ -161,20 +160,20 @@ impl<'a> PredictionPasses<'a> {
     }
 }
 
-/// A pass over some nodes.
+/// One pass over a slice.
 struct Refined<'a> {
     stencil: Stencil,
     shape: [usize; 4],
     pass: &'a Pass,
 }
 
-/// Eq 32 for all nodes of a pass.
+/// Computes eq 32 for all nodes of a pass.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_pass<R: Real>(refined: &Refined<'_>, step: R, codes: &[i32], field: &mut [R]) {
     refined.for_each_row(field, |first, nodes, predicted| rows::decode(nodes, predicted, &codes[first..], step));
 }
 
-/// The codes of a pass, and in place of its nodes what eq 32 makes of them.
+/// Computes the codes of a pass, and replaces its nodes by their decoded values (eq 32).
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &mut [i32], field: &mut [R]) -> bool {
     let mut fits = true;
@@ -184,7 +183,7 @@ fn encode_pass<R: Real>(refined: &Refined<'_>, [step, inverse]: [R; 2], codes: &
     fits
 }
 
-/// Adds what leaving the pass out changes. Overwrites `field` by what is left.
+/// Adds the change from leaving out the pass. Replaces the nodes in `field` by their predictions.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &mut [R]) {
     refined.for_each_row(field, |_, nodes, predicted| {
@@ -193,8 +192,7 @@ fn leave_out_pass<R: Real>(refined: &Refined<'_>, change: &mut Change, field: &m
 }
 
 impl Refined<'_> {
-    /// Calls `visit` with every row of nodes along x that the pass adds: the place of its codes, the nodes, and what they
-    /// are predicted to be.
+    /// Calls `visit(index of its first code, nodes, predicted)` for every row of nodes along x that the pass adds.
     #[inline(always)]
     fn for_each_row<R: Real>(&self, field: &mut [R], mut visit: impl FnMut(usize, &mut [R], &[R])) {
         let (first, distance) = self.pass.nodes(0);
@@ -253,7 +251,7 @@ impl Refined<'_> {
         let mut i = 0;
         while i < predicted.len() {
             let taps = taps(self.stencil, i, count);
-            // All nodes between the faces have the same taps, one further each.
+            // All nodes between the faces have the same taps, each shifted by one.
             let run = if taps.count == INNER { (count - 2 - i).min(predicted.len() - i) } else { 1 };
             let from = |t: usize| if t < taps.count { &evens[taps.first + t..] } else { &[] };
             taps.sum(std::array::from_fn(from), &mut predicted[i..i + run]);
@@ -261,7 +259,7 @@ impl Refined<'_> {
         }
     }
 
-    /// The shape in which the rows are longest: all nodes of a plane, where the pass adds or keeps all of them.
+    /// The shape with the longest rows: a row is a whole plane if the pass adds or keeps all nodes of planes.
     fn side_by_side(&self) -> [usize; 4] {
         let [x, y, z, k] = self.shape;
         let across = matches!(self.pass.axis, Some(Axis::Z | Axis::T));
@@ -270,10 +268,10 @@ impl Refined<'_> {
     }
 }
 
-/// Taps of a cubic stencil between the faces.
+/// The number of taps of a cubic stencil between the faces.
 const INNER: usize = 4;
 
-/// Rows that a pass needs for a while.
+/// Scratch rows of a pass.
 struct Scratch<R> {
     predicted: Vec<R>,
     apart: Vec<R>,
@@ -287,19 +285,19 @@ impl<R: Real> Scratch<R> {
     }
 }
 
-/// Where a row is: the offset of its node at x = 0, its `[x, y, z, k]`, and the place of its first code.
+/// The location of a row: the offset of its node at x = 0, its `[x, y, z, k]`, and the index of its first code.
 struct RowAt {
     start: usize,
     index: [usize; 4],
     codes: usize,
 }
 
-/// The rows along x that a pass adds nodes to, in an order in which those that predict them are near in memory.
+/// The rows along x of a pass, ordered so that the rows that predict them are near in memory.
 struct Rows {
     shape: [usize; 4],
     extent: [usize; 4],
     nodes: [(usize, usize); 4],
-    /// Axes of the outermost and of the next loop; y is the innermost.
+    /// The axes of the outermost and of the next loop; y is the innermost.
     loops: [usize; 2],
     next: usize,
 }
@@ -329,7 +327,7 @@ impl Iterator for Rows {
     }
 }
 
-/// Weights of some even nodes, the first being number `first`.
+/// The weights of `count` consecutive even nodes, from number `first` on.
 #[derive(Debug, Clone, Copy)]
 struct Taps {
     first: usize,
@@ -338,7 +336,7 @@ struct Taps {
 }
 
 impl Taps {
-    /// The weighted sum of rows, one for each tap, from the first tap to the last.
+    /// Computes the weighted sum of rows, one for each tap, from the first tap to the last.
     #[inline(always)]
     fn sum<R: Real>(&self, [a, b, c, d]: [&[R]; 4], out: &mut [R]) {
         let [w, x, y, z] = self.weights.map(R::of);
@@ -351,10 +349,11 @@ impl Taps {
     }
 }
 
-/// The stencil for odd node `i`, between the even nodes i and i + 1 of `evens` (eq 33). Sums go from the first tap to the last.
+/// The stencil for odd node `i`, between the even nodes i and i + 1 of `evens` (eq 33). Sums go from the first tap to
+/// the last.
 ///
-/// The polynomial through the nearest nodes: cubic through four, quadratic through three next to a face, and a straight line
-/// (-1, 3)/2 beyond the last even node.
+/// The polynomial through the nearest nodes: cubic through four, quadratic through three next to a face, and a straight
+/// line (-1, 3)/2 beyond the last even node.
 fn taps(stencil: Stencil, i: usize, evens: usize) -> Taps {
     let (last, cubic) = (i + 1 >= evens, stencil == Stencil::Cubic);
     let (first, weights, count) = match () {

@@ -2,33 +2,33 @@
 
 use std::ops::{Add, Mul, Sub};
 
-/// `f32` or `f64`. All operations are correctly rounded, so that every machine gets the same bits.
+/// `f32` or `f64`. All operations are correctly rounded, so every machine computes the same bits.
 pub(crate) trait Real:
     Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// Codes are smaller than this: whole numbers up to it, and halves between them, are exact.
+    /// Codes are smaller than this. Whole numbers up to it, and halves between them, are exact.
     const MOST_CODE: Self;
 
-    /// A block with larger samples is stored exactly: sums of its coefficients could overflow.
+    /// Blocks with larger samples are stored exactly, because sums of their coefficients could overflow.
     const LARGEST: f64;
 
-    /// Adding and taking away this rounds smaller numbers to the nearest whole one.
+    /// Adding and then subtracting this rounds smaller numbers to the nearest whole one.
     const BIG: Self;
 
-    /// Rounded to the type.
+    /// Rounds to the type.
     fn of(x: f64) -> Self;
 
-    /// Of a code.
+    /// Converts a code.
     fn of_code(code: i32) -> Self;
 
-    /// Exactly.
+    /// Converts exactly.
     fn to_f64(self) -> f64;
 
-    /// Whether it is not a number.
+    /// Whether the value is NaN.
     fn is_nan(self) -> bool;
 
-    /// What a whole number (less than 2^31 in `f64`, than 2^22 in `f32`) and [`Self::BIG`] sum to, back to that: the last digits
-    /// of such a sum count. A conversion of any number would not be vector code.
+    /// The whole number n (below 2^31 for `f64`, 2^22 for `f32`) from the sum n + [`Self::BIG`], by the sum's low bits.
+    /// A general conversion to an integer would not compile to vector code.
     fn less_big(self) -> i32;
 }
 

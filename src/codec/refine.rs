@@ -1,7 +1,8 @@
-//! Coding a block by a pyramid: samples to a field of coefficients (eq 5), through the passes (eq 32), and compared.
+//! Encodes a block by a pyramid: transforms samples to coefficients (eq 5), runs the passes (eq 32), and compares the
+//! result with the source.
 //!
-//! The step is that of eq 25 times the scheme's coarseness, less what 32-bit floats round. With a coarseness above 1
-//! rounding alone does not keep the promise, and samples that miss it are stored exactly.
+//! The step is that of eq 25 times the scheme's coarseness, less a margin for rounding in 32-bit floats. With a
+//! coarseness above 1, rounding alone may miss the bound; samples that miss it are stored exactly.
 
 use super::buffer::clear;
 use super::check::{Compared, Tally};
@@ -18,21 +19,21 @@ use crate::codec::bound::Measure;
 use crate::wavelet::LANES;
 use wavesplat_format::{Basis, Outliers, Pyramid};
 
-/// What is known about a block after its series have been coded.
+/// The result of coding the series of a block.
 pub(super) struct Coded {
     pub(super) step: f64,
-    /// With a pyramid: what leaving out each level part and all finer ones changes, where a part has codes.
+    /// With a pyramid: the change from leaving out each level part and all finer ones, for parts that have codes.
     pub(super) changes: Option<Vec<Change>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
     pub(super) tally: Tally,
 }
 
-/// The samples of a block, and how to code them.
+/// The samples of a block, and the codec for them.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) codec: &'a WindowCodec,
-    /// Voxels along x, y, z.
+    /// The number of voxels along x, y, z.
     pub(super) size: [usize; 3],
     /// Little-endian, frame by frame.
     pub(super) samples: &'a [u8],
@@ -44,7 +45,8 @@ impl Source<'_> {
         self.size.iter().product()
     }
 
-    /// Codes the block by a pyramid; the fields and `codes` are scratch and result. None if it must be stored exactly.
+    /// Encodes the block by a pyramid. `codes` is the result; the fields are scratch. None if the block must be stored
+    /// exactly.
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
@@ -69,19 +71,19 @@ impl Source<'_> {
         Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
     }
 
-    /// The step of the finest codes. None if the block must be stored exactly.
+    /// The step of the finest level. None if the block must be stored exactly.
     pub(super) fn step<R: Real>(&self, pyramid: &Pyramid, weighing: &QuantizerSetup) -> Option<f64> {
         let rounding = if pyramid.single { self.missing.magnitude * SINGLE_ROUNDING } else { 0.0 };
         let step = weighing.step * self.codec.scheme.coarseness - rounding;
         (step.is_normal() && step >= 0.0 && self.missing.magnitude <= R::LARGEST).then_some(step)
     }
 
-    /// Whether nothing but the pyramid is between a sample and its code, and every sample is judged by itself.
+    /// Whether the pyramid codes samples directly, and the bound applies to each sample by itself.
     fn plain(&self) -> bool {
         self.codec.scheme.basis == Basis::Samples && self.codec.promise.measure() == Measure::Largest
     }
 
-    /// The nodes that the pyramid refines.
+    /// Loads the nodes that the pyramid refines.
     pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup, field: &mut Vec<R>) {
         field.resize(self.codec.basis.coefficients() * self.voxels(), R::default());
         if self.plain() {
@@ -91,7 +93,7 @@ impl Source<'_> {
         }
     }
 
-    /// The samples themselves; those that are missing as "not a number".
+    /// Loads the samples as nodes; missing samples become NaN.
     fn load_samples<R: Real>(&self, field: &mut [R]) {
         sample::load_as(self.codec.sample, self.samples, field, R::of);
         if self.missing.count > 0 {
@@ -100,7 +102,7 @@ impl Source<'_> {
         }
     }
 
-    /// The coefficients of all series.
+    /// Loads the coefficients of all series.
     fn load_series<R: Real>(&self, weighing: &QuantizerSetup, field: &mut [R]) {
         let (codec, voxels) = (self.codec, self.voxels());
         let mut group = Group::new(codec);
@@ -117,30 +119,36 @@ impl Source<'_> {
         }
     }
 
-    /// Compares samples with the field, where every one is judged by itself. None if too many miss the bound.
+    /// Compares samples with the field, each by itself. None if too many miss the bound.
     fn check_samples<R: Real>(&self, field: &[R]) -> Option<Tally> {
         let (mut tally, mut decoded) = (Tally::new(), Vec::new());
         sample::for_each_run(self.codec.sample, self.samples, |first, values| {
-            if !self.outliers_affordable(tally.places.len()) {
+            if !self.outliers_affordable(tally.outliers.len()) {
                 return;
             }
             clear(&mut decoded).extend(field[first..][..values.len()].iter().map(|node| node.to_f64()));
             let (source, last_source) = values.as_chunks::<LANES>();
             let (whole, last_whole) = decoded.as_chunks::<LANES>();
             let last = |values: &[f64]| [std::array::from_fn(|l| values.get(l).copied().unwrap_or(0.0))];
-            let place = |first: usize| move |t: usize, l: usize| self.place(first + t * LANES + l);
+            let sample_index = |first: usize| move |t: usize, l: usize| self.sample_index(first + t * LANES + l);
             let present = self.missing.count == 0;
-            tally.add_series(self.codec, &Compared { source, decoded: whole }, LANES, present, place(first));
+            tally.add_series(self.codec, &Compared { source, decoded: whole }, LANES, present, sample_index(first));
             if !last_source.is_empty() {
                 let first = first + values.len() - last_source.len();
                 let (source, decoded) = (&last(last_source), &last(last_whole));
-                tally.add_series(self.codec, &Compared { source, decoded }, last_source.len(), present, place(first));
+                tally.add_series(
+                    self.codec,
+                    &Compared { source, decoded },
+                    last_source.len(),
+                    present,
+                    sample_index(first),
+                );
             }
         });
-        self.outliers_affordable(tally.places.len()).then_some(tally)
+        self.outliers_affordable(tally.outliers.len()).then_some(tally)
     }
 
-    /// Compares series with what the decoder makes of the field. None if too many samples miss the bound.
+    /// Compares series with the decoded field. None if too many samples miss the bound.
     fn check_series<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> Option<Tally> {
         let used = Used::of(self.codec.basis.as_ref(), marked);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
@@ -151,7 +159,7 @@ impl Source<'_> {
         Some(tally)
     }
 
-    /// A group of series, and what the decoder makes of the field there.
+    /// Loads a group of series, and decodes the field for them.
     fn decode_group<R: Real>(
         &self,
         weighing: &QuantizerSetup,
@@ -172,48 +180,49 @@ impl Source<'_> {
         used.basis(codec.basis.as_ref()).inverse(coefficients, &mut group.decoded);
     }
 
-    /// About how many samples miss the bound: a few of the series are looked at.
+    /// Estimates how many samples miss the bound, from one group of series in [`SAMPLING`].
     pub(super) fn estimate_outliers<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> usize {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
             return 0;
         }
         let used = Used::of(self.codec.basis.as_ref(), marked);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
-        for (first, count) in lane_groups(self.voxels()).step_by(LOOKED_AT) {
+        for (first, count) in lane_groups(self.voxels()).step_by(SAMPLING) {
             self.decode_group(weighing, (field, &used), (first, count), &mut group);
             self.add(&group, (first, count), &mut tally);
         }
-        tally.places.len() * LOOKED_AT
+        tally.outliers.len() * SAMPLING
     }
 
-    /// Compares a group's decoded series with the source. None if too many samples miss the bound by now.
+    /// Compares a group's decoded series with the source. None if too many samples have missed the bound so far.
     pub(super) fn check(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) -> Option<()> {
         self.add(group, (first, count), tally);
-        self.outliers_affordable(tally.places.len()).then_some(())
+        self.outliers_affordable(tally.outliers.len()).then_some(())
     }
 
     fn add(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) {
         let compared = Compared { source: &group.source, decoded: &group.decoded };
-        let place = |t: usize, lane: usize| self.place(t * self.voxels() + first + lane);
-        tally.add_series(self.codec, &compared, count, self.missing.count == 0, place);
+        let sample_index = |t: usize, lane: usize| self.sample_index(t * self.voxels() + first + lane);
+        tally.add_series(self.codec, &compared, count, self.missing.count == 0, sample_index);
     }
 
-    /// A sample that is there.
-    fn place(&self, index: usize) -> Option<usize> {
+    /// The index of a sample; none if it is missing.
+    fn sample_index(&self, index: usize) -> Option<usize> {
         (!self.missing.mask[index]).then_some(index)
     }
 
-    /// Whether so few samples miss the bound that storing them is cheaper than storing all.
+    /// Whether storing the samples that miss the bound is cheaper than storing all samples exactly.
     pub(super) fn outliers_affordable(&self, outliers: usize) -> bool {
         outliers <= self.missing.mask.len() / MOST_OUTLIERS
     }
 }
 
-/// One group of series in this many is looked at where outliers are only estimated; rows of usual lengths are no multiple.
-const LOOKED_AT: usize = 3;
+/// The estimate of outliers samples one group of series in this many. Rows of usual lengths are no multiple of it.
+const SAMPLING: usize = 3;
 
-/// A block in which more than one sample in this many misses the bound is stored exactly: an outlier costs more bytes.
+/// A block is stored exactly if more than one sample in this many misses the bound, because an outlier takes more bytes
+/// than a sample of an exact block.
 const MOST_OUTLIERS: usize = 8;
 
-/// What a step gives up, in units of the largest sample, so that rounding in 32-bit floats stays within the bound.
+/// The margin subtracted from a step, relative to the largest sample, for rounding in 32-bit floats.
 const SINGLE_ROUNDING: f64 = 1.0 / (1 << 22) as f64;

@@ -1,4 +1,4 @@
-//! Rows of nodes, side by side: what every pass of a pyramid does to them, to be compiled into it as vector code.
+//! Operations on rows of nodes, inlined into every pass of a pyramid and compiled to vector code.
 
 use super::real::Real;
 use crate::wavelet::{LANES, Lane};
@@ -38,7 +38,7 @@ pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], s
     }
 }
 
-/// The codes of v - p, 0 for what is not a number, and v as the decoder has it. False if a code does not fit.
+/// Computes the codes of v - p, 0 for NaN, and replaces v by its decoded value. False if a code does not fit.
 #[inline(always)]
 pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32], step: R, inverse: R) -> bool {
     let least = R::default() - R::MOST_CODE;
@@ -54,7 +54,7 @@ pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32
     fits
 }
 
-/// Every `distance`-th of some nodes, as many as there is room for.
+/// Copies every `distance`-th node until `out` is full.
 #[inline(always)]
 pub(super) fn gather<R: Real>(nodes: &[R], distance: usize, out: &mut [R]) {
     if distance == 2 && nodes.len() >= 2 * out.len() {
@@ -69,12 +69,12 @@ pub(super) fn is_zero<R: Real>(nodes: &[R]) -> bool {
     nodes.chunks(64).all(|some| some.iter().fold(true, |all, node| all & (*node == R::default())))
 }
 
-/// Whether no code says anything.
+/// Whether all codes are zero.
 pub(super) fn all_zero(codes: &[i32]) -> bool {
     codes.chunks(64).all(|some| some.iter().fold(0, |any, code| any | code) == 0)
 }
 
-/// How far values change, and by how much in all.
+/// The largest change and the sum of squared changes of some values.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Change {
     largest: Lane,
@@ -82,7 +82,7 @@ pub(crate) struct Change {
 }
 
 impl Change {
-    /// The largest change, rounded up; infinite where values are too large for their differences.
+    /// The largest change, rounded up; infinite if differences of the values overflow.
     pub(crate) fn largest(&self) -> f64 {
         if self.energy().is_nan() {
             return f64::INFINITY;
@@ -104,7 +104,7 @@ impl Change {
     }
 }
 
-/// Adds the changes from `nodes` to `others`, which take their place.
+/// Adds the changes from `nodes` to `others`, and replaces `nodes` by `others`.
 #[inline(always)]
 pub(super) fn replace<R: Real>(change: &mut Change, nodes: &mut [R], others: &[R]) {
     let (nodes, last_nodes) = nodes.as_chunks_mut::<LANES>();

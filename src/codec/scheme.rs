@@ -1,4 +1,4 @@
-//! Schemes: which transform and which pyramid the blocks of a window are coded with.
+//! Schemes: the transform and the pyramid that code the blocks of a window.
 
 use crate::wavelet::{self, TimeBasis};
 pub use wavesplat_format::{Axis, Basis, Pyramid, Stencil, Window};
@@ -10,19 +10,20 @@ pub struct Scheme {
     pub basis: Basis,
     /// The learned functions, if the basis is [`Basis::Learned`].
     pub functions: Vec<i16>,
-    /// How coefficients, or samples, are refined; none: each is coded by itself.
+    /// The pyramid that refines coefficients or samples; without one, each is coded by itself.
     pub pyramid: Option<Pyramid>,
-    /// The step in units of the one for which rounding alone keeps the promise. Samples that then miss it are stored exactly.
+    /// The step, relative to the step for which rounding alone stays within the bound. Samples that then miss the bound
+    /// are stored exactly.
     pub coarseness: f64,
 }
 
 impl Scheme {
-    /// A transform along time alone, as [Dobashi](crate::bibliography) has it.
+    /// Only a transform along time, as in [Dobashi](crate::bibliography).
     pub fn along_time(basis: Basis) -> Self {
         Self { basis, functions: Vec::new(), pyramid: None, coarseness: 1.0 }
     }
 
-    /// As a window of a file says.
+    /// The scheme of a window of a file.
     pub fn of_window(window: &Window) -> Self {
         let (functions, pyramid) = (window.functions.clone(), window.pyramid.clone());
         Self { basis: window.basis, functions, pyramid, coarseness: window.coarseness }
@@ -33,7 +34,7 @@ impl Scheme {
         wavelet::basis(self.basis, &self.functions, frames)
     }
 
-    /// Its name for reports: the transform, and what refines it along which axes.
+    /// A name for reports: the transform, and the pyramid's stencil and axes.
     pub fn name(&self) -> String {
         let Some(pyramid) = &self.pyramid else { return self.basis.name().into() };
         let axes: String = pyramid.order.iter().map(|axis| format!("{axis:?}").to_lowercase()).collect();

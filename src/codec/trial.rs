@@ -1,4 +1,4 @@
-//! About how many bytes a box of samples takes with a pyramid. No bytes are made, and few series compared.
+//! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
 use super::buffer::clear;
@@ -9,7 +9,7 @@ use super::refine::Source;
 use super::weigh::QuantizerSetup;
 use wavesplat_format::{Pyramid, estimate_cells};
 
-/// A box of samples, and the nodes that pyramids refine: the same for all schemes with one transform along time.
+/// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
 pub(crate) struct Trial<'a, R> {
     size: [usize; 3],
     samples: &'a [u8],
@@ -18,7 +18,7 @@ pub(crate) struct Trial<'a, R> {
     nodes: Vec<R>,
 }
 
-/// What trials reuse.
+/// Scratch that trials reuse.
 #[derive(Default)]
 pub(crate) struct Scratch<R> {
     field: Vec<R>,
@@ -36,17 +36,18 @@ impl<'a, R: Real> Trial<'a, R> {
         Self { size, samples, missing, weighing, nodes }
     }
 
-    /// Voxels of the box.
+    /// The number of voxels in the box.
     pub(crate) fn voxels(&self) -> usize {
         self.size.iter().product()
     }
 
-    /// About how many bytes the box takes; those of missing samples, which are always the same, are left out.
+    /// An estimate of the bytes of the box. Missing samples are left out, because they take the same bytes under every
+    /// scheme.
     pub(crate) fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
         self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
     }
 
-    /// None if the box must be stored exactly.
+    /// As [`Self::bytes`]; none if the box must be stored exactly.
     fn coded(
         &self,
         codec: &WindowCodec,
@@ -65,13 +66,13 @@ impl<'a, R: Real> Trial<'a, R> {
         let outliers = source.estimate_outliers(weighing, field, &passes.marked(codes));
         let parts = (0..).zip(codec.part_ranges(self.size));
         let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
-        // Where there are too many, all is stored exactly; the fewer, the nearer is a step that does.
+        // With too many outliers, all is stored exactly; the count still shows how near a better step is.
         let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
         Some(rest + outliers * (GAP + codec.sample.size()))
     }
 }
 
-/// Bytes of the place of an outlier, and what packing its sample saves: about as many.
+/// Bytes for the position of an outlier, less the bytes that packing its sample saves.
 const GAP: usize = 1;
 
 #[cfg(test)]
@@ -86,7 +87,7 @@ mod tests {
     const SIZE: [usize; 3] = [20, 18, 16];
     const FRAMES: usize = 16;
 
-    /// Waves, and a little noise.
+    /// Waves with a little noise.
     fn samples() -> Vec<u8> {
         let noise = |i: usize| f64::from((i as u32).wrapping_mul(0x9E37_79B1) >> 16) / 65536.0 - 0.5;
         let voxels: usize = SIZE.iter().product();

@@ -1,4 +1,4 @@
-//! Which coefficients a series keeps: the smallest are dropped for as long as the bound holds.
+//! Truncation of a series: drops its smallest coefficients as long as the error bound holds.
 //!
 //! [Dobashi](crate::bibliography) orders the coefficients of a series by size and keeps the largest n of them:
 //!
@@ -10,11 +10,11 @@
 //! Two misprints of the paper are corrected here. Its eq 6 sums the kept coefficients; the error is the sum over the
 //! dropped ones. Its loop drops coefficients until the error reaches the tolerance, and keeps the set whose error
 //! already does: one coefficient too few. The rule here: keep the fewest of the largest coefficients whose
-//! reconstruction is within the bound. A series that is within the bound of zero keeps none.
+//! reconstruction is within the bound. If zero is within the bound of a series, the series keeps none.
 //!
-//! Eq 6 needs an orthonormal basis, a bound of the mean, and coefficients that are not rounded. None of this is
-//! assumed. Coefficients are quantised first, every set is decoded, and the error is measured on samples. The number of
-//! dropped coefficients is found by bisection.
+//! Eq 6 needs an orthonormal basis, a bound of the mean, and unrounded coefficients. This code needs none of them: it
+//! quantises coefficients first, decodes every candidate set, and measures the error on samples. Bisection finds the
+//! number of coefficients to drop.
 
 use super::WindowCodec;
 use super::real::Real;
@@ -26,18 +26,19 @@ use crate::wavelet::{LANES, Lane};
 pub(super) struct Group {
     /// The samples, missing ones filled; `frames` lanes.
     pub(super) source: Vec<Lane>,
-    /// What a sample's error is multiplied by, 0 where it is missing; `frames` lanes.
+    /// The weight of each sample's error, 0 if the sample is missing; `frames` lanes.
     pub(super) weight: Vec<Lane>,
-    /// K lanes.
+    /// The coefficients before quantisation; K lanes.
     pub(super) coefficients: Vec<Lane>,
-    /// Quantised coefficients; those below their voxel's entry in `dropped` are not kept. K lanes.
+    /// The quantised coefficients. A voxel drops those whose rank is below its entry in `dropped`. K lanes.
     codes: Vec<[i32; LANES]>,
-    /// The place of each coefficient in its voxel's order of dropping; K lanes.
+    /// The rank of each coefficient in its voxel's order of dropping; K lanes.
     rank: Vec<[i32; LANES]>,
     dropped: [i32; LANES],
-    /// The sizes of those coefficients k of which any code is not zero, with k in the low bits, [`NONE`] where one is zero.
+    /// For each k with a nonzero code: k, and a sort key per lane (magnitude, then k in the low bits; [`NONE`] if the
+    /// code is zero).
     sizes: Vec<(usize, [i64; LANES])>,
-    /// What the decoder makes of the kept codes; `frames` lanes.
+    /// The series decoded from the kept codes; `frames` lanes.
     pub(super) decoded: Vec<Lane>,
     work: Vec<Lane>,
 }
@@ -58,23 +59,24 @@ impl Group {
         }
     }
 
-    /// Transforms and quantises the source. False if a code does not fit, so that the block must be stored exactly.
+    /// Transforms and quantises the source. False if a code does not fit; the block must then be stored exactly.
     pub(super) fn quantise(&mut self, codec: &WindowCodec, step: f64) -> bool {
         codec.basis.forward(&self.source, &mut self.coefficients);
         quantise(&self.coefficients, step, &mut self.codes)
     }
 
-    /// The codes of coefficient k that are kept.
+    /// The kept codes of coefficient k; 0 for lanes that drop it.
     pub(super) fn kept(&self, k: usize) -> [i32; LANES] {
         kept(&self.codes[k], &self.rank[k], &self.dropped)
     }
 
-    /// Drops as many of the smallest coefficients as the weighed errors allow, and decodes the rest into `decoded` (eq 7).
+    /// Drops as many of the smallest coefficients as the weighted errors allow, and decodes the rest into `decoded` (eq
+    /// 7).
     pub(super) fn truncate(&mut self, codec: &WindowCodec, step: f64) {
         let counts = self.order();
-        let mut holds = [0; LANES]; // so many can be dropped, or none can
+        let mut holds = [0; LANES]; // the number of drops known to hold, or 0
         let mut fails = counts.map(|n| n + 1);
-        self.dropped = counts; // a series within the bound of zero keeps none
+        self.dropped = counts; // first try to keep none
         loop {
             self.reconstruct(codec, step);
             let errors = self.errors(codec.promise.measure());
@@ -94,7 +96,8 @@ impl Group {
         }
     }
 
-    /// Ranks the coefficients of each lane by size, the finer first where equal; returns how many are not zero.
+    /// Ranks the coefficients of each lane by size; among equals, the finer comes first. Returns the number of nonzero
+    /// codes.
     fn order(&mut self) -> [i32; LANES] {
         self.sizes.clear();
         let mut counts = [0; LANES];
@@ -103,7 +106,7 @@ impl Group {
         for (k, (codes, coefficients)) in coded {
             let mut sizes = [NONE; LANES];
             for l in 0..LANES {
-                // The bits of positive numbers are ordered as the numbers are; the lowest make room for k.
+                // The bits of positive floats sort as the floats do; the low bits hold k.
                 let size = coefficients[l].abs().to_bits() & !u64::from(u16::MAX) | u64::from(u16::MAX - k as u16);
                 sizes[l] = if codes[l] == 0 { NONE } else { size as i64 };
                 counts[l] += i32::from(codes[l] != 0);
@@ -119,7 +122,7 @@ impl Group {
         codec.basis.inverse(&mut self.work, &mut self.decoded);
     }
 
-    /// The weighed error of each lane: the largest over the frames, or the root of the mean square.
+    /// The weighted error of each lane: the largest over the frames, or the root mean square.
     fn errors(&self, measure: Measure) -> Lane {
         let errors = errors(&self.decoded, &self.source, &self.weight);
         match measure {
@@ -129,7 +132,7 @@ impl Group {
     }
 }
 
-/// Coefficients to codes. False if a code does not fit.
+/// Quantises coefficients to codes. False if a code does not fit.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> bool {
     let mut fits = true;
@@ -137,7 +140,7 @@ fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> boo
         for l in 0..LANES {
             let rounded = coefficients[l] / step + f64::BIG;
             let q = rounded - f64::BIG;
-            // False for NaN, too, and for what the decoder would find infinite.
+            // Also false for NaN, and for codes that decode to infinity.
             let small = (q.abs() < f64::from(i32::MAX)) & ((q * step).abs() < f64::INFINITY);
             fits &= small;
             codes[l] = (if small { rounded } else { f64::BIG }).less_big();
@@ -146,10 +149,10 @@ fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> boo
     fits
 }
 
-/// Larger than the size of any coefficient.
+/// The sort key of a zero code, larger than any other.
 const NONE: i64 = i64::MAX;
 
-/// The place of each size among those of its lane.
+/// Ranks the sort keys of each lane.
 fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     if sizes.len() <= MOST_COMPARED {
         return rank_by_comparing(sizes, rank);
@@ -157,14 +160,14 @@ fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     for l in 0..LANES {
         let mut order: Vec<(i64, usize)> = sizes.iter().map(|(k, sizes)| (sizes[l], *k)).collect();
         order.sort_unstable();
-        order.into_iter().enumerate().for_each(|(place, (_, k))| rank[k][l] = place as i32);
+        order.into_iter().enumerate().for_each(|(position, (_, k))| rank[k][l] = position as i32);
     }
 }
 
-/// Most sizes of which each is compared with all others.
+/// The most keys that are ranked by comparing all pairs.
 const MOST_COMPARED: usize = 64;
 
-/// Vector code, but a square of comparisons.
+/// Ranks by comparing all pairs: quadratic, but vector code.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     for (k, size) in sizes {
@@ -178,7 +181,7 @@ fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]])
     }
 }
 
-/// The kept coefficients as the decoder has them, zero where the lane drops one.
+/// Decodes the kept coefficients; zero in lanes that drop one.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn decode_kept((codes, rank): (&[[i32; LANES]], &[[i32; LANES]]), dropped: &[i32; LANES], step: f64, out: &mut [Lane]) {
     for ((out, codes), rank) in out.iter_mut().zip(codes).zip(rank) {
@@ -189,7 +192,7 @@ fn decode_kept((codes, rank): (&[[i32; LANES]], &[[i32; LANES]]), dropped: &[i32
     }
 }
 
-/// Weighed errors of each lane.
+/// The weighted errors of each lane.
 struct Errors {
     largest: Lane,
     squares: Lane,
@@ -208,7 +211,7 @@ fn errors(decoded: &[Lane], source: &[Lane], weight: &[Lane]) -> Errors {
     errors
 }
 
-/// The codes of one coefficient, zero where the lane drops it.
+/// The codes of one coefficient, zero in lanes that drop it.
 fn kept(codes: &[i32; LANES], rank: &[i32; LANES], dropped: &[i32; LANES]) -> [i32; LANES] {
     std::array::from_fn(|l| if rank[l] >= dropped[l] { codes[l] } else { 0 })
 }

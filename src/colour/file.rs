@@ -6,17 +6,17 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// More is no colour map: a file without end must not take all memory.
+/// The largest size of a colour map file, so that an endless file cannot exhaust memory.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// A file, and which of its maps: the name behind `#`.
+/// Splits `FILE.json#MAP` into the file and the name of the map.
 pub(super) fn split(name: &str) -> (&str, Option<&str>) {
     let ending = ".json#";
-    let place = name.to_ascii_lowercase().find(ending).filter(|_| !Path::new(name).exists());
-    place.map_or((name, None), |at| (&name[..at + ending.len() - 1], Some(&name[at + ending.len()..])))
+    let found = name.to_ascii_lowercase().find(ending).filter(|_| !Path::new(name).exists());
+    found.map_or((name, None), |at| (&name[..at + ending.len() - 1], Some(&name[at + ending.len()..])))
 }
 
-/// From a file by its name, and for one of several maps `#` and that map's.
+/// Reads a file: `FILE`, or `FILE.json#MAP` for one of several maps.
 pub(super) fn read(name: &str) -> Result<TransferFunction> {
     let (path, map) = split(name);
     let parsed = match ending(path).as_str() {
@@ -34,7 +34,7 @@ fn ending(path: &str) -> String {
     Path::new(path).extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
-/// What a file says.
+/// The text of a file.
 fn text(path: &str) -> Result<String> {
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
@@ -47,7 +47,7 @@ fn text_of(bytes: Vec<u8>) -> std::result::Result<String, String> {
         return Err(format!("is larger than {} MiB, which no colour map is", MOST_BYTES >> 20));
     }
     let text = String::from_utf8(bytes).map_err(|_| "is not text, which a colour map is expected to be")?;
-    let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors begin with it
+    let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors write it
     if text.trim().is_empty() { Err("is empty, where a colour map is expected".into()) } else { Ok(text) }
 }
 
@@ -58,14 +58,14 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_map_is_named_behind_its_file() {
+    fn the_name_of_a_map_follows_its_file() {
         assert_eq!(split("a/b.json#Cool #1 (x.y/z)"), ("a/b.json", Some("Cool #1 (x.y/z)")));
         assert_eq!(split("a#1/b.JSON"), ("a#1/b.JSON", None));
         assert_eq!(split("é.JSON#é"), ("é.JSON", Some("é")));
     }
 
     #[test]
-    fn files_that_are_no_colour_maps_are_refused_in_words() {
+    fn files_that_are_not_colour_maps_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let long = vec![b' '; MOST_BYTES as usize + 1];
         let cases: [(&str, &[u8], &str); 5] = [
@@ -87,7 +87,7 @@ mod tests {
         assert!(matches!(TransferFunction::open("/dev/null.json"), Err(Error::Io { .. })));
     }
 
-    /// What is nearly right, and what is not at all.
+    /// Nearly valid and entirely invalid texts.
     fn texts() -> impl Strategy<Value = Vec<u8>> {
         let pieces = [
             "[",

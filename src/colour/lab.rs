@@ -5,7 +5,7 @@ use super::Colour;
 /// X, Y and Z of white.
 const WHITE: [f64; 3] = [0.9505, 1.0, 1.089];
 
-/// L* of 0 to 100, a* and b*.
+/// Converts to L* (0 to 100), a* and b*.
 pub(super) fn of_rgb(colour: Colour) -> [f64; 3] {
     let [r, g, b] = colour.map(linear);
     let xyz = [
@@ -17,7 +17,7 @@ pub(super) fn of_rgb(colour: Colour) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// The colour; what no screen can show is dimmed until it fits.
+/// Converts to a colour. Colours outside sRGB are dimmed until they fit.
 pub(super) fn to_rgb([l, a, b]: [f64; 3]) -> Colour {
     let y = (l + 16.0) / 116.0;
     let roots = [a / 500.0 + y, y, y - b / 200.0];

@@ -1,8 +1,8 @@
-//! Values to colours and opacities.
+//! Maps values to colours and opacities.
 //!
-//! A [`TransferFunction`] is a colour, and where it is asked for an opacity, for every value: one of the field's named
-//! maps over a range, or what a file says (`file`). It is applied to samples before the transform (eq 28), to the means
-//! of pixels after projection, or along the ray (eq 31). [`Scale`] colours pixels.
+//! A [`TransferFunction`] maps every value to a colour and, for composites, to an opacity. It is a named map over a
+//! range, or comes from a file (`file`). It is applied to samples before the transform (eq 28), to the means of pixels
+//! after projection, or along the ray (eq 31). [`Scale`] colours pixels.
 
 mod file;
 mod lab;
@@ -23,20 +23,20 @@ use std::path::Path;
 /// Red, green and blue, 0 to 1.
 pub type Colour = [f64; 3];
 
-/// A colour, 8 bits a channel.
+/// Red, green and blue, 8 bits per channel.
 pub type Rgb = [u8; 3];
 
-/// A colour and an opacity for every value.
+/// A map from values to colours and opacities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     colours: Colours,
-    /// (value, opacity), ascending, two or more.
+    /// (value, opacity), ascending by value, two or more.
     opacity: Vec<(f64, f64)>,
-    /// Of NaN, if a file says it.
+    /// The colour of NaN, if a file gives one.
     nan: Option<Colour>,
     /// The values of the first and the last colour.
     range: (f64, f64),
-    /// Whether the range means something, or is 0 to 1 as long as nobody gave another.
+    /// Whether the range was given; otherwise it is 0 to 1 by default.
     of_values: bool,
 }
 
@@ -44,12 +44,15 @@ pub struct TransferFunction {
 enum Colours {
     /// One of [`NAMES`].
     Named(&'static Named),
-    /// (value, colour), ascending, two or more, and how to get from one to the next.
+    /// (value, colour), ascending by value, two or more, and the space of interpolation.
     Points(Vec<(f64, Colour)>, ColourSpace),
 }
 
 impl TransferFunction {
-    /// A map by its name, or that of a file: ParaView's JSON, with `#` and the map's name if it holds several, or CSV.
+    /// Opens a map by its name, or a file: ParaView's JSON (`FILE.json#MAP` if it holds several maps) or CSV.
+    ///
+    /// # Errors
+    /// An unknown name, or a file that cannot be read or is not a colour map.
     pub fn open(name: &str) -> Result<Self> {
         if let Some(named) = named::known(name) {
             return Ok(Self::named(named));
@@ -67,11 +70,11 @@ impl TransferFunction {
         Self { colours: Colours::Named(named), opacity, nan: None, range, of_values: false }
     }
 
-    /// Of points of some values and, unless it is to run from 0 at the first to 1 at the last of them, of opacities.
+    /// A map of points (value, colour). By default, the opacity rises from 0 at the first value to 1 at the last.
     ///
     /// # Errors
-    /// Fewer than two points, values that are not ascending or all the same, or anything that is not finite or not
-    /// within 0 to 1: in words that follow a name.
+    /// Fewer than two points, values that do not ascend or are all equal, values that are not finite, or colours and
+    /// opacities outside 0 to 1. The message is worded to follow the name of the file.
     pub fn of_points(
         points: Vec<(f64, Colour)>,
         space: ColourSpace,
@@ -88,7 +91,7 @@ impl TransferFunction {
         Ok(Self { colours: Colours::Points(points, space), opacity, nan, range, of_values: true })
     }
 
-    /// Whether it is of certain values; of a mere name the range is to be given.
+    /// Whether the map has a range of values. A named map has none until [`Self::over`] sets it.
     pub fn is_of_values(&self) -> bool {
         self.of_values
     }
@@ -99,12 +102,15 @@ impl TransferFunction {
     }
 
     /// The same colours and opacities, stretched over another range.
+    ///
+    /// # Errors
+    /// A range that is empty, out of order or not finite.
     pub fn over(&self, range: (f64, f64)) -> Result<Self> {
         check_range(range)?;
         let (from, to) = self.range;
         let within = |v: f64| if (from..=to).contains(&v) { range } else { (f64::MIN, f64::MAX) };
         let moved = |v: f64| {
-            let (least, most) = within(v); // and not what rounding makes of it
+            let (least, most) = within(v); // keeps rounding inside the range
             (range.0 + (v - from) / (to - from) * (range.1 - range.0)).clamp(least, most)
         };
         let colours = match &self.colours {
@@ -117,10 +123,10 @@ impl TransferFunction {
         Ok(Self { colours, opacity, nan: self.nan, range, of_values: true })
     }
 
-    /// The same colours with other opacities, at shares of the range.
+    /// The same colours with other opacities: points (share of the range, opacity).
     ///
     /// # Errors
-    /// As [`Self::of_points`], in words that follow a name.
+    /// The same as for [`Self::of_points`].
     pub fn with_opacity(&self, at_shares: &[(f64, f64)]) -> std::result::Result<Self, String> {
         check_points("opacities", at_shares.iter().map(|(v, a)| (*v, std::slice::from_ref(a))))?;
         if let Some((share, _)) = at_shares.iter().find(|(share, _)| !(0.0..=1.0).contains(share)) {
@@ -131,7 +137,8 @@ impl TransferFunction {
         Ok(Self { opacity, ..self.clone() })
     }
 
-    /// The colour of a value: beyond the range the end's; of NaN none, unless a file says one.
+    /// The colour of a value. Values beyond the range get the colour of the nearer end. `None` for NaN, unless a file
+    /// gives a colour for it.
     pub fn colour(&self, value: f64) -> Option<Colour> {
         if value.is_nan() {
             return self.nan;
@@ -145,7 +152,7 @@ impl TransferFunction {
         })
     }
 
-    /// The opacity of a value, 0 to 1: beyond its points that of the end; of NaN 0.
+    /// The opacity of a value, 0 to 1. Values beyond the points get the opacity of the nearer end; NaN gets 0.
     pub fn opacity(&self, value: f64) -> f64 {
         if value.is_nan() { 0.0 } else { between(&self.opacity, value, |a, b, t| a + (b - a) * t) }
     }
@@ -155,7 +162,7 @@ impl TransferFunction {
         (self.opacity[0].0, self.opacity[self.opacity.len() - 1].0)
     }
 
-    /// Whether colours lie to both sides of a middle one.
+    /// Whether the colours diverge from a middle colour.
     pub fn is_diverging(&self) -> bool {
         match &self.colours {
             Colours::Named(named) => named.is_diverging(),
@@ -163,10 +170,10 @@ impl TransferFunction {
         }
     }
 
-    /// What it is best stretched over for values of a range: where they lie to both sides of 0, and its colours to both
-    /// sides of a middle one, to both sides of 0 alike. Never empty.
+    /// The range to stretch the map over for values from `lo` to `hi`. It is symmetric around 0 if the colours diverge
+    /// and the values lie on both sides of 0. It is never empty.
     pub fn suitable(&self, (lo, hi): (f64, f64)) -> (f64, f64) {
-        /// Less on one side than this share of the other is as good as none: what is around 0, and off by a little.
+        /// A side shorter than this share of the other does not count: values that end near 0 may overshoot a little.
         const SIDE: f64 = 0.05;
         if self.is_diverging() && lo < -SIDE * hi && hi > -SIDE * lo {
             return (-hi.max(-lo), hi.max(-lo));
@@ -174,7 +181,7 @@ impl TransferFunction {
         (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) })
     }
 
-    /// The name of its colours, unless they are points of a file.
+    /// The name of a named map; `None` for points.
     pub fn name(&self) -> Option<&'static str> {
         match &self.colours {
             Colours::Named(named) => Some(named.name),
@@ -182,13 +189,13 @@ impl TransferFunction {
         }
     }
 
-    /// Its colours in a few words, for people.
+    /// A short description of the colours and their range, for people.
     pub fn words(&self) -> String {
         let (lo, hi) = self.range;
         format!("{} from {lo} to {hi}", self.description())
     }
 
-    /// A map's name, or how many points a file's has.
+    /// The name of a named map, or the number of points and their colour space.
     pub fn description(&self) -> String {
         match &self.colours {
             Colours::Named(named) => named.name.into(),
@@ -196,19 +203,19 @@ impl TransferFunction {
         }
     }
 
-    /// Its opacities as VALUE:A,... or, where they are many, how many.
+    /// The opacities as VALUE:A,..., or their number if there are many.
     pub fn opacity_words(&self) -> String {
         const MOST: usize = 32;
         let points: Vec<String> = self.opacity.iter().map(|(value, opacity)| format!("{value}:{opacity}")).collect();
         if points.len() <= MOST { points.join(",") } else { format!("{} points", points.len()) }
     }
 
-    /// Whether all of its colours are greys.
+    /// Whether all colours are greys.
     fn is_grey(&self) -> bool {
         matches!(&self.colours, Colours::Named(named) if named.name == "grey")
     }
 
-    /// Whether a colour takes so long that a table of them is worth it.
+    /// Whether computing a colour is slow enough to tabulate the colours.
     fn is_slow(&self) -> bool {
         match &self.colours {
             Colours::Named(_) => false,
@@ -216,7 +223,7 @@ impl TransferFunction {
         }
     }
 
-    /// Its colours as text, from which [`Self::of_text`] makes them again, to the bit.
+    /// The colours as text. [`Self::of_text`] restores them exactly.
     pub fn text(&self) -> String {
         match &self.colours {
             Colours::Named(named) => format!("{} {:?} {:?}", named.name, self.range.0, self.range.1),
@@ -228,7 +235,7 @@ impl TransferFunction {
         }
     }
 
-    /// From [`Self::text`].
+    /// Restores the colours from [`Self::text`]; `None` for any other text.
     pub fn of_text(text: &str) -> Option<Self> {
         let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().ok()).collect::<Option<Vec<f64>>>();
         let Some((space, points)) = text.split_once(';') else {
@@ -242,7 +249,7 @@ impl TransferFunction {
     }
 }
 
-/// An error if a range that was asked for shows nothing.
+/// An error if a requested range is empty or invalid.
 fn check_range((lo, hi): (f64, f64)) -> Result<()> {
     let wrong = match (hi - lo).is_finite() {
         true if lo < hi => return Ok(()),
@@ -258,7 +265,7 @@ fn ramp((lo, hi): (f64, f64)) -> Vec<(f64, f64)> {
     vec![(lo, 0.0), (hi, 1.0)]
 }
 
-/// What is at a value, between the points on both sides of it. Of two points of one value the second holds from there
+/// Interpolates between the points around a value. If two points have the same value, the second one holds from there
 /// on.
 fn between<T: Copy>(points: &[(f64, T)], value: f64, mix: impl Fn(&T, &T, f64) -> T) -> T {
     let next = points.partition_point(|(v, _)| *v <= value);
@@ -269,10 +276,11 @@ fn between<T: Copy>(points: &[(f64, T)], value: f64, mix: impl Fn(&T, &T, f64) -
     }
 }
 
-/// More points than this are more than a map needs, and than the settings of a file hold.
+/// The largest number of points: enough for any map, and few enough for the settings of a file.
 const MOST_POINTS: usize = 1 << 16;
 
-/// Whether points are two or more, of ascending values, with components of 0 to 1; a step has a value twice.
+/// Checks that there are two or more points with ascending values and components of 0 to 1. A value may repeat, for a
+/// step.
 fn check_points<'a>(what: &str, points: impl Iterator<Item = (f64, &'a [f64])>) -> std::result::Result<(), String> {
     let (mut count, mut first, mut last) = (0, f64::INFINITY, f64::NEG_INFINITY);
     for (n, (value, components)) in (1..).zip(points) {

@@ -1,6 +1,6 @@
-//! Colour maps of the field by their names: viridis, plasma, inferno and magma ([Viridis](crate::bibliography)),
-//! cividis ([Nunez](crate::bibliography)), turbo ([Turbo](crate::bibliography)), coolwarm
-//! ([Moreland](crate::bibliography)), grey, and the rainbow of [Dobashi](crate::bibliography).
+//! Named colour maps: viridis, plasma, inferno and magma ([Viridis](crate::bibliography)), cividis
+//! ([Nunez](crate::bibliography)), turbo ([Turbo](crate::bibliography)), coolwarm ([Moreland](crate::bibliography)),
+//! grey, and the rainbow of [Dobashi](crate::bibliography).
 
 use super::Colour;
 use super::space::ColourSpace;
@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 pub const NAMES: [&str; 9] =
     ["viridis", "plasma", "inferno", "magma", "cividis", "turbo", "coolwarm", "grey", "rainbow"];
 
-/// A map of the field: colours at even steps of its range, from one to the next in a straight line.
+/// A named map: colours at even steps of the range, with linear interpolation.
 #[derive(Debug, PartialEq)]
 pub(super) struct Named {
     pub(super) name: &'static str,
@@ -18,31 +18,31 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// Whether the colours lie to both sides of a middle one.
+    /// Whether the colours diverge from a middle colour.
     pub(super) fn is_diverging(&self) -> bool {
         self.name == "coolwarm"
     }
 
     /// The colour at a share of the range, 0 to 1.
     pub(super) fn colour(&self, t: f64) -> Colour {
-        let place = t * (self.colours.len() - 1) as f64;
-        let n = (place as usize).min(self.colours.len() - 2);
-        ColourSpace::Rgb.between(self.colours[n], self.colours[n + 1], place - n as f64)
+        let index = t * (self.colours.len() - 1) as f64;
+        let n = (index as usize).min(self.colours.len() - 2);
+        ColourSpace::Rgb.between(self.colours[n], self.colours[n + 1], index - n as f64)
     }
 }
 
-/// All maps.
+/// All named maps.
 static MAPS: LazyLock<Vec<Named>> =
     LazyLock::new(|| NAMES.into_iter().map(|name| Named { name, colours: colours(name) }).collect());
 
-/// A map by its name.
+/// Finds a map by its name.
 pub(super) fn known(name: &str) -> Option<&'static Named> {
     let name = if name == "gray" { "grey" } else { name };
     MAPS.iter().find(|known| known.name == name)
 }
 
-/// The colours of a known map. Those of the library are of 8 bits, and are taken where its own tables have them:
-/// between these a transform would meet steps.
+/// The colours of a named map. The colours of the library have 8 bits, so they are taken only at the entries of its own
+/// tables: colours in between would have steps.
 fn colours(name: &str) -> Vec<Colour> {
     let gradient = match name {
         "viridis" => colorous::VIRIDIS,
@@ -65,8 +65,8 @@ fn colours(name: &str) -> Vec<Colour> {
 const COOL: Colour = [0.231_373, 0.298_039, 0.752_941];
 const WARM: Colour = [0.705_882, 0.015_686_3, 0.149_02];
 
-/// The map of [Dobashi](crate::bibliography): small values blue, large ones red, by the hues between (240 to 0
-/// degrees).
+/// The map of [Dobashi](crate::bibliography): from blue for small values to red for large ones, through the hues from
+/// 240 to 0 degrees.
 const BLUE_TO_RED: [Colour; 5] = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
 
 #[cfg(test)]
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_are_those_of_the_library() {
+    fn maps_agree_with_the_library() {
         let bytes = |name: &str, t| known(name).expect("a name").colour(t).map(|c| (c * 255.0).round() as u8);
         for n in 0..256 {
             let t = n as f64 / 255.0;

@@ -1,17 +1,17 @@
-//! ParaView's colour maps: JSON as its colour map editor exports and imports it.
+//! ParaView's colour maps: the JSON of its colour map editor.
 
 use super::{Colour, ColourSpace, TransferFunction};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// What a map says of itself; what does not matter here is left out.
+/// The fields of a map that matter here.
 #[derive(Deserialize)]
 struct Map {
     #[serde(rename = "Name")]
     name: Option<String>,
     #[serde(rename = "ColorSpace")]
     space: Option<String>,
-    /// Hue the shorter way around; 0 in files that do not say.
+    /// Whether hue takes the shorter way around; 0 by default.
     #[serde(rename = "HSVWrap")]
     wrapped: Option<Value>,
     /// Value, red, green, blue, and so on.
@@ -26,10 +26,10 @@ struct Map {
     indexed: Option<Vec<f64>>,
 }
 
-/// More objects than any file of colour maps holds, of which each takes much more memory than two brackets.
+/// The largest number of objects in a file. An object needs much more memory than its two brackets.
 const MOST_OBJECTS: usize = 1 << 16;
 
-/// The map of such a name, or the only one.
+/// Parses the map with this name, or the only map.
 pub(super) fn parse(text: &str, name: Option<&str>) -> Result<TransferFunction, String> {
     let wrong = |e: serde_json::Error| format!("expected a colour map in ParaView's JSON: {e}");
     if text.bytes().filter(|byte| *byte == b'{').count() > MOST_OBJECTS {
@@ -50,7 +50,7 @@ fn chosen<'a>(maps: &'a [Map], name: Option<&str>) -> Result<&'a Map, String> {
     found.ok_or_else(|| which(maps, name))
 }
 
-/// Asks for one of the maps.
+/// The error that asks for the name of a map.
 fn which(maps: &[Map], name: Option<&str>) -> String {
     const SHOWN: usize = 10;
     let names: Vec<&str> = maps.iter().filter_map(|map| map.name.as_deref()).collect();
@@ -77,7 +77,7 @@ fn transfer_function(map: &Map) -> Result<TransferFunction, String> {
     TransferFunction::of_points(points.collect(), space(map)?, opacities, nan)
 }
 
-/// Numbers that come in fours.
+/// Numbers in groups of four.
 fn fours<'a>(name: &str, what: &str, numbers: &'a [f64]) -> Result<&'a [[f64; 4]], String> {
     let (fours, rest) = numbers.as_chunks();
     if rest.is_empty() {
@@ -97,8 +97,9 @@ fn space(map: &Map) -> Result<ColourSpace, String> {
     }
 }
 
-/// Opacities as straight lines. The midpoint of two points is where, as a share of the way, the mean of both is; their
-/// sharpness is 0 for straight lines on both of its sides, and 1 for a step there. The first point says it for both.
+/// Turns opacities into straight lines. The midpoint of two points is the share of the way at which the mean of both
+/// lies. Their sharpness is 0 for straight lines on both sides of the midpoint, and 1 for a step at the midpoint. The
+/// first of two points holds both settings.
 fn bends(points: &[[f64; 4]]) -> Result<Vec<(f64, f64)>, String> {
     let mut lines = Vec::new();
     for (n, [value, opacity, midpoint, sharpness]) in (1..).zip(points) {
@@ -157,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn invalid_maps_give_errors() {
         let many: Vec<String> = (0..12).map(|i| format!(r#"{{"Name": "m{i}"}}"#)).collect();
         let many = format!("[{}]", many.join(","));
         let objects = format!("[{}]", vec!["{}"; MOST_OBJECTS + 1].join(","));

@@ -6,33 +6,41 @@ use crate::base::error::{Error, Note, Remedy, Result};
 /// How values are spread over the colours.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Norm {
-    /// Evenly.
+    /// Linearly.
     #[default]
     Linear,
-    /// By their logarithm: every factor of ten as much as any other.
+    /// By their logarithm: every factor of ten has the same share.
     Log,
 }
 
-/// Values to colours: a transfer function over a range, and the background.
+/// The colours of pixels: a transfer function over a range, and the background.
 #[derive(Debug, Clone)]
 pub struct Scale {
-    /// Of shares, 0 to 1.
+    /// The map over shares of the range, 0 to 1.
     map: TransferFunction,
-    /// Colours of that at even shares, or none where it is quick by itself.
+    /// Colours at even shares; empty if the map is fast without a table.
     table: Vec<Rgb>,
     range: (f64, f64),
     norm: Norm,
     background: Rgb,
 }
 
-/// Shares of a table, so many that no colour is off by more than rounding.
+/// Number of steps of the table, enough that colours are exact up to rounding.
 const SHARES: u16 = 1 << 13;
 
 impl Scale {
-    /// From the first to the last colour over `range`.
+    /// A scale of a named map (see [`super::NAMES`]), spread linearly over a range of values, on a black background.
     ///
     /// # Errors
-    /// A range that is not finite or out of order, or not above 0 for a logarithm.
+    /// The same as for [`TransferFunction::open`] and [`Self::new`].
+    pub fn named(name: &str, range: (f64, f64)) -> Result<Self> {
+        Self::new(&TransferFunction::open(name)?, range, Norm::Linear, [0; 3])
+    }
+
+    /// A scale from the first to the last colour over `range`.
+    ///
+    /// # Errors
+    /// A range that is not finite or out of order, or not above 0 for a logarithmic scale.
     pub fn new(map: &TransferFunction, range: (f64, f64), norm: Norm, background: Rgb) -> Result<Self> {
         let (lo, hi) = range;
         if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
@@ -48,7 +56,7 @@ impl Scale {
         Ok(Self { map, table, range, norm, background })
     }
 
-    /// The colour of a value: beyond the range the end's, of NaN the background.
+    /// The colour of a value. Values beyond the range get the colour of the nearer end; NaN gets the background.
     pub fn colour(&self, value: f32) -> Rgb {
         if value.is_nan() {
             return self.background;
@@ -56,8 +64,8 @@ impl Scale {
         self.colour_at(self.share(value))
     }
 
-    /// The colour of a pixel: of a value, of channels, each spread over the range, or of light and its opacity; the
-    /// background where any number is NaN.
+    /// The colour of a pixel of one value, of three channels (each spread over the range), or of light and its opacity.
+    /// The background if any number is NaN.
     pub fn colour_of_pixel(&self, numbers: &[f32]) -> Rgb {
         match *numbers {
             [value] => self.colour(value),
@@ -65,7 +73,7 @@ impl Scale {
         }
     }
 
-    /// As [`Self::colour_of_pixel`], but neither rounded nor from a table.
+    /// The same as [`Self::colour_of_pixel`], but neither rounded nor from a table.
     pub fn exact_colour_of_pixel(&self, numbers: &[f32]) -> Colour {
         let background = || self.background.map(|c| f64::from(c) / 255.0);
         match *numbers {
@@ -77,7 +85,7 @@ impl Scale {
         }
     }
 
-    /// The colour of light that comes through with such an opacity, before the background.
+    /// The colour of light with this opacity in front of the background.
     fn over_background(&self, light: [f32; 3], opacity: f32) -> Colour {
         let behind = f64::from(1.0 - opacity) / 255.0;
         std::array::from_fn(|i| (f64::from(light[i]) + behind * f64::from(self.background[i])).clamp(0.0, 1.0))
@@ -89,7 +97,7 @@ impl Scale {
         tabled.copied().or_else(|| self.map.colour(share).map(bytes)).unwrap_or(self.background)
     }
 
-    /// Where a value lies in the range, 0 to 1; NaN counts as 0.
+    /// The position of a value in the range, 0 to 1; 0 for NaN.
     pub fn share(&self, value: impl Into<f64>) -> f64 {
         let normed = |v: f64| if self.norm == Norm::Log { libm::log(v.max(f64::MIN_POSITIVE)) } else { v };
         let (lo, hi) = (normed(self.range.0), normed(self.range.1));
@@ -113,13 +121,13 @@ impl Scale {
         self.map.is_grey() && r == g && g == b
     }
 
-    /// What is where there is nothing.
+    /// The colour of the background.
     pub fn background(&self) -> Rgb {
         self.background
     }
 }
 
-/// To 8 bits a channel.
+/// Rounds to 8 bits per channel.
 pub(super) fn bytes(colour: Colour) -> Rgb {
     colour.map(|c| (c * 255.0).round() as u8)
 }
@@ -140,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_logarithm_gives_every_factor_as_much() {
+    fn a_logarithm_gives_equal_shares_to_equal_factors() {
         let grey = TransferFunction::open("grey").expect("a known map");
         let scale = Scale::new(&grey, (1e-2, 1e2), Norm::Log, [0; 3]).expect("a range");
         for (value, share) in [(1e-2, 0.0), (1e-1, 0.25), (1.0, 0.5), (1e2, 1.0), (-3.0, 0.0), (0.0, 0.0)] {
@@ -150,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_off_by_no_more_than_rounding() {
+    fn a_table_is_exact_up_to_rounding() {
         let points = vec![(0.0, [0.2, 0.3, 0.8]), (1.0, [0.7, 0.0, 0.1])];
         let map =
             TransferFunction::of_points(points, crate::colour::ColourSpace::Diverging, None, None).expect("two points");
@@ -164,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_colours_are_those_that_are_rounded() {
+    fn colours_are_rounded_exact_colours() {
         let map = TransferFunction::open("turbo").expect("a known map");
         let scale = Scale::new(&map, (-1.0, 2.0), Norm::Linear, [9, 8, 7]).expect("a range");
         let pixels: [&[f32]; 6] =

@@ -1,30 +1,30 @@
-//! From one colour to the next.
+//! Interpolation between colours.
 
 use super::Colour;
 use super::lab;
 use std::f64::consts::{PI, TAU};
 
-/// How colours are interpolated: as VTK does, so that maps look as in ParaView.
+/// The space in which colours are interpolated, as in VTK, so that maps look the same as in ParaView.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColourSpace {
-    /// Red, green and blue each by itself.
+    /// Red, green and blue separately.
     Rgb,
-    /// Hue, saturation and value each by itself; hue is a number of 0 to 1, and does not pass 0.
+    /// Hue, saturation and value separately. Hue is a number from 0 to 1 and does not wrap around.
     Hsv,
-    /// As [`Self::Hsv`], but hue takes the shorter way around.
+    /// The same as [`Self::Hsv`], but hue takes the shorter way around.
     HsvWrapped,
-    /// CIE L*a*b* of sRGB and D65.
+    /// CIE L*a*b* for sRGB and D65.
     Lab,
-    /// Moreland's, by way of white where the colours are saturated and of different hues.
+    /// Moreland's Msh space; passes through white if both colours are saturated and their hues differ.
     Diverging,
-    /// The second colour from behind the first on.
+    /// A step: the second colour everywhere but at the first point.
     Step,
 }
 
 impl ColourSpace {
     const ALL: [Self; 6] = [Self::Rgb, Self::Hsv, Self::HsvWrapped, Self::Lab, Self::Diverging, Self::Step];
 
-    /// Its name.
+    /// The name of the space.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rgb => "RGB",
@@ -36,12 +36,12 @@ impl ColourSpace {
         }
     }
 
-    /// By its name.
+    /// Finds a space by its name.
     pub(super) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|space| space.name().eq_ignore_ascii_case(name))
     }
 
-    /// The colour at a share of the way; each channel is 0 to 1, as those of the two are.
+    /// The colour at a share `t` of the way from `a` to `b`. All channels are 0 to 1.
     pub(super) fn between(self, a: Colour, b: Colour, t: f64) -> Colour {
         let colour = match self {
             Self::Rgb => mix(a, b, t),
@@ -60,7 +60,7 @@ fn mix(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t)
 }
 
-/// Hue (0 to 1), saturation and value.
+/// Converts to hue (0 to 1), saturation and value.
 fn hsv([r, g, b]: Colour) -> [f64; 3] {
     let (value, least) = (r.max(g).max(b), r.min(g).min(b));
     let chroma = value - least;
@@ -79,13 +79,13 @@ fn hsv([r, g, b]: Colour) -> [f64; 3] {
 
 fn of_hsv([hue, saturation, value]: [f64; 3]) -> Colour {
     let channel = |sixth: f64| {
-        let place = (sixth + hue * 6.0).rem_euclid(6.0);
-        value - value * saturation * place.min(4.0 - place).clamp(0.0, 1.0)
+        let angle = (sixth + hue * 6.0).rem_euclid(6.0);
+        value - value * saturation * angle.min(4.0 - angle).clamp(0.0, 1.0)
     };
     [channel(5.0), channel(3.0), channel(1.0)]
 }
 
-/// Hue the shorter way around.
+/// Mixes with the hue going the shorter way around.
 fn mix_wrapped(mut a: [f64; 3], mut b: [f64; 3], t: f64) -> [f64; 3] {
     if a[0] - b[0] > 0.5 {
         a[0] -= 1.0;
@@ -95,17 +95,17 @@ fn mix_wrapped(mut a: [f64; 3], mut b: [f64; 3], t: f64) -> [f64; 3] {
     mix(a, b, t)
 }
 
-/// Moreland's Msh: the length of L*a*b*, its angle to the axis of greys, and the hue; the angles in radians.
+/// Converts L*a*b* to Moreland's Msh: length, angle to the axis of greys, and hue. Angles are in radians.
 fn polar([l, a, b]: [f64; 3]) -> [f64; 3] {
     let length = (l * l + a * a + b * b).sqrt();
     let angle = if length > 0.001 { libm::acos((l / length).clamp(-1.0, 1.0)) } else { 0.0 };
     [length, angle, if angle > 0.001 { libm::atan2(b, a) } else { 0.0 }]
 }
 
-/// Angles below this are no colour, but grey.
+/// Colours with smaller angles count as grey.
 const SATURATED: f64 = 0.05;
 
-/// Between two colours in Msh, as [Moreland](crate::bibliography) has it.
+/// Interpolates between two colours in Msh, as in [Moreland](crate::bibliography).
 fn diverging(mut a: [f64; 3], mut b: [f64; 3], mut t: f64) -> Colour {
     let colours = a[1] > SATURATED && b[1] > SATURATED;
     let apart = (a[2] - b[2] + PI).rem_euclid(TAU) - PI;
@@ -126,7 +126,7 @@ fn diverging(mut a: [f64; 3], mut b: [f64; 3], mut t: f64) -> Colour {
     lab::to_rgb([length * libm::cos(angle), chroma * libm::cos(hue), chroma * libm::sin(hue)])
 }
 
-/// The hue that a grey of such a length is given, so that colours change evenly on the way to a saturated one.
+/// The hue assigned to a grey of length `grey`, so that colours change evenly on the way to a saturated colour.
 fn hue_of_grey([length, angle, hue]: [f64; 3], grey: f64) -> f64 {
     if length >= grey - 0.1 {
         return hue;
@@ -148,7 +148,7 @@ mod tests {
     const WARM: Colour = [0.705_882, 0.015_686_3, 0.149_02];
 
     #[test]
-    fn the_ends_of_every_way_are_the_colours() {
+    fn interpolation_starts_and_ends_at_the_colours() {
         let colours = [[0.0; 3], [1.0; 3], COOL, WARM, [0.0, 1.0, 0.25], [0.5; 3], [1.0, 0.0, 1.0]];
         for (space, a, b) in ColourSpace::ALL.iter().flat_map(|s| colours.map(|a| colours.map(|b| (s, a, b))).concat())
         {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn cool_to_warm_is_the_table_of_moreland() {
+    fn cool_to_warm_matches_the_table_of_moreland() {
         // Bytes of the published table of 33 colours: every eighth.
         let table = [[59, 76, 192], [141, 176, 254], [221, 221, 221], [244, 154, 123], [180, 4, 38]];
         for (i, bytes) in table.into_iter().enumerate() {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn hues_pass_0_only_when_wrapped() {
+    fn hues_wrap_around_only_when_wrapped() {
         let (blue, red) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
         near(ColourSpace::Hsv.between(blue, red, 0.5), [0.0, 1.0, 0.0], 1e-12);
         near(ColourSpace::HsvWrapped.between(blue, red, 0.5), [1.0, 0.0, 1.0], 1e-12);

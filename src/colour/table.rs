@@ -1,9 +1,9 @@
-//! Transfer functions as tables: CSV.
+//! Transfer functions from CSV tables.
 
 use super::{Colour, ColourSpace, TransferFunction};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-/// What a header may call each column.
+/// The accepted names of each column.
 const NAMES: [&[&str]; 5] = [
     &["value", "scalar", "x"],
     &["red", "r", "rgb_r"],
@@ -12,10 +12,10 @@ const NAMES: [&[&str]; 5] = [
     &["opacity", "alpha", "a", "o"],
 ];
 
-/// Where each column is; opacity may be nowhere.
+/// The index of each column. The opacity column is optional.
 type Columns = [Option<usize>; 5];
 
-/// A line: its number, value, red, green, blue and perhaps opacity.
+/// A line: its number, value, colour and optional opacity.
 struct Row {
     line: u64,
     value: f64,
@@ -23,7 +23,8 @@ struct Row {
     opacity: Option<f64>,
 }
 
-/// From value, red, green, blue and perhaps opacity in each line, in the order that a header says, if there is one.
+/// Parses a table with value, red, green, blue and optional opacity in each line. A header may change the order of
+/// columns.
 pub(super) fn parse(text: &str) -> Result<TransferFunction, String> {
     let mut reader = ReaderBuilder::new();
     reader.has_headers(false).flexible(true).trim(Trim::All).comment(Some(b'#'));
@@ -49,7 +50,7 @@ fn transfer_function(rows: &[Row]) -> Result<TransferFunction, String> {
     TransferFunction::of_points(colours, ColourSpace::Rgb, (!opacities.is_empty()).then_some(opacities), None)
 }
 
-/// The colour of a line in a table of bytes.
+/// The colour of a line in a table with colours of 0 to 255.
 fn of_bytes(row: &Row) -> Result<Colour, String> {
     let wrong = |c: &&f64| !(0.0..=255.0).contains(*c) || c.fract() != 0.0;
     match row.colour.iter().find(wrong) {
@@ -62,7 +63,7 @@ fn at(line: u64, expected: &str) -> String {
     format!("line {line}: expected {expected}")
 }
 
-/// The number of a record's line. Its position is that of what was skipped before it.
+/// The line number of a record. The record's own position is where the skipped lines before it begin.
 fn line(text: &str, record: &StringRecord) -> u64 {
     let Some(position) = record.position() else { return 0 };
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
@@ -75,15 +76,15 @@ fn is_header(record: &StringRecord) -> bool {
     record.iter().all(|field| field.parse::<f64>().is_err())
 }
 
-/// The columns in the usual order.
+/// The columns of a table without a header.
 fn plain(record: &StringRecord) -> Columns {
     std::array::from_fn(|i| (i < 4 || i < record.len()).then_some(i))
 }
 
-/// The columns as a header names them.
+/// The columns named by a header.
 fn named(line: u64, header: &StringRecord) -> Result<Columns, String> {
-    let place = |names: &[&str]| header.iter().position(|h| names.contains(&h.to_ascii_lowercase().as_str()));
-    let columns = NAMES.map(place);
+    let find = |names: &[&str]| header.iter().position(|h| names.contains(&h.to_ascii_lowercase().as_str()));
+    let columns = NAMES.map(find);
     match columns[..4].iter().position(Option::is_none) {
         None => Ok(columns),
         Some(lacking) => {
@@ -122,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_name_the_line() {
         let cases = [
             ("# nothing\n", "has 0 point(s) of colours"),
             ("0,0,0,0\n", "has 1 point(s) of colours"),

@@ -1,10 +1,9 @@
-//! Which scheme a window is coded with: the one that makes some of its boxes smallest.
+//! Chooses the scheme of a window: the one that makes some of its boxes smallest.
 //!
 //! Candidates are a learned basis along time (eq 20) with a pyramid in space, and a pyramid in space and time (eq 32).
-//! Fronts and moving things suit the second, slow change and noise the first. The promising ones are tuned: first the
-//! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33) and the growth of steps (eq 34).
-//! Boxes lie at the places of the sequence of [Roberts](crate::bibliography), which are spread evenly whatever their
-//! number.
+//! The first suits slow change and noise, the second fronts and moving things. The promising candidates are tuned:
+//! first the step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33) and the growth of steps (eq
+//! 34). Box positions follow the sequence of [Roberts](crate::bibliography), which spreads any number of them evenly.
 
 use super::learn::learned_functions;
 use super::{ConvertConfig, Pool};
@@ -20,28 +19,28 @@ use crate::source::{Archive, FrameWindow, read_frames};
 use crate::wavelet::Basis;
 use rayon::prelude::*;
 
-/// What of a scheme is fixed; the rest is chosen for each window.
+/// The fixed parts of a scheme; the rest is chosen for each window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SchemeConstraint {
-    /// The transform along time; none: any.
+    /// The transform along time; none allows any.
     pub basis: Option<Basis>,
     /// The pyramid.
     pub space: SpatialPredictor,
 }
 
-/// What refines coefficients in space, or samples in space and time.
+/// How coefficients are predicted in space, or samples in space and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SpatialPredictor {
-    /// Whichever stencil suits.
+    /// A pyramid with whichever stencil suits.
     Any,
-    /// Nothing: every series by itself.
+    /// No prediction: every series is coded by itself.
     Alone,
     /// A pyramid with this stencil.
     Pyramid(Stencil),
 }
 
 impl SchemeConstraint {
-    /// Everything is chosen.
+    /// No constraint: everything is chosen.
     pub const AUTO: Self = Self { basis: None, space: SpatialPredictor::Any };
 }
 
@@ -53,18 +52,18 @@ impl From<Basis> for SchemeConstraint {
     }
 }
 
-/// Samples that are looked at together: as many as a block of `block` samples has, and more where it is small.
+/// The largest number of samples in all boxes: as many as in a block of `block` samples, and more if that is small.
 pub(super) fn most_samples(block: usize) -> usize {
     block.max(FEW_SAMPLES)
 }
 
-/// Bytes that a choice takes: the samples, and for each of two transforms the nodes and which are missing; and what a
-/// trial of them takes.
+/// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
+/// trial.
 pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
     most_samples(block) * (sample.size() + 2 * (size_of::<f64>() + 1) + size_of::<f64>() + size_of::<i32>())
 }
 
-/// What a choice rests on.
+/// The inputs of a choice.
 pub(super) struct SchemeSelector<'a> {
     pub(super) config: &'a ConvertConfig,
     pub(super) archive: &'a Archive,
@@ -75,7 +74,7 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) magnitude: f64,
     /// [`most_samples`]
     pub(super) most: usize,
-    /// What the window before was coded with, if the choice may begin there.
+    /// The scheme of the window before, if the choice may begin with it.
     pub(super) before: Option<&'a Scheme>,
 }
 
@@ -85,20 +84,20 @@ struct Sampled {
     samples: Vec<u8>,
 }
 
-/// A transform along time, and the boxes as it leaves them.
+/// A transform along time, and the transformed boxes.
 struct Transformed<'a, R> {
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
 }
 
-/// What schemes are tried on, and with.
+/// The boxes for trials, and reusable scratch.
 struct Trials<'a, R> {
     boxes: Vec<Transformed<'a, R>>,
     idle: Pool<Scratch<R>>,
 }
 
 impl SchemeSelector<'_> {
-    /// The scheme that codes some boxes of the window in the fewest bytes. The same for any number of threads.
+    /// The scheme that codes some boxes of the window in the fewest bytes. It does not depend on the number of threads.
     pub(super) fn choose(&self) -> Result<Scheme> {
         if let SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Alone } = self.config.coding
             && basis != Basis::Learned
@@ -116,7 +115,7 @@ impl SchemeSelector<'_> {
         }
     }
 
-    /// The smallest of some families and their variants, all of which have a pyramid.
+    /// The smallest of some families and their variants; all families must have a pyramid.
     fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
         let boxes = self.boxes()?;
         let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
@@ -138,7 +137,7 @@ impl SchemeSelector<'_> {
         Ok(best.1)
     }
 
-    /// The boxes under each of the transforms along time of some schemes.
+    /// The boxes under each of the schemes' transforms along time.
     fn transformed<'a, R: Real + Send + Sync>(
         &self,
         schemes: &[Scheme],
@@ -155,7 +154,7 @@ impl SchemeSelector<'_> {
         found
     }
 
-    /// A scheme with the step that makes the boxes smallest, where rounding alone does not have to keep the promise.
+    /// The scheme with the step that makes the boxes smallest. A coarseness of exactly 1 stays.
     fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &Trials<'_, R>) -> (f64, Scheme) {
         if first.1.coarseness == 1.0 {
             return first;
@@ -184,18 +183,18 @@ impl SchemeSelector<'_> {
         self.tried(Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() }, trials)
     }
 
-    /// A scheme, and about how many bytes the window takes with it.
+    /// A scheme with its estimated bytes of the window.
     fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &Trials<'_, R>) -> (f64, Scheme) {
         (self.bytes(&scheme, trials), scheme)
     }
 
-    /// Frames of the window.
+    /// The number of frames in the window.
     fn frames(&self) -> usize {
         self.channels[0].frames()
     }
 
-    /// Boxes spread over the volume and the channels: about one voxel in fifty, at least a few boxes; together at most as much
-    /// as a block.
+    /// Boxes spread over the volume and the channels: about one voxel in fifty, at least a few boxes, together at most
+    /// as many samples as a block.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
         let whole: usize = dims.iter().product();
@@ -209,12 +208,13 @@ impl SchemeSelector<'_> {
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
-    /// The box of a number, at one of places that spread evenly: the same for every window; channels take turns.
+    /// Reads the box with this number. Its position is one of an evenly spread sequence, the same for every window;
+    /// channels take turns.
     fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
         let dims = self.archive.grid.dims;
         let start: [usize; 3] = std::array::from_fn(|axis| {
-            let place = (0.5 + GOLDEN[axis] * number as f64).fract();
-            (place * (dims[axis] - size[axis] + 1) as f64) as usize
+            let position = (0.5 + GOLDEN[axis] * number as f64).fract();
+            (position * (dims[axis] - size[axis] + 1) as f64) as usize
         });
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
         let window = self.channels[number % self.channels.len()];
@@ -222,7 +222,7 @@ impl SchemeSelector<'_> {
         Ok(Sampled { size, samples })
     }
 
-    /// One scheme of each kind that is allowed.
+    /// One scheme of each allowed kind.
     fn families(&self) -> Result<Vec<Scheme>> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
@@ -253,7 +253,7 @@ impl SchemeSelector<'_> {
         Ok(found)
     }
 
-    /// Learned from rows all over the volume, not from the boxes that they are then tried on.
+    /// The learned functions, from rows all over the volume instead of the boxes used for trials.
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
         let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
@@ -275,7 +275,8 @@ impl SchemeSelector<'_> {
         normal && self.promise.delta >= self.magnitude * SINGLE
     }
 
-    /// Steps under a bound of means leave room for dropping coefficients, too ([`ErrorBound::step`]).
+    /// The first coarseness to try. Under a bound of the mean, steps leave a budget for dropped coefficients
+    /// ([`ErrorBound::step`]).
     fn coarseness(&self, of_largest: f64) -> f64 {
         match self.promise.measure() {
             Measure::Largest => of_largest,
@@ -302,7 +303,7 @@ impl SchemeSelector<'_> {
         variants(best, |p| others.iter().map(|&(growth, most)| Pyramid { growth, most, ..p.clone() }).collect())
     }
 
-    /// About how many bytes the window takes.
+    /// Estimates the bytes of the window.
     fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
         let codec = self.codec(scheme);
         let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
@@ -326,7 +327,7 @@ impl SchemeSelector<'_> {
     }
 }
 
-/// The one of fewer bytes, the first of equal ones.
+/// The scheme with fewer bytes; the first if equal.
 fn fewer(a: (f64, Scheme), b: (f64, Scheme)) -> (f64, Scheme) {
     if b.0 < a.0 { b } else { a }
 }
@@ -336,54 +337,57 @@ fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme>
     pyramids.into_iter().map(|pyramid| Scheme { pyramid: Some(pyramid), ..best.clone() }).collect()
 }
 
-/// Samples that can always be looked at.
+/// The number of samples that may always be read.
 const FEW_SAMPLES: usize = 1 << 17;
 
-/// Voxels along the edge of a box that schemes are tried on.
+/// The edge, in voxels, of a box for trials.
 const EDGE: usize = 30;
 
-/// One voxel in so many is tried.
+/// One voxel in this many is used for trials.
 const SHARE: usize = 50;
 
-/// Boxes that are tried.
+/// The smallest and the largest number of boxes for trials.
 const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
-/// Voxels of a volume that is not small: a few boxes are then a small part of it.
+/// From this number of voxels on, a few boxes are a small part of the volume.
 const LARGE: usize = 1 << 19;
 
-/// Rows of voxels that functions are learned from, and the number of the first place.
+/// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;
 const LEARNING: usize = 1000;
 
-/// A scheme is worth tuning that is at most so many times as large as the smallest before.
+/// A scheme is tuned only if its estimate is at most this many times the smallest.
 const PROMISING: f64 = 1.3;
 
-/// A variant must make boxes smaller by this to be taken: less says little about blocks, which are larger.
+/// A variant is used only if it makes boxes smaller by this factor: smaller gains do not carry over to blocks, which
+/// are larger.
 const CLEARLY: f64 = 0.99;
 
-/// Fractions whose multiples spread evenly: powers of the inverse of the root of x^4 = x + 1.
+/// Fractions with evenly spread multiples: powers of the inverse of the root of x^4 = x + 1.
 const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];
 
-/// Orders of passes that are tried, x first where it pays: rows of x are then contiguous in all other passes.
+/// The orders of passes to try. Orders with x first keep rows of x contiguous in all other passes.
 const ORDERS: [[Axis; 4]; 3] =
     [[Axis::X, Axis::Y, Axis::Z, Axis::T], [Axis::Z, Axis::Y, Axis::X, Axis::T], [Axis::T, Axis::Z, Axis::Y, Axis::X]];
 
-/// How steps of coarser levels shrink, and by how much at most; the first is taken to begin with.
+/// The shrinkage of steps of coarser levels, and its limit; the choice begins with the first.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
 
-/// The step of learned functions that is tried first, in units of the one for which rounding alone keeps the promise.
+/// The first step to try with learned functions, relative to the step for which rounding alone stays within the bound.
 const COARSE: f64 = 3.92;
 
-/// The same under a bound of means, of any basis: begun further from the best, a family is given up that would win.
+/// As [`COARSE`], for any basis under a bound of the mean. A first step further from the best would reject families
+/// that win when tuned.
 const COARSE_OF_MEANS: f64 = 2.8;
 
-/// Steps grow, or shrink, by this as long as it pays.
+/// Steps grow or shrink by this factor while the estimate improves.
 const COARSER: f64 = 1.4;
 
-/// The least bound, in units of the largest sample, for 32-bit floats: their rounding takes next to nothing of it.
+/// The smallest bound relative to the largest sample at which 32-bit floats are used: their rounding then takes almost
+/// none of it.
 const SINGLE: f64 = 1.0 / (1 << 15) as f64;
 
-/// Magnitudes at which 32-bit floats have all their digits, and sums and products of some are finite.
+/// Magnitudes at which 32-bit floats have full precision, and their sums and products are finite.
 const LEAST_SINGLE: f64 = 1e-30;
 const MOST_SINGLE: f64 = 1e30;

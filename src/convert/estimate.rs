@@ -1,4 +1,4 @@
-//! How large a conversion would come out, by coding some blocks of some windows.
+//! Estimates the size of a coefficient file by coding some blocks of some windows.
 
 use super::{ConvertConfig, Plan, Task, convert};
 use crate::base::error::{Error, Result};
@@ -12,33 +12,34 @@ use serde::Serialize;
 use std::io::{self, Cursor};
 use std::path::Path;
 
-/// Blocks that are coded of a window, and windows.
+/// The largest number of blocks coded in a window, and of windows.
 const BLOCKS: usize = 24;
 const WINDOWS: usize = 3;
-/// Of what may be allocated, the samples of these blocks have this part.
+/// The samples of these blocks take at most one part in this many of the allowed memory.
 const SHARE: usize = 4;
 
-/// What an archive would come to.
+/// The estimated size of an archive's coefficient file.
 #[derive(Debug, Clone, Serialize)]
 pub struct Estimate {
     /// Bytes of the coefficient file.
     pub bytes: u64,
-    /// How many times smaller than the samples that is.
+    /// The compression ratio: bytes of the samples divided by `bytes`.
     pub ratio: f64,
     /// The tolerance.
     pub tolerance: f64,
-    /// The value range that it refers to: of the first frame of each window that was looked at, and of the last frame.
+    /// The value range that it refers to, from the first frame of each coded window and the last frame.
     pub range: (f64, f64),
     /// Blocks that were coded in each window.
     pub blocks: usize,
-    /// Windows of which blocks were coded.
+    /// Windows with coded blocks.
     pub windows: usize,
 }
 
-/// Converts some blocks, spread over the volume and over time, and goes from them to all. For a bound that refers to a range.
+/// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive. For a bound
+/// that refers to a range.
 ///
 /// # Errors
-/// Those of a conversion, and a source that is a stream.
+/// Those of a conversion; also an error if the source is a stream.
 pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
     let archive = source.archive().clone();
     let Some(frames) = archive.frames.filter(|frames| *frames > 0) else {
@@ -72,19 +73,19 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     Ok(Estimate { bytes: bytes as u64, ratio, tolerance: config.tolerance, range, blocks, windows })
 }
 
-/// Up to `most` of so many, at even distances.
+/// Up to `most` indices below `all`, evenly spaced.
 fn spread(all: usize, most: usize) -> impl Iterator<Item = usize> {
     let count = all.min(most);
     (0..count).map(move |i| (2 * i + 1) * all / (2 * count))
 }
 
-/// The first frames of some windows: of all if they are few, else of whole ones.
+/// The first frames of some windows: of all windows if they are few, else only of full ones.
 fn windows(frames: usize, window: usize) -> Vec<usize> {
     let all = frames.div_ceil(window);
     spread(if all <= WINDOWS { all } else { frames / window }, WINDOWS).map(|index| index * window).collect()
 }
 
-/// The range of some whole frames: the first one of each window, and the very last one.
+/// The value range of the first frame of each window and of the last frame of the archive.
 fn range(
     source: &mut dyn FrameSource,
     archive: &Archive,
@@ -92,23 +93,23 @@ fn range(
     firsts: &[usize],
 ) -> Result<(f64, f64)> {
     let last = archive.frames.map(|frames| frames - 1);
-    let mut seen = Scan::NOTHING.range;
+    let mut range = Scan::NOTHING.range;
     for frame in firsts.iter().copied().chain(last) {
         let window = source.window(frame, 1)?;
         let scan = scan_frame(Scan::NOTHING, window.as_ref(), 0, &archive.grid, archive.sample, missing_value)?;
-        seen = join_ranges(seen, scan.range);
+        range = join_ranges(range, scan.range);
     }
-    Ok(if seen.0 <= seen.1 { seen } else { (0.0, 0.0) })
+    Ok(if range.0 <= range.1 { range } else { (0.0, 0.0) })
 }
 
-/// A block, moved inwards if it is cut at a far face: all are of one size then.
+/// A block, moved inwards if a far face cuts it, so that all blocks have the same size.
 fn whole_block(plan: &Plan<'_>, block: usize) -> Region {
     let (Region { start, .. }, BlockGrid { dims, edge }) = (plan.blocks.region(block), plan.blocks);
     let start: [usize; 3] = std::array::from_fn(|axis| start[axis].min(dims[axis].saturating_sub(edge)));
     Region { start, end: std::array::from_fn(|axis| (start[axis] + edge).min(dims[axis])) }
 }
 
-/// Blocks of a window side by side, as an archive of their own: along the volume's longest axis, which is cut into whole ones.
+/// Some blocks of a window as an archive of their own, side by side along the volume's longest axis.
 fn stacked(window: &dyn FrameWindow, archive: &Archive, blocks: &[Region]) -> Result<Box<dyn FrameSource>> {
     let (dims, size) = (blocks[0].dims(), archive.sample.size());
     let axis = (0..3).max_by_key(|axis| archive.grid.dims[*axis]).unwrap_or_default();

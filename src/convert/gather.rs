@@ -1,4 +1,4 @@
-//! The reader's stage: windows of frames in, batches of blocks out.
+//! The reader stage: reads windows of frames and sends batches of blocks.
 
 use super::choose::{SchemeSelector, most_samples};
 use super::sampled::{self, Pixel};
@@ -16,16 +16,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_format::{BlockId, FileId, Window};
 
-/// Some blocks of one window: their samples, frame by frame.
+/// Blocks of one window with their samples, frame by frame.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) window: Arc<WindowJob>,
     pub(super) blocks: Vec<(BlockId, Vec<u8>)>,
-    /// No more follow of its window, whose source was unchanged when they were gathered.
+    /// Whether this is the last batch of its window. The source was still unchanged after it was read.
     pub(super) last: bool,
 }
 
-/// Reads all windows in order until the frames end, and sends those that are not yet done. Returns the time spent reading.
+/// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
+/// spent reading.
 pub(super) fn read(
     source: &mut dyn FrameSource,
     (config, archive): (&ConvertConfig, &Archive),
@@ -40,7 +41,7 @@ pub(super) fn read(
     };
     let (id, range, scheme) = (done.id, None, None);
     let mut reader = WindowReader { config, plan, idle, archive, pixels, range, id, scheme, frames: 0, before: 0 };
-    done.windows[..done.before].iter().for_each(|window| reader.take_over(window));
+    done.windows[..done.before].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
     let mut busy = Duration::ZERO;
     for index in done.before.. {
@@ -53,7 +54,7 @@ pub(super) fn read(
             }
         };
         if let Some(known) = known {
-            reader.recognise(window.as_ref(), known, done)?;
+            reader.skip_done(window.as_ref(), known, done)?;
             busy += started.elapsed();
             continue;
         }
@@ -63,7 +64,7 @@ pub(super) fn read(
         let job = Arc::new(reader.prepare(window.as_ref(), index)?);
         busy += started.elapsed();
         if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < config.window {
-            break; // at the end, or because a later stage failed and says why
+            break; // the frames ended, or a later stage failed and reports why
         }
     }
     Ok(busy)
@@ -72,20 +73,20 @@ pub(super) fn read(
 struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
-    /// Room for the samples of blocks.
+    /// Buffers for the samples of blocks.
     idle: &'a Pool<Vec<u8>>,
-    /// Of the samples that are coded.
+    /// The archive of the coded samples.
     archive: &'a Archive,
-    /// Where a sampled bound looks.
+    /// The pixels of a sampled bound.
     pixels: Vec<Pixel>,
-    /// Range of the frames so far.
+    /// The range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
-    /// Of the window before.
+    /// The scheme of the window before.
     scheme: Option<Scheme>,
-    /// Frames of the file so far.
+    /// The number of frames in the file so far.
     frames: u64,
-    /// Those of them that are not the source's.
+    /// Frames of the file that precede the source's first frame.
     before: u64,
 }
 
@@ -100,49 +101,47 @@ impl WindowReader<'_> {
         Ok(Some(source.window(first, count)?).filter(|window| window.frames() > 0))
     }
 
-    /// The error of a source that goes on after what was its end, in a window that is short.
+    /// The error if a source continues after a short last window that was already converted.
     fn has_grown(&self, done: &WindowsDone) -> Error {
         let frames = self.frames;
         let what = format!("the input ended after {frames} frames and has grown");
         Error::changed(&done.name, Note::with(what, Remedy::AppendOrBeginAnew { frames }))
     }
 
-    /// The error of a source that has fewer frames than it had.
+    /// The error if a source has fewer frames than before.
     fn ended(&self, done: &WindowsDone) -> Error {
         let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
         let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
         Error::changed(&done.name, what)
     }
 
-    /// The source's frame that comes next.
+    /// The number of the source's next frame.
     fn first(&self) -> usize {
         (self.frames - self.before) as usize
     }
 
-    /// Goes on after a window as if it had just been coded.
-    fn take_over(&mut self, window: &Window) {
+    /// Takes over a window's record as if the window had just been coded.
+    fn continue_after(&mut self, window: &Window) {
         self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
         self.scheme = Some(Scheme::of_window(window));
         self.frames += u64::from(window.frames);
     }
 
-    /// Goes on after a window that is done; an error if its frames are not those that the source has now.
-    fn recognise(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
-        let seen = self.scan(window)?;
+    /// Continues after a window that the file has; an error if its frames differ from the source's.
+    fn skip_done(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
+        let scan = self.scan(window)?;
         window.check_unchanged()?;
-        if seen.digest != known.digest || window.frames() != known.frames as usize {
+        if scan.digest != known.digest || window.frames() != known.frames as usize {
             let (first, end) = (known.first_frame, known.first_frame + u64::from(known.frames));
-            let what = format!(
-                "frames {first}..{end} are not those that were converted before, of which {} holds the windows",
-                done.name.display()
-            );
+            let what =
+                format!("frames {first}..{end} are not those that were converted before into {}", done.name.display());
             return Err(Error::changed(window.name(0), what));
         }
-        self.take_over(known);
+        self.continue_after(known);
         Ok(())
     }
 
-    /// The file's id: that of the file which is continued, or a new one that follows from the first window's digest.
+    /// The file's id: that of the continued file, or a new one from the first window's digest.
     fn id(&mut self, digest: u64) -> Result<FileId> {
         let new = || self.plan.start.file_id(digest).map_err(|e| Error::setting("settings", e.to_string()));
         let id = self.id.map_or_else(new, Ok)?;
@@ -150,19 +149,19 @@ impl WindowReader<'_> {
         Ok(id)
     }
 
-    /// Looks at the samples of a window as they are read.
+    /// Scans the samples of a window as they are read.
     fn scan(&self, window: &dyn FrameWindow) -> Result<Scan> {
         let plain = (self.archive.sample, self.config.missing_value);
         let (ty, missing_value) = self.plan.colour_transform.map_or(plain, |p| (p.sample, p.missing_value));
         scan(window, &self.archive.grid, ty, missing_value)
     }
 
-    /// Looks at the window's samples and fixes its bound.
+    /// Scans a window, fixes its error bound and chooses its scheme.
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
         let (config, ty, first) = (self.config, self.archive.sample, self.first());
-        let seen = self.scan(window)?;
-        self.refuse_missing(window, first, &seen)?;
-        let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { seen.range };
+        let scan = self.scan(window)?;
+        self.refuse_missing(window, first, &scan)?;
+        let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { scan.range };
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
         let range = config.range.unwrap_or(range);
@@ -182,19 +181,19 @@ impl WindowReader<'_> {
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
         codec.missing_value = config.missing_value;
-        let id = self.id(seen.digest)?;
+        let id = self.id(scan.digest)?;
         let index =
             u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;
         let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        Ok(WindowJob { index, first_frame, id, codec, range, digest: seen.digest, times })
+        Ok(WindowJob { index, first_frame, id, codec, range, digest: scan.digest, times })
     }
 
-    /// The window's bound; its samples are in the range `seen`, and all up to its end in `range`.
-    fn delta(&self, channels: &[&dyn FrameWindow], seen: (f64, f64), range: (f64, f64)) -> Result<f64> {
+    /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.
+    fn delta(&self, channels: &[&dyn FrameWindow], of_window: (f64, f64), range: (f64, f64)) -> Result<f64> {
         let ConvertConfig { tolerance, missing_value, .. } = *self.config;
-        let magnitude = sample::magnitude(seen);
+        let magnitude = sample::magnitude(of_window);
         match self.config.bound {
             Bound::Pointwise | Bound::Rms => Ok(bound::range_bound(tolerance, range)),
             Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),
@@ -205,14 +204,14 @@ impl WindowReader<'_> {
                     view.bound(tolerance, &self.pixels)
                 };
                 let deltas = channels.iter().map(of_channel).collect::<Result<Vec<_>>>()?;
-                // A channel without any light is kept by every bound.
+                // A channel that is black everywhere meets every bound, so it does not count.
                 Ok(deltas.into_iter().filter(|delta| *delta > 0.0).reduce(f64::min).unwrap_or(0.0))
             }
         }
     }
 
-    fn refuse_missing(&self, window: &dyn FrameWindow, first: usize, seen: &Scan) -> Result<()> {
-        let (MissingPolicy::Error, Some((frame, voxel))) = (self.config.missing, seen.first_missing) else {
+    fn refuse_missing(&self, window: &dyn FrameWindow, first: usize, scan: &Scan) -> Result<()> {
+        let (MissingPolicy::Error, Some((frame, voxel))) = (self.config.missing, scan.first_missing) else {
             return Ok(());
         };
         let [x, y, z] = self.archive.grid.whole().voxel(voxel);
@@ -220,13 +219,13 @@ impl WindowReader<'_> {
             "frame {} has a missing value (NaN, infinite or as declared) at x {x}, y {y}, z {z}, the first of {} in \
              frames {first}..{}",
             first + frame,
-            seen.missing,
+            scan.missing,
             first + window.frames()
         );
         Err(Error::input(window.name(frame), Note::with(what, Remedy::MaskMissing)))
     }
 
-    /// Gathers and sends the window's blocks. False if nobody listens any more.
+    /// Reads and sends the window's blocks. False if the receiver is gone.
     fn send_blocks(
         &self,
         window: &dyn FrameWindow,
@@ -251,7 +250,7 @@ impl WindowReader<'_> {
         Ok(true)
     }
 
-    /// The samples of one block, frame by frame, as they are read; blocks are numbered through all channels.
+    /// Reads the samples of one block, frame by frame. Block numbers run through all channels.
     fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let region = self.plan.blocks.region(block);
@@ -262,12 +261,12 @@ impl WindowReader<'_> {
     }
 }
 
-/// What a window's samples are coded as, if not as they are: the channels of their colours.
+/// The colour channels of a window; empty if samples are coded directly.
 fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {
     let of =
         |colour_transform| (0..plan.channels()).map(move |channel| ColourWindow { window, colour_transform, channel });
     plan.colour_transform.into_iter().flat_map(of).collect()
 }
 
-/// Every so many windows a scheme is chosen anew; the others begin with that of the window before.
+/// Every this many windows, the scheme is chosen anew; otherwise the choice begins with that of the window before.
 const ANEW: usize = 8;

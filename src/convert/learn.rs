@@ -1,22 +1,22 @@
-//! Functions along time that suit the series of some boxes: their principal components
+//! Learns functions along time from the series of some boxes: their principal components
 //! ([Hotelling](crate::bibliography)).
 //!
-//! With v_i the series of voxel i as a vector over time, the functions are eigenvectors of the sum of products, those
-//! of the largest energy first:
+//! With v_i the series of voxel i as a vector over time, the functions are the eigenvectors of the sum of products, in
+//! order of decreasing energy:
 //!
 //! ```text
 //! (sum of v_i v_i^T) u_k = energy_k u_k                                                                   (eq 20)
 //! ```
 //!
-//! No other K functions leave a smaller sum of squares of these series. Functions are kept whose coefficients have a
+//! No other K functions leave a smaller sum of squares of these series. A function is kept if its coefficients have a
 //! root mean square above delta / 4: below that, nearly all codes would be zero.
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::ErrorBound;
 use crate::wavelet::Learned;
 
-/// The functions of [`Learned::new`], the most important first: as many as matter under the promise. `boxes` hold samples
-/// frame by frame.
+/// The functions for [`Learned::new`], the most important first: as many as matter under the error bound. `boxes` hold
+/// samples frame by frame.
 pub(super) fn learned_functions<'a>(
     boxes: impl Iterator<Item = &'a [u8]>,
     ty: SampleType,
@@ -38,7 +38,7 @@ pub(super) fn learned_functions<'a>(
     kept.flat_map(|(_, row)| Learned::quantise(row).collect::<Vec<_>>()).collect()
 }
 
-/// Sums of products of the samples of two frames, over series, in units of the largest sample of each box.
+/// Sums over series of the products of samples at two frames, in units of the largest sample so far.
 struct Products {
     frames: usize,
     matrix: Vec<f64>,
@@ -51,7 +51,7 @@ impl Products {
         Self { frames, matrix: vec![0.0; frames * frames], series: 0, magnitude: 0.0 }
     }
 
-    /// Adds some series of a box, those without missing samples.
+    /// Adds some series of a box; series with missing samples are left out.
     fn add(&mut self, values: &[f64], missing_value: Option<f64>) {
         let voxels = values.len() / self.frames;
         let largest =
@@ -69,7 +69,7 @@ impl Products {
         }
     }
 
-    /// Goes over to units in which `largest` is at most 1.
+    /// Changes the unit so that `largest` is at most 1.
     fn rescale(&mut self, largest: f64) {
         if largest > self.magnitude {
             let ratio = self.magnitude / largest;
@@ -85,17 +85,17 @@ impl Products {
         }
     }
 
-    /// The unit; none without any series.
+    /// The unit; none if there are no series.
     fn scale(&self) -> Option<f64> {
         (self.series > 0).then_some(self.magnitude)
     }
 }
 
-/// Series of each box that are looked at.
+/// The largest number of series read from each box.
 const SERIES: usize = 128;
 
-/// Eigenvalues and eigenvectors of a symmetric matrix, largest first, by the rotations of [Jacobi](crate::bibliography): plain
-/// arithmetic in a fixed order, so that every machine finds the same.
+/// Eigenvalues and eigenvectors of a symmetric matrix, largest first, by the rotations of
+/// [Jacobi](crate::bibliography). The arithmetic has a fixed order, so every machine gets the same result.
 fn eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
     let mut v: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
     for _ in 0..SWEEPS {
@@ -113,7 +113,7 @@ fn eigen(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
     (order.iter().map(|i| a[i * n + i]).collect(), order.iter().map(|i| v[*i].clone()).collect())
 }
 
-/// Turns axes p and q so that the matrix has 0 there.
+/// Rotates axes p and q so that the matrix entry (p, q) becomes 0.
 fn rotate(a: &mut [f64], v: &mut [Vec<f64>], n: usize, p: usize, q: usize) {
     let off = a[p * n + q];
     if off == 0.0 {
@@ -137,10 +137,10 @@ fn rotate(a: &mut [f64], v: &mut [Vec<f64>], n: usize, p: usize, q: usize) {
     }
 }
 
-/// Rounds of rotations at most; a handful is usual.
+/// The largest number of sweeps; a handful is usual.
 const SWEEPS: usize = 30;
 
-/// Share of squares off the diagonal that is left.
+/// The share of squares off the diagonal at which the sweeps stop.
 const ENOUGH: f64 = 1e-28;
 
 #[cfg(test)]

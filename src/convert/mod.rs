@@ -1,4 +1,4 @@
-//! Frames to a coefficient file: reader, workers and writer, with bounded channels between them.
+//! Converts frames to a coefficient file: a reader, workers and a writer, with bounded channels between them.
 //!
 //! ```text
 //! reader thread            workers (rayon)           writer (the caller's thread)
@@ -6,14 +6,14 @@
 //! gather its blocks        of blocks                 window by window
 //! ```
 //!
-//! Batches keep their order, so the bytes depend neither on the number of threads nor on the memory budget, which fix the
-//! size of a batch. Workers are those of rayon's global pool. The bound of a window follows from its own samples or, where
-//! the tolerance refers to the value range, from that of all frames up to its end, which never exceeds that of the archive:
-//! no first pass over the data is needed, and a pipe gives the same bytes as files.
+//! Batches keep their order. So the bytes do not depend on the number of threads, nor on the memory budget, which only
+//! sets the size of a batch. The workers are rayon's global pool. The bound of a window follows from its own samples,
+//! or, if the tolerance refers to the value range, from the range of all frames up to its end. That range never exceeds
+//! the archive's. So conversion needs only one pass over the data, and a pipe gives the same bytes as files.
 //!
-//! A window is ended in the file once its source was seen unchanged; then `out` is flushed. So what a killed conversion
-//! leaves is whole up to its last window, and [`resume`] continues there: to the bytes that the conversion would have had
-//! without the kill, since what one window tells the next is in its record.
+//! A window is completed in the file only after its source was found unchanged; then `out` is flushed. So a killed
+//! conversion leaves a file that is valid up to its last complete window, and [`resume`] continues there. Each window's
+//! record holds all that the next window needs, so the resumed file has the same bytes as an uninterrupted one.
 
 mod choose;
 pub mod estimate;
@@ -23,14 +23,16 @@ mod record;
 pub mod sampled;
 mod settings;
 mod task;
+mod to_file;
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
-use crate::codec::bound::Bound;
+pub use crate::codec::bound::Bound;
 use crate::codec::encode::{Encoded, Encoder};
+pub use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
@@ -47,53 +49,62 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
-use wavesplat_format::{Basis, BlockId, CompletePrefix, FileId, Metadata, Window};
+pub use to_file::convert_to_file;
+pub use wavesplat_format::Basis;
+use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MissingPolicy {
-    /// Refuse, naming the first one and how many there are.
+    /// Reject the input; the error names the first one and their number.
     Error,
-    /// Keep them as they are; they are splatted as nothing.
+    /// Keep their bits; they add nothing to pictures.
     Mask,
 }
 
-/// How to convert.
+/// How to convert. [`ConvertConfig::new`] has the defaults; change others by struct update:
+///
+/// ```
+/// use wavesplat::convert::{Bound, ConvertConfig};
+///
+/// let config = ConvertConfig { bound: Bound::Rms, window: 16, ..ConvertConfig::new(0.001) };
+/// ```
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
-    /// The scheme, or what of it is fixed.
+    /// The scheme, or what of it is fixed. Default: the smallest is found for every window.
     pub coding: SchemeConstraint,
-    /// Frames in a window.
+    /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
     pub window: usize,
-    /// The error allowed, as a share of what the bound refers to; 0 keeps every bit.
+    /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
     pub tolerance: f64,
-    /// What is promised.
+    /// What is promised. Default: no sample is off by more than the tolerance times the value range.
     pub bound: Bound,
-    /// The value range that a pointwise or rms tolerance refers to; by default that of the frames so far.
+    /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
     pub range: Option<(f64, f64)>,
-    /// What to do with missing samples.
+    /// What to do with missing samples. Default: refuse them.
     pub missing: MissingPolicy,
-    /// A value that means "missing", besides NaN and infinities.
+    /// A value that means "missing", besides NaN and infinities. Default: none.
     pub missing_value: Option<f64>,
-    /// Colours that samples are turned into before all else: three channels, 0 to 1, of which the bound then is. The value range
-    /// is by default just that.
+    /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
+    /// value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
-    /// Voxels a side of a block; by default as many as suit the window.
+    /// Voxels a side of a block. Default: as many as suit the window.
     pub block: Option<usize>,
-    /// zstd level.
+    /// zstd level, 1 to 19. Default: 3.
     pub level: i32,
-    /// Bytes that may be allocated.
+    /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
-    /// What was asked of the input (frames, region, variable), to find the same samples again.
+    /// What was asked of the input (frames, region, variable), to find the same samples again. Default: nothing.
     pub settings: Vec<(String, String)>,
 }
 
 impl ConvertConfig {
-    /// Pointwise within a share of the range; missing samples refused, and all else as the program has it by default.
-    pub fn new(coding: impl Into<SchemeConstraint>, window: usize, tolerance: f64, memory: usize) -> Self {
+    /// The defaults, which are those of `wavesplat convert`, with a tolerance: 0.01 allows every sample to be off by 1 % of
+    /// the value range.
+    pub fn new(tolerance: f64) -> Self {
         Self {
-            coding: coding.into(),
-            window,
+            coding: SchemeConstraint::AUTO,
+            window: 32,
             tolerance,
             bound: Bound::Pointwise,
             range: None,
@@ -102,18 +113,18 @@ impl ConvertConfig {
             colours: None,
             block: None,
             level: 3,
-            memory,
+            memory: memory::DEFAULT,
             settings: Vec::new(),
         }
     }
 }
 
-/// What a conversion did.
+/// The report of a conversion.
 #[derive(Debug, Clone, Serialize)]
 pub struct ConvertReport {
     /// Frames of the file.
     pub frames: u64,
-    /// Those that were in it before.
+    /// Frames that were in the file before.
     pub frames_before: u64,
     /// Windows of the file.
     pub windows: usize,
@@ -129,42 +140,42 @@ pub struct ConvertReport {
     pub outliers: u64,
     /// Missing samples.
     pub missing: u64,
-    /// What is promised.
+    /// The error bound.
     #[serde(flatten)]
     pub promise: BoundReport,
-    /// Value range, which a pointwise or rms tolerance refers to.
+    /// The value range that a pointwise or rms tolerance refers to.
     pub range: (f64, f64),
     /// The largest bound in any window.
     pub delta: f64,
     /// The largest error reached in any sample.
     pub reached: f64,
-    /// The largest share of its bound that any series used.
+    /// The largest share of its bound that any series uses.
     pub share: f64,
-    /// What each window promised and reached.
+    /// The bound and the errors of each window.
     pub per_window: Vec<WindowReport>,
     /// Seconds spent scanning and gathering samples, on the reader's thread.
     pub read_seconds: f64,
-    /// Seconds spent encoding, on all workers together as wall time.
+    /// Seconds of wall time in which the workers encoded.
     pub encode_seconds: f64,
     /// Seconds spent writing.
     pub write_seconds: f64,
-    /// Seconds from beginning to end.
+    /// Seconds from start to end.
     pub seconds: f64,
 }
 
-/// What a file holds to which frames are added.
+/// The complete windows of a file that more frames are added to.
 #[derive(Debug)]
 pub struct PartialFile {
-    /// Its whole windows.
+    /// The file's complete windows.
     pub unfinished: CompletePrefix,
-    /// The first of these windows whose frames the source still holds, from its first frame on; those before it are not
-    /// compared with anything.
+    /// The number of the first window whose frames the source still has, from its first frame on. Windows before it are
+    /// not compared with the source.
     pub before: usize,
 }
 
-/// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without a seek.
+/// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
 ///
-/// `out` is flushed whenever a window is complete. `name` stands for it in messages.
+/// `out` is flushed when a window is complete. Messages call it `name`.
 pub fn convert<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
@@ -175,10 +186,10 @@ pub fn convert<W: Write>(
     resume(source, config, None, name, out, progress)
 }
 
-/// As [`convert`], after the whole windows of a file that was begun; `out` is where they end.
+/// As [`convert`], continuing a partial file after its complete windows; `out` must be at their end.
 ///
 /// # Errors
-/// Also where the file was begun with other settings, or from other frames.
+/// Those of [`convert`]; also an error if the partial file has other settings, or was converted from other frames.
 pub fn resume<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
@@ -199,7 +210,7 @@ pub fn resume<W: Write>(
     let (to_writer, from_workers) = bounded(0);
     let idle = Pool::default();
     let (read_time, encode_time) = std::thread::scope(|scope| {
-        // Each stage owns its ends of the channels, so that its end, good or bad, ends its neighbours.
+        // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
         let (plan, done, idle) = (&plan, &done, &idle);
         let reader = scope.spawn(move || gather::read(source, (config, archive), plan, done, idle, &to_workers));
         let workers = scope.spawn(move || encode(config.level, plan, idle, &from_reader, &to_writer));
@@ -212,31 +223,32 @@ pub fn resume<W: Write>(
     Ok(report)
 }
 
-/// What a file of `archive` says before its first frame: all that is decided without looking at samples.
+/// The metadata of a file of `archive` before its first frame: all that is decided without reading samples.
 pub fn open_partial(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
     let Task { config, archive, colour_transform } = &Task::new(config, archive);
     Plan::new(config, archive, colour_transform.as_ref()).map(|plan| plan.start)
 }
 
-/// Passes a panic of a stage on; it is a bug, not an error.
+/// Propagates the panic of a stage, which is a bug and not an error.
 fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
     stage.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
-/// What follows from the configuration and the archive before any frame is read.
+/// Decisions made from the configuration and the archive before any frame is read.
 #[derive(Debug)]
 struct Plan<'a> {
-    /// What makes samples into channels, if there are several.
+    /// Converts samples to channels, if there are several.
     colour_transform: Option<&'a ColourTransform>,
-    /// What the file says before its first frame.
+    /// The metadata before the first frame.
     start: Metadata,
     blocks: BlockGrid,
     /// Blocks that are gathered, encoded and written together.
     batch: usize,
 }
 
-/// Voxels a side of a block unless one is given: 32, less for long windows so that a block stays near 4 MiB. With a
-/// pyramid up to 48, which it codes in fewer bytes, and so that the blocks along the longest axis are alike.
+/// The default block edge in voxels. Without a pyramid at most 32, less for long windows, so that a block stays near 4
+/// MiB. With a pyramid up to 48, because larger blocks compress better, and such that the blocks along the longest axis
+/// have equal sizes.
 fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usize {
     let (largest, samples) =
         if coding.space == SpatialPredictor::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
@@ -281,7 +293,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// What the file says before its first frame.
+/// The metadata before the first frame.
 fn start(
     config: &ConvertConfig,
     archive: &Archive,
@@ -302,12 +314,12 @@ fn start(
         tolerance: config.tolerance,
         missing_value: config.missing_value,
         windows: Vec::new(),
-        settings: settings::remembered(config, archive, colour_transform),
+        settings: settings::stored_settings(config, archive, colour_transform),
         program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
     }
 }
 
-/// The windows that a file holds already, and how the source's frames lie to them.
+/// The windows that a file already has, and their relation to the source's frames.
 #[derive(Debug, Default)]
 struct WindowsDone {
     id: Option<FileId>,
@@ -331,8 +343,8 @@ impl WindowsDone {
     }
 }
 
-/// How many blocks in flight fit in memory: two batches of samples and two of coded blocks, a worker's scratch, and what
-/// choosing the next window's scheme takes.
+/// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
+/// workers' scratch, and what choosing the next window's scheme takes.
 fn batch_len(
     config: &ConvertConfig,
     blocks: BlockGrid,
@@ -344,15 +356,15 @@ fn batch_len(
     let samples = voxels * config.window;
     let raw = samples
         * colour_transform.map_or(sample.size(), |colour_transform| colour_transform.sample.size().max(sample.size()));
-    let painted = colour_transform.map_or(0, |_| samples * sample.size());
+    let channel_bytes = colour_transform.map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
-    let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // then no pyramid is tried
+    let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // no pyramid is tried then
     let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
     let choice = if alone { 0 } else { choose::bytes(samples, sample) };
-    let scratch = samples + 2 * codes + field + raw + painted + ZSTD_SCRATCH;
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + ZSTD_SCRATCH;
     let needs =
         |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
-    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // memory that was just used is near
+    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // recent memory is cached
     let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
@@ -366,7 +378,7 @@ fn batch_len(
     })
 }
 
-/// Coefficients of a voxel in a whole window.
+/// The number of coefficients of a voxel in a full window.
 fn most_coefficients(config: &ConvertConfig) -> usize {
     match config.coding.basis {
         Some(basis @ (Basis::Haar | Basis::Multi)) => wavelet::basis(basis, &[], config.window).coefficients(),
@@ -374,11 +386,11 @@ fn most_coefficients(config: &ConvertConfig) -> usize {
     }
 }
 
-/// Upper end of what a zstd context takes at the levels on offer, for inputs of a few MiB.
+/// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
 
-/// The middle stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
+/// The worker stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
 fn encode(
     level: i32,
     plan: &Plan<'_>,
@@ -393,7 +405,7 @@ fn encode(
         let encode = |(id, samples): (BlockId, Vec<u8>)| {
             let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
             let size = plan.blocks.region(id.block as usize).dims();
-            let samples = painted(plan.colour_transform, id, samples, read);
+            let samples = to_channel(plan.colour_transform, id, samples, read);
             let encoded = encoder.block(&window.codec, id, size, &samples).map_err(bug);
             idle.put(encoder);
             read.put(samples);
@@ -403,14 +415,19 @@ fn encode(
         busy += started.elapsed();
         let encoded = EncodedBatch { window, blocks: blocks?, last };
         if out.send(encoded).is_err() {
-            break; // the writer failed and says why
+            break; // the writer failed and reports why
         }
     }
     Ok(busy)
 }
 
-/// The samples of a block as its channel has them.
-fn painted(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Vec<u8>, idle: &Pool<Vec<u8>>) -> Vec<u8> {
+/// Converts the samples of a block to those of its channel.
+fn to_channel(
+    colour_transform: Option<&ColourTransform>,
+    id: BlockId,
+    samples: Vec<u8>,
+    idle: &Pool<Vec<u8>>,
+) -> Vec<u8> {
     let Some(colour_transform) = colour_transform else { return samples };
     let mut channel = idle.take().unwrap_or_default();
     channel.resize(samples.len() / colour_transform.sample.size() * ColourTransform::SAMPLE.size(), 0);
@@ -419,7 +436,7 @@ fn painted(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Vec
     channel
 }
 
-/// Things to use again: new memory costs about as much as what is done with it.
+/// A pool of reusable values: new memory costs about as much as the work done with it.
 #[derive(Debug)]
 struct Pool<T>(Mutex<Vec<T>>);
 
@@ -434,19 +451,19 @@ impl<T> Pool<T> {
         self.0.lock().ok().and_then(|mut idle| idle.pop())
     }
 
-    fn put(&self, thing: T) {
+    fn put(&self, value: T) {
         if let Ok(mut idle) = self.0.lock() {
-            idle.push(thing);
+            idle.push(value);
         }
     }
 }
 
-/// Compressing fails only where a size escaped our own limits.
+/// An error for compression failures, which happen only if a size exceeds our own limits.
 fn bug(error: wavesplat_format::Error) -> Error {
     Error::CoefficientFile { path: "encoding".into(), source: error }
 }
 
-/// Coded blocks on their way to the file, in order.
+/// Coded blocks for the writer, in order.
 #[derive(Debug)]
 struct EncodedBatch {
     window: Arc<WindowJob>,
@@ -454,16 +471,16 @@ struct EncodedBatch {
     last: bool,
 }
 
-/// A window as the reader found it.
+/// A window, as the reader prepared it.
 #[derive(Debug)]
 struct WindowJob {
     index: u32,
     first_frame: u64,
     id: FileId,
     codec: WindowCodec,
-    /// What the tolerance refers to: as given, or the range of the samples of all frames up to the window's end.
+    /// The range that the tolerance refers to: the given one, or that of all samples up to the window's end.
     range: (f64, f64),
     digest: u64,
-    /// Times of its frames, if the source has any.
+    /// The times of its frames, if the source has any.
     times: Vec<f64>,
 }

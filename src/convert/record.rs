@@ -1,4 +1,4 @@
-//! The writer's stage: coded blocks into the file, and what their window adds up to.
+//! The writer stage: appends coded blocks to the file, and sums up each window.
 
 use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
 use crate::base::error::{Error, Result};
@@ -14,10 +14,10 @@ pub(super) struct Recorder<'a, W: Write> {
     name: &'a Path,
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
-    /// The file's writer; made when the first window gives the file its id.
+    /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
-    /// What the blocks of the window so far add up to.
+    /// The sums over the blocks of the current window so far.
     window: Option<WindowEnd>,
     frames_before: u64,
     busy: Duration,
@@ -39,7 +39,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
     }
 
-    /// Appends batches as they come until the workers end.
+    /// Appends batches until the workers end.
     pub(super) fn write(&mut self, batches: Receiver<EncodedBatch>, progress: &dyn Progress) -> Result<()> {
         for batch in batches {
             let started = Instant::now();
@@ -55,7 +55,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         if let Some(out) = self.out.take() {
             self.writer = Some(Writer::new(out, batch.window.id, &self.plan.start).map_err(failed)?);
         }
-        let writer = self.writer.as_mut().expect("made with the first batch");
+        let writer = self.writer.as_mut().expect("created with the first batch");
         if self.window.is_none() {
             writer.begin_window(window_record(&batch.window)).map_err(failed)?;
         }
@@ -72,7 +72,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         Ok(())
     }
 
-    /// Ends the file and says what was done.
+    /// Completes the file and returns the report.
     pub(super) fn finish(mut self, started: Instant, read: Duration, encode: Duration) -> Result<ConvertReport> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         let Some(writer) = self.writer.take() else {
@@ -118,7 +118,7 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 }
 
-/// How a window begins.
+/// The record that begins a window.
 fn window_record(job: &WindowJob) -> WindowRecord {
     let (scheme, WindowEnd { number, reached, share, squared_error, min, max, missing, coded, outliers }) =
         (&job.codec.scheme, WindowEnd::empty(job.index));

@@ -1,7 +1,7 @@
 //! The bound of [Dobashi](crate::bibliography), section 3.4: an estimate from random pixels, not a guarantee.
 //!
-//! The relative error of a pixel stays below the tolerance where samples are off by less than epsilon (eq 10). But g is
-//! not known before pictures are rendered, so its mean at random pixels stands for it:
+//! The relative error of a pixel stays below the tolerance if all sample errors are below epsilon (eq 10). But g is
+//! known only after rendering, so the mean of g at random pixels replaces it:
 //!
 //! ```text
 //! |I^ - I| / I < epsilon(t_j) sum of w_i / sum of v_i w_i                                                 (eq 10)
@@ -10,12 +10,11 @@
 //! sum over j of the squared error of a series <= sum over j of epsilon(t_j)^2                             (eq 13)
 //! ```
 //!
-//! Pixels are taken on the three views along the axes, with tau = 0 and the default kernel. Samples may have any sign,
-//! so the mean is that of |g|. delta is the root mean square of epsilon over the window's frames, and bounds every
-//! series as in eq 23.
+//! The pixels lie on the three views along the axes, with tau = 0 and the default kernel. Samples may have any sign, so
+//! the mean is that of |g|. delta is the root mean square of epsilon over the window's frames, and bounds every series
+//! as in eq 23.
 //!
-//! Pixels darker than the mean may be off by more than the tolerance. So may single frames: eq 13 bounds the sum over
-//! time alone.
+//! Pixels darker than the mean may exceed the tolerance. So may single frames: eq 13 bounds only the sum over time.
 
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
@@ -26,41 +25,42 @@ use rayon::prelude::*;
 use std::ops::Range;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// A pixel of the view along an axis: its line of sight.
+/// The line of sight of a pixel in the view along an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
     /// The axis that the line is parallel to: 0, 1, 2 for x, y, z.
     pub axis: usize,
-    /// Where it passes, in voxels along x, y, z; of no meaning along its own axis.
+    /// The position of the line in voxels along x, y, z; the entry of its own axis is unused.
     pub at: [f64; 3],
 }
 
 /// `samples` random pixels on each of three faces, uniform over the cells of their voxels.
 ///
-/// They follow from the seed and their number alone, and are the same for ever: more samples add pixels to those of fewer.
+/// A pixel depends only on the seed and its number, in every version. Asking for more samples appends pixels.
 pub fn pixels(dims: [usize; 3], samples: u32, seed: u64) -> Vec<Pixel> {
     let unit = |counter: u64| (xxh3_64_with_seed(&counter.to_le_bytes(), seed) >> 11) as f64 / (1u64 << 53) as f64;
     let number = 0..u64::from(samples);
     let pixel = |(n, axis): (u64, usize)| {
-        let place = |a: usize| unit((n * 3 + axis as u64) * 3 + a as u64) * dims[a] as f64 - 0.5;
-        Pixel { axis, at: std::array::from_fn(place) }
+        let position = |a: usize| unit((n * 3 + axis as u64) * 3 + a as u64) * dims[a] as f64 - 0.5;
+        Pixel { axis, at: std::array::from_fn(position) }
     };
     number.flat_map(|n| (0..3).map(move |axis| (n, axis))).map(pixel).collect()
 }
 
-/// A window of an archive, to be looked through.
+/// A window of an archive, and how to read it.
 pub(super) struct View<'a> {
     pub(super) window: &'a dyn FrameWindow,
     pub(super) grid: &'a Grid,
     pub(super) sample: SampleType,
-    /// Stands for a missing sample.
+    /// The value of missing samples.
     pub(super) missing_value: Option<f64>,
     /// The largest |sample|.
     pub(super) magnitude: f64,
 }
 
 impl View<'_> {
-    /// The root mean square over the window's frames of `tolerance` times the mean of |g| at `pixels`: delta (eq 11 and 13).
+    /// delta (eq 11 and 13): the root mean square over the window's frames of `tolerance` times the mean of |g| at
+    /// `pixels`.
     pub(super) fn bound(&self, tolerance: f64, pixels: &[Pixel]) -> Result<f64> {
         let kernel = Kernel::new(None, 0.0, self.grid)?;
         let scale = scale(self.magnitude);
@@ -89,25 +89,26 @@ impl View<'_> {
     }
 }
 
-/// One worker's samples; reused from line to line.
+/// The sample buffers of one worker, reused from line to line.
 #[derive(Debug, Default)]
 struct Scratch {
     bytes: Vec<u8>,
     values: Vec<f64>,
 }
 
-/// A power of two that brings samples of this magnitude near 1, so that sums and squares neither overflow nor vanish.
+/// A power of two that scales samples of this magnitude to near 1, so that sums and squares neither overflow nor
+/// underflow.
 fn scale(magnitude: f64) -> f64 {
     libm::scalbn(1.0, if magnitude > 0.0 { -libm::ilogb(magnitude).clamp(-1000, 1000) } else { 0 })
 }
 
-/// The mean of the absolute values of those that are there; 0 without any.
+/// The mean absolute value of the present values; 0 without any.
 fn mean_of_present(values: &[Option<f64>]) -> f64 {
     let present = || values.iter().flatten();
     present().map(|g| g.abs()).sum::<f64>() / present().count().max(1) as f64
 }
 
-/// The voxels that a line of sight sees, and their weights: a product of one factor along each axis (eq 2).
+/// The voxels near a line of sight, and their weights: a product of one factor along each axis (eq 2).
 struct Line {
     region: Region,
     factors: [Vec<f64>; 3],
@@ -132,12 +133,13 @@ impl Line {
     }
 }
 
-/// The Gaussian of voxels near `centre` along one of `len`, as far as the exact method goes; all in voxels.
+/// The Gaussian of the voxels near `centre` on an axis of `len` voxels, cut at the radius of the exact method; all
+/// lengths in voxels.
 fn factors(centre: f64, sigma: f64, len: usize) -> (Range<usize>, Vec<f64>) {
     let reach = Method::EXACT.radius * sigma;
     let first = (centre - reach).ceil().max(0.0) as usize;
     let end = ((centre + reach).floor() as usize + 1).min(len);
-    let nearest = (centre.round().max(0.0) as usize).min(len - 1); // at least, where voxels are far apart
+    let nearest = (centre.round().max(0.0) as usize).min(len - 1); // used even if voxels are far apart
     let range = first.min(nearest)..end.max(nearest + 1);
     let gauss = |i: usize| {
         let off = i as f64 - centre;
@@ -146,10 +148,10 @@ fn factors(centre: f64, sigma: f64, len: usize) -> (Range<usize>, Vec<f64>) {
     (range.clone(), range.map(gauss).collect())
 }
 
-/// Voxels that are looked at together: little memory for each worker. Sums go row by row and do not depend on it.
+/// The number of voxels read together, to limit each worker's memory. Sums go row by row and do not depend on it.
 const PIECE: usize = 1 << 13;
 
-/// A region in pieces of no more than [`PIECE`] voxels, or of single rows.
+/// Splits a region into pieces of at most [`PIECE`] voxels, or of single rows.
 fn pieces(region: &Region) -> impl Iterator<Item = Region> {
     let (region, [nx, ny, _]) = (*region, region.dims());
     let (rows, planes) = ((PIECE / nx).clamp(1, ny), (PIECE / (nx * ny)).max(1));

@@ -1,4 +1,4 @@
-//! What a file remembers of how it was made: enough to verify it against its source, and to append to it.
+//! The settings stored in a file: enough to verify it against its source, and to append to it.
 
 use super::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use crate::codec::bound::Bound;
@@ -10,8 +10,8 @@ use crate::wavelet::Basis;
 use std::str::FromStr;
 use wavesplat_format::Metadata;
 
-/// How a conversion is remembered; what is in the metadata anyway is not repeated.
-pub(super) fn remembered(
+/// The settings of a conversion. What the metadata holds anyway is not repeated.
+pub(super) fn stored_settings(
     config: &ConvertConfig,
     archive: &Archive,
     colour_transform: Option<&ColourTransform>,
@@ -35,7 +35,7 @@ pub(super) fn remembered(
     [ours, given].concat()
 }
 
-/// The configuration that made a file, to append to it; none if it does not say.
+/// The configuration of the conversion that wrote a file, to append to it; none if the file's settings are incomplete.
 pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
     let named = |name: &str| setting(file, name);
     let basis = BASES.iter().find(|(name, _)| named("basis") == Some(name))?.1;
@@ -64,12 +64,12 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
         memory,
-        settings: file.settings.iter().filter(|(name, _)| !is_ours(file, name)).cloned().collect(),
+        settings: file.settings.iter().filter(|(name, _)| !is_own(file, name)).cloned().collect(),
     })
 }
 
-/// The options of `wavesplat convert` by which the same samples become the same file, with their values: all that its bytes
-/// follow from, defaults too. Of colours that are the points of a file there is no name to say, so they are not among these.
+/// The options of `wavesplat convert` that make the same file from the same samples, with their values, including
+/// defaults. Colours given as a file of points are left out, because no option value names them.
 pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
     let mut options = vec![("tolerance", format!("{:?}", file.tolerance)), ("bound", file.bound.name().into())];
     match file.bound {
@@ -117,7 +117,7 @@ const STORED: [&str; 17] = [
     "origin",
 ];
 
-/// The first thing in which two conversions differ, in words; the program's version may, unless it must be the same.
+/// The first difference between two conversions, in words. The program's version counts only if `same_program`.
 pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) -> Option<String> {
     let of = |m: &Metadata| {
         let given = [
@@ -133,27 +133,27 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
-        let ours = OURS
+        let own = OWN
             .into_iter()
             .chain(Units::SETTINGS)
             .chain(["frames", "region"])
             .chain(ColourTransform::SETTINGS.map(|(name, _)| name));
-        let settings = ours.map(|name| (called(name), setting(m, name).unwrap_or("none").to_string()));
+        let settings = own.map(|name| (display_name(name), setting(m, name).unwrap_or("none").to_string()));
         settings.chain(given).collect::<Vec<_>>()
     };
     let pairs = of(before).into_iter().zip(of(now));
     let mut differ = pairs.filter(|(before, now)| before != now);
-    differ.next().map(|((what, before), (_, now))| format!("{what}: {}, now {}", shown(&before), shown(&now)))
+    differ.next().map(|((what, before), (_, now))| format!("{what}: {}, now {}", shortened(&before), shortened(&now)))
 }
 
-/// What a setting is called in messages.
-fn called(setting: &'static str) -> &'static str {
+/// The name of a setting in messages.
+fn display_name(setting: &'static str) -> &'static str {
     let of_colours = ColourTransform::SETTINGS.into_iter().find(|(name, _)| *name == setting);
     of_colours.map_or(setting, |(_, words)| words)
 }
 
-/// As much of a setting as a message has room for: transfer functions may have many points.
-fn shown(setting: &str) -> String {
+/// A setting, shortened for a message: transfer functions may have many points.
+fn shortened(setting: &str) -> String {
     const MOST: usize = 60;
     if setting.len() <= MOST { setting.into() } else { setting.chars().take(MOST).chain("...".chars()).collect() }
 }
@@ -162,14 +162,14 @@ fn number<T: FromStr>(text: &str) -> Option<T> {
     text.parse().ok()
 }
 
-/// Whether [`remembered`] adds a setting by itself.
-fn is_ours(file: &Metadata, name: &str) -> bool {
+/// Whether [`stored_settings`] adds a setting by itself.
+fn is_own(file: &Metadata, name: &str) -> bool {
     let of_colours = || ColourTransform::SETTINGS.iter().any(|(ours, _)| *ours == name);
-    OURS.contains(&name) || Units::SETTINGS.contains(&name) || setting(file, "colours").is_some() && of_colours()
+    OWN.contains(&name) || Units::SETTINGS.contains(&name) || setting(file, "colours").is_some() && of_colours()
 }
 
-/// The names of what [`remembered`] adds by itself, besides those of colours.
-const OURS: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
+/// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
+const OWN: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
 
 const BASES: [(&str, Option<Basis>); 5] = [
     ("auto", None),

@@ -1,14 +1,14 @@
-//! What is coded: the samples of an archive, or three channels of their colours.
+//! The samples to code: those of an archive, or three channels of their colours.
 
 use super::ConvertConfig;
 use crate::base::sample;
 use crate::source::{Archive, ColourTransform};
 
-/// A conversion in terms of the samples that are coded.
+/// A conversion, described for the coded samples.
 pub(super) struct Task {
     pub(super) config: ConvertConfig,
     pub(super) archive: Archive,
-    /// What makes them of those that are read, if they are not the same.
+    /// Converts source samples to coded ones, if they differ.
     pub(super) colour_transform: Option<ColourTransform>,
 }
 
@@ -28,5 +28,5 @@ impl Task {
     }
 }
 
-/// From none to full: what the samples of a channel may be.
+/// The range of a colour channel, from no brightness to full.
 pub(super) const BRIGHTNESS: (f64, f64) = (0.0, 1.0);

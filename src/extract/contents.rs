@@ -1,4 +1,4 @@
-//! What is extracted, in words for which every format has some place.
+//! The description of extracted samples, for the headers of all formats.
 
 use super::ExtractConfig;
 use crate::base::grid::Grid;
@@ -6,10 +6,10 @@ use crate::base::sample::{SampleType, missing_value, round_to};
 use crate::file::{CoefficientFile, setting};
 use crate::source::CHANNELS;
 
-/// How far a regular time may be from where it should be, in steps.
+/// The largest deviation of regular times from equal steps, in steps.
 const REGULAR: f64 = 1e-6;
 
-/// What the header of a file of samples can tell of them.
+/// A description of the extracted samples for a file's header.
 #[derive(Debug, Clone)]
 pub struct Contents {
     /// The lattice of the extracted region.
@@ -18,26 +18,26 @@ pub struct Contents {
     pub sample: SampleType,
     /// The number of each frame in the coefficient file.
     pub frames: Vec<usize>,
-    /// The time of each frame; its number where the file has no times.
+    /// The time of each frame, or its number if the file has no times.
     pub times: Vec<f64>,
-    /// Whether times are numbers of frames.
+    /// Whether `times` are frame numbers.
     pub numbered: bool,
-    /// Name of the variable, without control characters, as all texts here.
+    /// The name of the variable. All texts here have no control characters.
     pub name: String,
-    /// Units of the samples.
+    /// The unit of the samples.
     pub units: Option<String>,
-    /// Units of times.
+    /// The unit of times.
     pub time_units: Option<String>,
-    /// The calendar of times, where it is said.
+    /// The calendar of times, if known.
     pub calendar: Option<String>,
-    /// Units of positions.
+    /// The unit of positions.
     pub space_units: Option<String>,
-    /// What marks a missing sample, if some may be missing: a number of the samples' type, or NaN.
+    /// The value of missing samples, if some may be missing: a number of the sample type, or NaN.
     pub missing: Option<f64>,
 }
 
 impl Contents {
-    /// What a file says of what is extracted from it.
+    /// Describes what `config` extracts from a file.
     pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Self {
         let m = file.metadata();
         let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
@@ -60,7 +60,7 @@ impl Contents {
         }
     }
 
-    /// The first time and the step to each next one, if all steps are the same.
+    /// The first time and the step between times, if all steps are equal.
     pub(super) fn regular_times(&self) -> Option<(f64, f64)> {
         let [first, .., last] = self.times[..] else { return None };
         let step = (last - first) / (self.times.len() - 1) as f64;
@@ -68,13 +68,13 @@ impl Contents {
         (step > 0.0 && self.times.iter().enumerate().all(is_near)).then_some((first, step))
     }
 
-    /// Samples of one frame.
+    /// The number of samples in one frame.
     pub(super) fn voxels(&self) -> u64 {
         self.grid.dims.iter().fold(1, |n: u64, dim| n.saturating_mul(*dim as u64))
     }
 }
 
-/// What marks missing samples: what is declared to, or NaN if some are missing.
+/// The value of missing samples: the declared one, or NaN if some are missing.
 fn missing(file: &CoefficientFile, config: &ExtractConfig) -> Option<f64> {
     let ty = file.sample();
     if let Some(declared) = missing_value(ty, file.metadata().missing_value) {
@@ -84,7 +84,7 @@ fn missing(file: &CoefficientFile, config: &ExtractConfig) -> Option<f64> {
     (any && ty.is_float()).then_some(f64::NAN)
 }
 
-/// Text for one line of a header.
+/// Text fit for one line of a header.
 fn plain(text: &str) -> String {
     text.trim().chars().filter(|c| !c.is_control()).collect()
 }

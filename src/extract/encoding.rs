@@ -1,32 +1,32 @@
-//! Samples as a format stores them.
+//! The encoding of samples in a format.
 
 use crate::base::sample::{SampleType, load, store, swap_endian};
 use std::io::{self, Write};
 
-/// Samples that are turned at a time.
+/// Samples converted at a time.
 const RUN: usize = 8 << 10;
 
-/// What becomes of samples on their way into a file.
+/// How samples are converted when they are written.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Encoding {
-    /// Their type before.
+    /// The type before.
     pub(super) from: SampleType,
-    /// Their type in the file, which has all numbers of the other.
+    /// The type in the file; it can represent every value of `from`.
     pub(super) to: SampleType,
-    /// Whether the file has their most significant byte first.
+    /// Whether the file is big-endian.
     pub(super) big_endian: bool,
 }
 
 impl Encoding {
-    /// Writes some samples, given little-endian.
+    /// Writes little-endian samples in the file's encoding.
     pub(super) fn write(&self, samples: &[u8], out: &mut impl Write) -> io::Result<()> {
         if self.from == self.to && !self.big_endian {
             return out.write_all(samples);
         }
-        samples.chunks(RUN * self.from.size()).try_for_each(|run| out.write_all(&self.turned(run)))
+        samples.chunks(RUN * self.from.size()).try_for_each(|run| out.write_all(&self.converted(run)))
     }
 
-    fn turned(&self, run: &[u8]) -> Vec<u8> {
+    fn converted(&self, run: &[u8]) -> Vec<u8> {
         let mut bytes = if self.from == self.to { run.to_vec() } else { self.retyped(run) };
         if self.big_endian {
             swap_endian(self.to, &mut bytes);

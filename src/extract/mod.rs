@@ -1,15 +1,18 @@
-//! A coefficient file back to samples: any frames, any region, without reading the rest; and into files of other programs.
+//! Extracts samples from a coefficient file: any frames and any region, without reading the rest. Writes them in the
+//! formats of other programs.
 
 mod contents;
 mod encoding;
 mod format;
 mod netcdf;
 mod nrrd;
+mod read;
 mod sink;
 mod vti;
 
 pub use contents::Contents;
 pub use format::SampleFormat;
+pub use read::read_region;
 pub use sink::{Files, Sink};
 
 use crate::base::error::{Error, Result};
@@ -23,17 +26,39 @@ use serde::Serialize;
 use std::io::Write;
 use wavesplat_format::BlockEntry;
 
-/// What to extract.
+/// What to extract. [`ExtractConfig::new`] asks for everything; narrow it by struct update.
 #[derive(Debug, Clone)]
 pub struct ExtractConfig {
-    /// Which frames, ascending.
+    /// Which frames, ascending. Default: all.
     pub frames: Vec<usize>,
-    /// Which voxels.
+    /// Which voxels. Default: all.
     pub region: Region,
-    /// Which channel, from 0.
+    /// Which channel, from 0. Default: the first.
     pub channel: usize,
-    /// Bytes that may be allocated.
+    /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
+}
+
+impl ExtractConfig {
+    /// All frames and voxels of the first channel of `file`.
+    pub fn new(file: &CoefficientFile) -> Self {
+        Self { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel: 0, memory: memory::DEFAULT }
+    }
+
+    /// An error unless the file has these frames and voxels and this channel.
+    fn check(&self, file: &CoefficientFile) -> Result<()> {
+        let (frames, [x, y, z], channels) = (file.frames(), file.grid.dims, file.channels());
+        if !self.frames.is_sorted() || self.frames.last().is_some_and(|last| *last >= frames) {
+            return Err(Error::setting("frames", format!("takes numbers below {frames}, ascending")));
+        }
+        if !file.grid.whole().contains(&self.region) || self.region.is_empty() {
+            return Err(Error::setting("region", format!("takes voxels of {x} x {y} x {z}, at least one")));
+        }
+        if self.channel >= channels {
+            return Err(Error::setting("channel", format!("takes a number below {channels}")));
+        }
+        Ok(())
+    }
 }
 
 /// What an extraction did.
@@ -41,15 +66,15 @@ pub struct ExtractConfig {
 pub struct ExtractReport {
     /// Frames written.
     pub frames: usize,
-    /// Blocks that were decoded, each time counted.
+    /// Decoded blocks; a block decoded twice counts twice.
     pub blocks_read: u64,
-    /// Stored bytes that were read of blocks.
+    /// Stored bytes of blocks that were read.
     pub bytes_read: u64,
-    /// Bytes of the file that were read, directory and all.
+    /// Bytes that were read of the file, including its directory.
     pub file_bytes_read: u64,
-    /// Bytes that the file has.
+    /// Bytes of the file.
     pub file_bytes: u64,
-    /// Bytes of samples, in the type that they have in the file.
+    /// Bytes of the extracted samples, in the file's sample type.
     pub bytes: u64,
 }
 
@@ -58,7 +83,7 @@ pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()
     Pieces::new(file, config).map(|_| ())
 }
 
-/// Writes the samples in their own type, little-endian, frame by frame, x fastest. `name` stands for `out` in messages.
+/// Writes the samples in the file's sample type, little-endian, frame by frame, x fastest. Messages call `out` `name`.
 pub fn extract(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -70,7 +95,7 @@ pub fn extract(
     extract_to(file, config, &mut write, progress)
 }
 
-/// As [`extract`]; `write` is given the samples in pieces: whole frames, or some of one frame.
+/// As [`extract`]; `write` gets the samples in pieces: whole frames, or part of one frame.
 pub fn extract_to(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -96,15 +121,15 @@ pub fn extract_to(
     Ok(report)
 }
 
-/// How much is decoded at a time: some frames of a window whole, or one frame by slabs of z.
+/// The amount decoded at a time: whole frames of a window, or slabs of z of one frame.
 struct Pieces {
     frames: usize,
     slab: usize,
-    /// Blocks that are decoded at a time.
+    /// Blocks decoded at a time.
     blocks: usize,
 }
 
-/// Frames (of one window) and voxels that are decoded together, in the order of the output.
+/// Frames of one window and voxels that are decoded together, in the order of the output.
 struct Piece {
     window: u32,
     frames: Vec<usize>,
@@ -113,6 +138,7 @@ struct Piece {
 
 impl Pieces {
     fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
+        config.check(file)?;
         let plane = config.region.dims()[0] * config.region.dims()[1] * file.sample().size();
         let frame = plane * config.region.dims()[2];
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
@@ -141,7 +167,7 @@ impl Pieces {
     }
 }
 
-/// Bytes that decoding one block takes: as it is read and refined, and its samples.
+/// Bytes of memory to decode one block: its codes, its coefficients and its samples.
 fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
@@ -160,11 +186,12 @@ fn read_piece(
     let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     let size = file.sample().size();
-    out.resize(frames.len() * piece.region.voxels() * size, 0); // all of it is overwritten
+    out.resize(frames.len() * piece.region.voxels() * size, 0); // blocks overwrite all of it
     for entries in file.entries(piece.window, channel, &piece.region) {
         for entries in entries?.chunks(at_once) {
+            let batch = file.batch(&codec, entries, &wanted)?;
             let decode =
-                |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+                |entry: &BlockEntry| batch.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);
@@ -177,7 +204,7 @@ fn read_piece(
     Ok(())
 }
 
-/// Copies the rows that a block and the piece share.
+/// Copies the rows shared by a block and the piece.
 fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], piece: &Region, out: &mut [u8]) {
     let size = codec.sample.size();
     let shared = block.intersect(piece);

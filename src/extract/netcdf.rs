@@ -1,14 +1,14 @@
-//! What precedes the samples in a NetCDF file of a classic form, and what each variable is, by the conventions for climate
-//! and forecast data.
+//! The header of a classic NetCDF file, with the variables described by the conventions for climate and forecast data
+//! (CF).
 //!
-//! The samples are the last variable, so that they are written as they come. The form is that with 64-bit offsets
-//! (CDF-2) or, where types or lengths need it, that with 64-bit counts (CDF-5), whose types are more.
+//! The samples are the last variable, so they are written as they come. The form is CDF-2 (64-bit offsets), or CDF-5
+//! (64-bit counts, more types) if types or lengths need it.
 
 use super::contents::Contents;
 use crate::base::sample::{SampleType, store};
 use std::io::{self, Write};
 
-/// What follows the samples is zeros up to a multiple of so many bytes.
+/// Zeros after the samples fill up to a multiple of this many bytes.
 const ALIGNMENT: u64 = 4;
 
 const DIMENSIONS: u32 = 0x0a;
@@ -16,7 +16,7 @@ const VARIABLES: u32 = 0x0b;
 const ATTRIBUTES: u32 = 0x0c;
 const TEXT: u32 = 2;
 
-/// The dimensions, slowest first; each has a variable of its name: the times, or positions in the world.
+/// The dimensions, slowest first. Each has a variable of the same name with its times or positions.
 const NAMES: [&str; 4] = ["time", "z", "y", "x"];
 
 /// Writes the header, times and positions.
@@ -27,7 +27,7 @@ pub(super) fn write_header(contents: &Contents, ty: SampleType, out: &mut impl W
     write_coordinates(contents, out)
 }
 
-/// Zeros that follow the samples.
+/// The zeros after the samples.
 pub(super) fn padding(contents: &Contents, ty: SampleType) -> Vec<u8> {
     let bytes = sample_bytes(contents, ty);
     vec![0; (bytes.next_multiple_of(ALIGNMENT) - bytes) as usize]
@@ -53,14 +53,14 @@ fn write_coordinates(contents: &Contents, out: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
-/// A variable, but for its values.
+/// A variable without its values.
 struct Variable {
     name: String,
-    /// Which of the dimensions it has.
+    /// Its range in [`NAMES`].
     dimensions: std::ops::Range<usize>,
     ty: SampleType,
     texts: Vec<(&'static str, String)>,
-    /// What stands for a missing value.
+    /// The value of missing samples.
     fill: Option<f64>,
     bytes: u64,
 }
@@ -82,7 +82,7 @@ fn variables(contents: &Contents, ty: SampleType) -> Vec<Variable> {
 
 fn coordinate_texts(contents: &Contents, name: &str) -> Vec<(&'static str, String)> {
     let (space, time) = (contents.space_units.as_ref(), contents.time_units.as_ref());
-    // ParaView takes what says that its axis is X or Y for longitudes and latitudes, and bends the volume.
+    // ParaView reads an axis marked X or Y as longitude or latitude, and bends the volume.
     let (long, axis, units) = match name {
         "time" if contents.numbered => ("number of the frame", Some("T"), None),
         "time" => ("time", Some("T"), time),
@@ -96,14 +96,14 @@ fn coordinate_texts(contents: &Contents, name: &str) -> Vec<(&'static str, Strin
     texts
 }
 
-/// The variable's name in letters, digits and underscores, and none of a dimension.
+/// The variable's name in letters, digits and underscores, different from all dimensions.
 fn name_of(contents: &Contents) -> String {
     let name: String = contents.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic());
     if starts_well && !NAMES.contains(&name.as_str()) { name } else { format!("values_{name}") }
 }
 
-/// The header as far as it is encoded.
+/// The header encoded so far.
 struct Header {
     bytes: Vec<u8>,
     /// Whether counts have 64 bits.
@@ -111,13 +111,13 @@ struct Header {
 }
 
 impl Header {
-    /// The whole header, of variables whose values start at the byte `first` of the file.
+    /// The whole header; the values of the variables start at byte `first` of the file.
     fn of(contents: &Contents, variables: &[Variable], first: u64) -> Self {
         let lengths = lengths(contents);
         let has_type = |v: &Variable| !matches!(v.ty, SampleType::U8 | SampleType::U16 | SampleType::U32);
         let wide = !variables.iter().all(has_type) || lengths.iter().any(|n| *n > i32::MAX as u64);
         let mut header = Self { bytes: vec![b'C', b'D', b'F', if wide { 5 } else { 2 }], wide };
-        header.count(0); // records: none, as no dimension is without limit
+        header.count(0); // no records: no dimension is unlimited
         header.list(DIMENSIONS, NAMES.len());
         for (name, length) in NAMES.iter().zip(lengths) {
             header.name(name);
@@ -130,7 +130,7 @@ impl Header {
         header
     }
 
-    /// A variable whose values begin at this byte of the file; where they end.
+    /// Encodes a variable whose values begin at byte `begin` of the file; returns where they end.
     fn variable(&mut self, variable: &Variable, begin: u64) -> u64 {
         self.name(&variable.name);
         self.count(variable.dimensions.len() as u64);
@@ -142,7 +142,7 @@ impl Header {
         }
         self.int(code_of(variable.ty));
         let padded = variable.bytes.next_multiple_of(ALIGNMENT);
-        self.count(if self.wide { padded } else { padded.min(u32::MAX.into()) }); // of the last one this says "more"
+        self.count(if self.wide { padded } else { padded.min(u32::MAX.into()) }); // the last may be "more"
         self.bytes.extend(reversed(begin.to_le_bytes()));
         begin.saturating_add(padded)
     }

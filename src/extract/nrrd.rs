@@ -1,11 +1,11 @@
-//! The header of a NRRD.
+//! Writes the header of a NRRD.
 
 use super::contents::Contents;
 use crate::base::sample::SampleType;
 use std::fmt::Display;
 use std::io::{self, Write};
 
-/// Writes the header: of an attached file, or of one whose samples are in the file `data` of the same folder.
+/// Writes the header of an attached file, or of one with its samples in the file `data` of the same folder.
 pub(super) fn write_header(
     contents: &Contents,
     ty: SampleType,
@@ -23,7 +23,7 @@ pub(super) fn write_header(
             "dimension: 4\nspace dimension: 3\nsizes: {x} {y} {z} {frames}\nkinds: domain domain domain time"
         )?,
     }
-    write_places(contents, one, out)?;
+    write_geometry(contents, one, out)?;
     if let Some((first, step)) = contents.regular_times() {
         writeln!(out, "spacings: nan nan nan {step}\naxis mins: nan nan nan {first}")?;
         if let Some(units) = &contents.time_units {
@@ -40,8 +40,8 @@ pub(super) fn write_header(
     }
 }
 
-/// Where voxels are in the world.
-fn write_places(contents: &Contents, one: bool, out: &mut impl Write) -> io::Result<()> {
+/// Writes the positions of voxels in world space.
+fn write_geometry(contents: &Contents, one: bool, out: &mut impl Write) -> io::Result<()> {
     let [sx, sy, sz] = contents.grid.spacing;
     let time = if one { "" } else { " none" };
     writeln!(out, "space directions: ({sx},0,0) (0,{sy},0) (0,0,{sz}){time}")?;

@@ -1,4 +1,4 @@
-//! Extracted samples into files.
+//! Writes extracted samples to files.
 
 use super::contents::Contents;
 use super::encoding::Encoding;
@@ -11,19 +11,19 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Which files an extraction writes.
+/// The files that an extraction writes.
 #[derive(Debug)]
 pub struct Files {
     format: SampleFormat,
-    /// Files of samples: one for all frames, or one for each.
+    /// The files of samples: one for all frames, or one for each.
     samples: Vec<PathBuf>,
-    /// What leads to those, and is written when they are there.
+    /// A list or a header that refers to `samples`, written last.
     last: Option<PathBuf>,
 }
 
 impl Files {
-    /// Those that `path` stands for: itself, or `-`; a pattern as `out_%04d.vti` if each frame has its own; of a header or a
-    /// list also what is beside it.
+    /// The files for `path`: itself, or `-` for standard output. If each frame has its own file, `path` is a pattern
+    /// like `out_%04d.vti`. Headers and lists also have files beside them.
     pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
         let (samples, last) = match format {
             SampleFormat::Vti => (numbered(path, frames)?, None),
@@ -40,17 +40,17 @@ impl Files {
         Ok(Self { format, samples, last })
     }
 
-    /// All of them, in the order in which they are finished.
+    /// All files, in the order in which they are completed.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.samples.iter().chain(&self.last).map(PathBuf::as_path)
     }
 
-    /// The folder of files that a list leads to.
+    /// The folder of the files of a list.
     fn folder(&self) -> Option<&Path> {
         self.samples[0].parent().filter(|_| self.format == SampleFormat::Pvd)
     }
 
-    /// An error if one of them cannot be made, as far as can be told without making it.
+    /// An error if a file cannot be created, as far as that is known beforehand.
     fn check(&self, force: bool) -> Result<()> {
         if let Some(folder) = self.folder().filter(|folder| !folder.is_dir()) {
             self.last.iter().try_for_each(|list| Output::check(list, force))?;
@@ -75,23 +75,23 @@ fn numbered(path: &Path, frames: &[usize]) -> Result<Vec<PathBuf>> {
     Ok(frames.iter().map(|frame| names.of(*frame)).collect())
 }
 
-/// The name, without its ending, that is also that of what lies beside the file.
+/// The name without its extension, which the files beside it share.
 fn stem(path: &Path) -> Result<String> {
     let stem = path.file_stem().filter(|_| path != Path::new(STANDARD) && path.extension().is_some());
-    let what = "other files lie beside this one, named after it: name a file with an ending";
+    let what = "other files are written beside this one and named after it, so its name needs an extension";
     stem.map(|stem| stem.to_string_lossy().into_owned()).ok_or_else(|| Error::path(path, what))
 }
 
 fn no_folder(path: &Path) -> Error {
-    Error::path(path, "must be a folder, for the files of frames; it is a file")
+    Error::path(path, "is a file, but the files of frames need a folder of this name")
 }
 
-/// A folder that was made for files, and goes away if none is in it.
+/// A folder created for files; it is removed on drop if it is empty.
 #[derive(Debug)]
 struct Folder(PathBuf);
 
 impl Folder {
-    /// None if there is such a folder already.
+    /// Creates the folder; none if it exists already.
     fn create(path: &Path) -> Result<Option<Self>> {
         match fs::create_dir(path) {
             Ok(()) => Ok(Some(Self(path.into()))),
@@ -103,28 +103,28 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        let _ = fs::remove_dir(&self.0); // which fails if it is of use
+        let _ = fs::remove_dir(&self.0); // fails if the folder is not empty
     }
 }
 
-/// Where samples go.
+/// Writes samples to the files of an extraction.
 #[derive(Debug)]
 pub struct Sink<'a> {
     contents: &'a Contents,
     files: Files,
     force: bool,
     encoding: Encoding,
-    /// The file that is being written.
+    /// The file being written.
     open: Option<Output>,
-    /// Bytes of samples that it is yet to be given.
+    /// Bytes of samples still missing in the open file.
     left: u64,
-    /// Files of samples that were begun.
+    /// The number of files of samples begun.
     begun: usize,
-    _folder: Option<Folder>, // after the file: it is gone by then
+    _folder: Option<Folder>, // dropped after the open file
 }
 
 impl<'a> Sink<'a> {
-    /// Opens the first of the files; existing ones are an error unless `force` replaces them.
+    /// Opens the first file; existing files are an error unless `force` replaces them.
     pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
         files.check(force)?;
         let folder = files.folder().map(Folder::create).transpose()?.flatten();
@@ -134,7 +134,7 @@ impl<'a> Sink<'a> {
         Ok(sink)
     }
 
-    /// Takes the next samples, little-endian.
+    /// Writes the next samples, given little-endian.
     pub fn write(&mut self, mut samples: &[u8]) -> Result<()> {
         while !samples.is_empty() {
             if self.left == 0 {
@@ -151,7 +151,7 @@ impl<'a> Sink<'a> {
         Ok(())
     }
 
-    /// Gives the last file of samples its name, and writes what leads to them, if there is such a file.
+    /// Commits the last file of samples, and writes the list or header if there is one.
     pub fn finish(mut self) -> Result<()> {
         self.end()?;
         let Some(path) = &self.files.last else { return Ok(()) };
@@ -160,7 +160,7 @@ impl<'a> Sink<'a> {
         out.commit()
     }
 
-    /// Opens the next file and writes what precedes its samples.
+    /// Opens the next file and writes its header.
     fn begin(&mut self) -> Result<()> {
         let path = &self.files.samples[self.begun];
         let frames = self.contents.frames.len() / self.files.samples.len();
@@ -171,7 +171,7 @@ impl<'a> Sink<'a> {
         Ok(())
     }
 
-    /// Writes what follows the samples and gives the file its name.
+    /// Writes the text after the samples and commits the file.
     fn end(&mut self) -> Result<()> {
         let Some(mut out) = self.open.take() else { return Ok(()) };
         let end = match self.files.format {

@@ -5,10 +5,10 @@ use crate::base::sample::SampleType;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
 
-/// What follows the samples.
+/// The text after the samples.
 pub(super) const END: &[u8] = b"\n  </AppendedData>\n</VTKFile>\n";
 
-/// Writes what precedes the samples of a frame, their count in bytes included.
+/// Writes the text before the samples of a frame, and their number of bytes.
 pub(super) fn write_header(contents: &Contents, ty: SampleType, time: f64, out: &mut impl Write) -> io::Result<()> {
     let [x, y, z] = contents.grid.dims.map(|n| n - 1);
     let (extent, name, ty_name) = (format!("0 {x} 0 {y} 0 {z}"), escape(&contents.name), name_of(ty));
@@ -34,13 +34,13 @@ pub(super) fn write_header(contents: &Contents, ty: SampleType, time: f64, out: 
     out.write_all(&contents.voxels().saturating_mul(ty.size() as u64).to_le_bytes())
 }
 
-/// The samples' units, where VTK keeps them.
+/// The samples' unit, in VTK's own key.
 fn units(contents: &Contents) -> String {
     let key = |units| format!(r#"<InformationKey name="UNITS_LABEL" location="vtkDataArray">{units}</InformationKey>"#);
     contents.units.as_deref().map(escape).map(key).unwrap_or_default()
 }
 
-/// Writes the list of the files of all frames, by their names from the list's folder, with their times.
+/// Writes the list of the files of all frames with their times; `names` are relative to the list's folder.
 pub(super) fn write_list(
     contents: &Contents,
     names: impl Iterator<Item = String>,

@@ -1,24 +1,27 @@
-//! An open coefficient file: the format's reader over a mapped file, in this library's terms.
+//! An open coefficient file: the format's reader over any storage, in this library's terms.
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
-use crate::base::mapped::{Access, FileBytes};
+use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::{SampleType, join_ranges};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
+use crate::file::counted::Counted;
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockId, CompletePrefix, FileId, LeafEntry, Metadata, Reader};
+use wavesplat_format::{BlockEntry, BlockId, CompletePrefix, FileId, LeafEntry, Metadata, Reader, Storage};
 
-/// An open file; several threads may read it.
+/// An open coefficient file; several threads may read it.
 #[derive(Debug)]
 pub struct CoefficientFile {
     path: PathBuf,
-    reader: Reader<FileBytes>,
+    pub(super) reader: Reader<Counted>,
+    /// The state of a local file when it was opened.
+    state: Option<State>,
     /// The lattice.
     pub grid: Grid,
     /// How it is cut into blocks.
@@ -52,19 +55,41 @@ impl Damage {
 }
 
 impl CoefficientFile {
-    /// Opens a file: checks header, footer, metadata and directory, not yet the blocks.
-    pub fn open(path: &Path, access: Access) -> Result<Self> {
-        let failed = |source| Error::CoefficientFile { path: path.into(), source };
-        let reader = Reader::open(FileBytes::open(path, access)?).map_err(failed)?;
+    /// Opens a local file through a memory map.
+    ///
+    /// Checks header, footer, metadata and directory, but not the blocks.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::CoefficientFile`] if it is damaged, unfinished or no coefficient
+    /// file.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with(path, Access::Map)
+    }
+
+    /// As [`Self::open`], with a choice between a memory map and plain reads.
+    pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<Self> {
+        let bytes = FileBytes::open(path.as_ref(), access)?;
+        let state = Some(bytes.state());
+        Ok(Self { state, ..Self::from_storage(path.as_ref(), bytes)? })
+    }
+
+    /// Opens a file in any storage: memory, or an object behind HTTP. `name` stands for it in messages.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_storage(name: impl Into<PathBuf>, storage: impl Storage + Send + Sync + 'static) -> Result<Self> {
+        let path = name.into();
+        let failed = |source| Error::CoefficientFile { path: path.clone(), source };
+        let reader = Reader::open(Counted::new(Box::new(storage))).map_err(failed)?;
         let m = reader.metadata();
         let dims = m.dims.map(|n| n as usize);
         let grid = Grid { dims, spacing: m.spacing, origin: m.origin };
         let blocks = BlockGrid { dims, edge: m.block_edge as usize };
         let colour_transform = colour_transform(m).map_err(failed)?;
-        Ok(Self { path: path.into(), grid, blocks, colour_transform, reader, skipped: None })
+        Ok(Self { path, grid, blocks, colour_transform, reader, state: None, skipped: None })
     }
 
-    /// Its path.
+    /// Its path, or the name of its storage.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -236,12 +261,23 @@ impl CoefficientFile {
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
+        self.block_from(&self.reader, codec, entry, wanted)
+    }
+
+    /// Reads a block by way of `reader`.
+    pub(super) fn block_from<S: Storage>(
+        &self,
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+    ) -> Result<Block> {
         let size = self.blocks.region(entry.id.block as usize).dims();
         if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::of_missing(codec, size));
         }
-        Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
+        Block::read(reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
@@ -284,9 +320,9 @@ impl CoefficientFile {
         self.reader.storage().bytes_read()
     }
 
-    /// An error if the file is no longer what it was when opened.
+    /// An error if a local file is no longer what it was when opened. Other storages report changes as they are read.
     pub fn check_unchanged(&self) -> Result<()> {
-        self.reader.storage().check_unchanged()
+        self.state.map_or(Ok(()), |state| state.check_path(&self.path))
     }
 
     /// The error of a file whose parts contradict each other.
@@ -294,7 +330,7 @@ impl CoefficientFile {
         self.failed(wavesplat_format::Error::Invalid(what))
     }
 
-    fn failed(&self, source: wavesplat_format::Error) -> Error {
+    pub(super) fn failed(&self, source: wavesplat_format::Error) -> Error {
         Error::CoefficientFile { path: self.path.clone(), source }
     }
 }

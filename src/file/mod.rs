@@ -3,10 +3,13 @@
 //! [`CoefficientFile`] is the only door from the format package to this library. Nothing here writes blocks (that is
 //! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
 
+mod counted;
+mod batch;
 mod coefficient_file;
 pub mod report;
 pub mod verify;
 pub mod recover;
 pub mod resume;
 
+pub(crate) use batch::BlockBatch;
 pub use coefficient_file::{CoefficientFile, setting};

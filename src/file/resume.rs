@@ -107,12 +107,12 @@ fn whole_windows(part: &Path) -> Result<Option<CompletePrefix>> {
 
 /// The program's own last look at what it wrote, before the file gets its name: every checksum.
 pub fn check(part: &Path) -> Result<()> {
-    CoefficientFile::open(part, Access::Read)?.check_stored()
+    CoefficientFile::open_with(part, Access::Read)?.check_stored()
 }
 
 /// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
 pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Option<usize>) -> Result<bool> {
-    let file = CoefficientFile::open(path, Access::Read)?;
+    let file = CoefficientFile::open_with(path, Access::Read)?;
     Ok(file.metadata().start() == *like && frames.is_none_or(|frames| frames == file.frames()))
 }
 

@@ -79,36 +79,36 @@ impl Mode {
     }
 }
 
-/// The settings of a rendering.
+/// The settings of a rendering. [`RenderConfig::new`] gives the defaults; struct update changes the others.
 #[derive(Debug, Clone)]
 pub struct RenderConfig {
-    /// How the values along a ray are combined.
+    /// How the values along a ray are combined. Default: a projection.
     pub mode: Mode,
-    /// The views; all have the same picture size.
+    /// The views, at least one; all have the same picture size.
     pub views: Vec<View>,
-    /// The kernel of every voxel.
+    /// The kernel of every voxel. Default: [`Kernel::of_grid`].
     pub kernel: Kernel,
-    /// The quantity that a pixel of a projection shows.
+    /// The quantity that a pixel of a projection shows. Default: the mean.
     pub quantity: Quantity,
-    /// Frame numbers, ascending.
+    /// Frame numbers, ascending. Default: all frames.
     pub frames: Vec<usize>,
-    /// The voxels to render; by default all.
+    /// The voxels to render; `None`, the default, means all.
     pub region: Option<Region>,
     /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
     /// brightest point of the picture plane. For a mean it is relative to the value range at pixels with that point's
-    /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method.
+    /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default:
+    /// [`default_splat_error`].
     pub splat_error: f64,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
-    /// precision of the file. For an emission, the limit is the error of a picture whose samples all have this error.
+    /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all
+    /// have this error.
     pub allowed: Option<f64>,
-    /// The error that `allowed` limits.
+    /// The error that `allowed` limits. Default: the certified error.
     pub limited: Limit,
-    /// Whether each picture comes with an error bound for every pixel.
+    /// Whether each picture comes with an error bound for every pixel. Default: no.
     pub certify: bool,
-    /// Limit of allocated memory in bytes.
+    /// Limit of allocated memory in bytes, without the memory of the sink. Default: 512 MiB.
     pub memory: usize,
-    /// Bytes of `memory` reserved for the sink.
-    pub reserved: usize,
 }
 
 /// An error that can be limited.
@@ -145,7 +145,7 @@ impl RenderConfig {
             (self.chooses_by_view(), "limited"),
             (self.quantity != Quantity::Mean, "quantity"),
         ];
-        let projects = |setting| Error::setting(setting, Note::with("is of projections alone", Remedy::Project));
+        let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));
         refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, setting)| Err(projects(setting)))
     }
 }

@@ -21,6 +21,12 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// The layout with one plane of values for each of `frames` frames, and no other planes.
+    pub fn of_values(frames: usize) -> Self {
+        let (coefficients, error_planes, order) = (0, 0, Order::Pixels);
+        Self { coefficients, frames, values: true, absent: false, error_planes, lengths: false, order }
+    }
+
     /// The index of a frame's plane of values.
     pub fn value(&self, frame: usize) -> usize {
         self.coefficients + frame

@@ -26,7 +26,7 @@
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
 //! project, composite   the pictures of each batch
-//! annotate/, sink/  text in pictures, and output files
+//! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!
 //! ```text
@@ -63,11 +63,18 @@ mod project;
 mod composite;
 pub mod annotate;
 pub mod sink;
+mod pictures;
 
+pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
+pub use layout::{Layout, Order};
+pub use pictures::render_png;
+pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
 pub use report::{Picture, RenderReport, Rendered, ViewReport};
-pub use scene::{LeftOut, Scene};
+pub use scene::{
+    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
+};
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
 use crate::base::error::{Error, Note, Remedy, Result};
@@ -75,7 +82,7 @@ use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
 use splat::ViewSetup;
-use splat::reference_weights::without_what_is_dim;
+use splat::reference_weights::without_dim_voxels;
 use std::time::{Duration, Instant};
 
 /// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
@@ -129,11 +136,11 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
-        let what = "the samples are colours already, of which only projections are made";
+        let what = "the samples are colours already, and colours are rendered as projections only";
         return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
     }
     let volume = (*scene.grid(), scene.blocks());
-    let setup = |view: &View| without_what_is_dim(ViewSetup::new(volume, config, view)?, config);
+    let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
     let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
     match config.mode {
         Mode::Projection => Budget::check(config, scene, &setups)?,

@@ -50,7 +50,10 @@ impl<'a> Budget<'a> {
         let ([width, height], mib) = (config.size(), least.div_ceil(1 << 20));
         let threads = rayon::current_num_threads();
         let pictures = format!("pictures of {width}x{height} pixels of this volume");
-        Err(Error::setting("memory", format!("{pictures} need at least {mib}MiB with {threads} thread(s)")))
+        Err(Error::setting(
+            "memory",
+            format!("{pictures} need at least {mib}MiB with {threads} thread(s), without the memory of the sink"),
+        ))
     }
 
     /// The budget for pictures from these views, or for these slabs of one view.
@@ -176,7 +179,7 @@ fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
         (Mode::Projection, _) => setups.len() * width * height * WEIGHT_BYTES,
         (_, setup) => setup.map_or(0, |setup| slabs::bytes(setup, config)),
     };
-    memory::FIXED + config.reserved + more
+    memory::FIXED + more
 }
 
 /// An upper bound of the number of planes for `frames` frames of a batch.

@@ -10,7 +10,7 @@ use crate::codec::real::Real;
 pub enum PlaneValues<'a> {
     /// All are zero.
     Nothing,
-    /// One value for each voxel, x fastest.
+    /// One value for each voxel: x fastest, then y, z.
     Single(&'a [f32]),
     /// The same as [`Self::Single`], in f64.
     Double(&'a [f64]),
@@ -21,14 +21,14 @@ pub enum PlaneValues<'a> {
 impl PlaneValues<'_> {
     /// Calls `visit(voxel, value)` for all nonzero values, ascending by voxel.
     pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
-        let mut all = |amounts: &mut dyn Iterator<Item = f64>| {
-            amounts.enumerate().filter(|(_, amount)| *amount != 0.0).for_each(|(voxel, amount)| visit(voxel, amount));
+        let mut all = |values: &mut dyn Iterator<Item = f64>| {
+            values.enumerate().filter(|(_, value)| *value != 0.0).for_each(|(voxel, value)| visit(voxel, value));
         };
         match self {
             Self::Nothing => {}
-            Self::Single(amounts) => all(&mut amounts.iter().map(|amount| f64::from(*amount))),
-            Self::Double(amounts) => all(&mut amounts.iter().copied()),
-            Self::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| visit(*voxel as usize, *amount)),
+            Self::Single(values) => all(&mut values.iter().map(|value| f64::from(*value))),
+            Self::Double(values) => all(&mut values.iter().copied()),
+            Self::Few(values) => values.iter().for_each(|(voxel, value)| visit(*voxel as usize, *value)),
         }
     }
 
@@ -36,16 +36,16 @@ impl PlaneValues<'_> {
     pub(super) fn add_to(&self, factor: f64, sums: &mut [f64]) {
         match self {
             Self::Nothing => {}
-            Self::Single(amounts) => add_scaled(amounts, factor, sums),
-            Self::Double(amounts) => add_scaled(amounts, factor, sums),
-            Self::Few(amounts) => amounts.iter().for_each(|(voxel, amount)| sums[*voxel as usize] += factor * amount),
+            Self::Single(values) => add_scaled(values, factor, sums),
+            Self::Double(values) => add_scaled(values, factor, sums),
+            Self::Few(values) => values.iter().for_each(|(voxel, value)| sums[*voxel as usize] += factor * value),
         }
     }
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_scaled<R: Real>(amounts: &[R], factor: f64, sums: &mut [f64]) {
-    sums.iter_mut().zip(amounts).for_each(|(sum, amount)| *sum += factor * amount.to_f64());
+fn add_scaled<R: Real>(values: &[R], factor: f64, sums: &mut [f64]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value.to_f64());
 }
 
 impl<'a> From<Plane<'a>> for PlaneValues<'a> {
@@ -58,20 +58,28 @@ impl<'a> From<Plane<'a>> for PlaneValues<'a> {
     }
 }
 
-/// A block that has been read.
+/// A block that is ready to be splatted.
 pub trait BlockPlanes: Send + Sync {
     /// Number of voxels in the block.
     fn voxels(&self) -> usize;
 
-    /// The values of a plane. They may be stored in `scratch`.
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>>;
+    /// The values of a plane, 0 to [`Layout::planes`](super::Layout::planes). They may be stored in `scratch`.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>>;
 
-    /// Number of nonzero coefficients, and stored bytes that were read.
+    /// Number of nonzero coefficients, and stored bytes that were read; for the report.
     fn held(&self) -> [u64; 2];
 }
 
 /// A source of blocks.
 pub(super) trait BlockSource: Sync {
+    /// Prepares to read these blocks next.
+    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
+        Ok(())
+    }
+
     /// Reads a block.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 }
@@ -85,6 +93,12 @@ pub struct Scratch {
 }
 
 impl Scratch {
+    /// A buffer for one value of each voxel. It holds values of an earlier plane.
+    pub fn values(&mut self, voxels: usize) -> &mut [f64] {
+        self.double.resize(voxels, 0.0);
+        &mut self.double
+    }
+
     /// The samples in `bytes`; none of them is missing.
     pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();
@@ -129,10 +143,10 @@ impl BlockPlanes for UnitValues {
         self.0
     }
 
-    fn plane<'a>(&'a self, _: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        room.single.clear();
-        room.single.resize(self.0, 1.0);
-        Ok(PlaneValues::Single(&room.single))
+    fn plane<'a>(&'a self, _: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+        scratch.single.clear();
+        scratch.single.resize(self.0, 1.0);
+        Ok(PlaneValues::Single(&scratch.single))
     }
 
     fn held(&self) -> [u64; 2] {

@@ -70,6 +70,10 @@ fn expect(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize,
 }
 
 impl BlockSource for &dyn FrameBatch {
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        FrameBatch::fetch(*self, blocks)
+    }
+
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         FrameBatch::planes(*self, block)
     }

@@ -4,16 +4,24 @@
 //! in planes (eq 9), and a linear map from planes to frames (eq 8). The rest of the renderer knows nothing else about
 //! them.
 
-use super::config::RenderConfig;
+use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
 use super::layout::Layout;
 use super::plane_values::BlockPlanes;
 use crate::base::error::Result;
-use crate::base::grid::{BlockGrid, Grid};
+use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::memory;
+use crate::view::camera::View;
+use crate::view::footprint::Kernel;
 use crate::wavelet::Lane;
 use serde::Serialize;
 
-/// A data source to render.
+/// A data source to render: a grid of voxels with a value in every frame, read block by block.
+///
+/// The library has two scenes: [`super::CoefficientScene`] and [`super::FrameScene`]. Another program can implement
+/// this trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the
+/// planes of a scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`],
+/// and its inverse copies.
 pub trait Scene {
     /// The grid of voxels.
     fn grid(&self) -> &Grid;
@@ -29,6 +37,12 @@ pub trait Scene {
     /// Number of frames; `None` if it is unknown until all are read.
     fn frames(&self) -> Option<usize>;
 
+    /// The largest error of a sample as a share of the value range, if it is known. It determines the default splat
+    /// error.
+    fn tolerance(&self) -> Option<f64> {
+        None
+    }
+
     /// One past the last frame that can be rendered together with `frame`.
     fn batch_end(&self, frame: usize) -> usize;
 
@@ -39,7 +53,41 @@ pub trait Scene {
     fn block_bytes(&self) -> usize;
 
     /// Opens one channel of a frame batch, and selects the blocks to read.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>>;
+}
+
+impl RenderConfig {
+    /// The defaults: means of all frames of a scene, seen from one view.
+    ///
+    /// ```
+    /// use wavesplat::render::{FrameScene, Quantity, RenderConfig};
+    /// use wavesplat::source::ArraySource;
+    /// use wavesplat::view::camera::View;
+    ///
+    /// let source = ArraySource::from_f32([8, 8, 8], &[1.0; 2 * 8 * 8 * 8])?;
+    /// let scene = FrameScene::new(Box::new(source), None);
+    /// let emission = RenderConfig { quantity: Quantity::Emission, ..RenderConfig::new(&scene, View::new(30.0, 20.0)) };
+    /// assert_eq!(emission.frames, [0, 1]);
+    /// # Ok::<(), wavesplat::Error>(())
+    /// ```
+    pub fn new(scene: &dyn Scene, view: View) -> Self {
+        Self {
+            mode: Mode::Projection,
+            views: vec![view],
+            kernel: Kernel::of_grid(scene.grid()),
+            quantity: Quantity::Mean,
+            frames: (0..scene.frames().unwrap_or(0)).collect(),
+            region: None,
+            splat_error: default_splat_error(scene.tolerance()),
+            allowed: None,
+            limited: Limit::Certified,
+            certify: false,
+            memory: memory::DEFAULT,
+        }
+    }
 }
 
 /// A request for frames to render together.
@@ -55,7 +103,7 @@ pub struct BatchRequest<'a> {
     pub views: &'a [Expectation<'a>],
 }
 
-/// Frames that are rendered together.
+/// Frames that are rendered together. Several threads read the blocks of a batch.
 pub trait FrameBatch: Sync {
     /// The meaning of each plane.
     fn layout(&self) -> Layout;
@@ -63,22 +111,37 @@ pub trait FrameBatch: Sync {
     /// The selected blocks.
     fn selection(&self) -> &Selection;
 
+    /// Prepares to read these blocks next. A remote scene reads them in one request; by default this does nothing.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
+    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
+        Ok(())
+    }
+
     /// Reads a block: its values in each plane.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
 
     /// The inverse transform (eq 8), from the planes of some pixels to their frames. Planes not listed in `used` are
-    /// zero.
+    /// zero. The function takes at least [`Layout::planes`] lanes and fills [`Layout::frames`] lanes; a lane holds one
+    /// number for each of [`LANES`](super::LANES) pixels.
     fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
 
     /// Error bounds of the samples, to be combined with the sums of the error planes.
     fn errors(&self) -> &SampleErrors;
 
-    /// Ends the batch and reports whether its layout sufficed. An error if the input changed while it was read.
+    /// Ends the batch and reports whether its layout sufficed.
+    ///
+    /// # Errors
+    /// The input changed while it was read.
     fn finish(&self) -> Result<BatchOutcome>;
 }
 
-/// Computes the frames at some pixels from all planes. Overwrites the planes.
-pub(super) type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
+/// Computes the frames at some pixels (second argument) from all planes (first argument). May overwrite the planes.
+pub type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
 /// The outcome of a batch after its blocks are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,6 +170,23 @@ pub struct Selection {
     pub certified: f64,
     /// For each view of the request, the expected mean square over its pixels of the error that the samples cause.
     pub expected: Vec<f64>,
+}
+
+impl Selection {
+    /// Selects all blocks that touch the region of the request, for scenes that know no values before they read them.
+    pub fn of_all(blocks: BlockGrid, request: &BatchRequest<'_>) -> Self {
+        let region = request.config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
+        let touching: Vec<usize> = blocks.touching(&region).collect();
+        let any = (f64::NEG_INFINITY, f64::INFINITY);
+        let ranged = if request.config.mode.is_projection() { &[][..] } else { &touching };
+        Self {
+            ranges: ranged.iter().map(|block| (*block, any)).collect(),
+            empty: (blocks.len() - touching.len()) as u64,
+            blocks: touching,
+            expected: vec![0.0; request.views.len()],
+            ..Self::default()
+        }
+    }
 }
 
 /// Counts of blocks and parts that are not read.

@@ -82,14 +82,14 @@ impl BlockSource for Ones<'_> {
 }
 
 fn put_first_plane(tile: &mut ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
-    let place = tile.rect;
+    let rect = tile.rect;
     if tile.used().is_empty() {
         return;
     }
-    for (y, at) in place.y.clone().zip((0..).step_by(place.x.len())) {
-        for first in (0..place.x.len()).step_by(LANES) {
-            let count = LANES.min(place.x.len() - first);
-            pixels.put(0, [place.x.start + first, y], &tile.load_one(at + first, count)[..count]);
+    for (y, at) in rect.y.clone().zip((0..).step_by(rect.x.len())) {
+        for first in (0..rect.x.len()).step_by(LANES) {
+            let count = LANES.min(rect.x.len() - first);
+            pixels.put(0, [rect.x.start + first, y], &tile.load_one(at + first, count)[..count]);
         }
     }
 }

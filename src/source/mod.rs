@@ -4,6 +4,7 @@
 //! order of axes (`layout`). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
 //! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
 
+mod array;
 mod colour_transform;
 mod file_header;
 mod formats;
@@ -21,6 +22,7 @@ mod stream;
 mod testing;
 mod variables;
 
+pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;

@@ -23,7 +23,7 @@
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 
-/// What a user asks of a view.
+/// The settings of a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Degrees about z, counter-clockwise seen from +z; 0 looks along -y.
@@ -40,6 +40,13 @@ pub struct View {
     pub center: Option<[f64; 3]>,
 }
 
+impl View {
+    /// The whole volume in a picture of 512 x 512 pixels, seen from an azimuth and elevation in degrees.
+    pub fn new(azimuth: f64, elevation: f64) -> Self {
+        Self { azimuth, elevation, roll: 0.0, size: [512, 512], scale: None, center: None }
+    }
+}
+
 /// A view of one grid: an affine map from world positions to pixels and depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
@@ -54,11 +61,14 @@ pub struct Camera {
     nearest: f64,
 }
 
-/// Share of the picture that the volume takes up when it is made to fit.
+/// Share of the picture that the volume fills at the default scale.
 const FIT: f64 = 0.9;
 
 impl Camera {
-    /// The camera that shows `grid` as `view` asks.
+    /// The camera for a view of `grid`.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, a scale that is not above 0, or a picture size out of range.
     pub fn new(view: &View, grid: &Grid) -> Result<Self> {
         let center = view.center.unwrap_or_else(|| middle(grid));
         let numbers = [("azimuth", view.azimuth), ("elevation", view.elevation), ("roll", view.roll)];
@@ -90,7 +100,7 @@ impl Camera {
         ]
     }
 
-    /// What a step of `length` along a world axis adds to the projection.
+    /// The change of the projection, [x, y, depth], for a step of `length` along a world axis.
     pub fn step(&self, axis: usize, length: f64) -> [f64; 3] {
         let along = |screen: [f64; 3]| screen[axis] * length;
         [self.scale * along(self.right), -self.scale * along(self.up), along(self.forward)]
@@ -101,7 +111,7 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
     }
 
-    /// The world point so many world units to the right of the one in the middle of the picture.
+    /// The world point `length` world units to the right of the point in the middle of the picture.
     pub fn beside(&self, length: f64) -> [f64; 3] {
         std::array::from_fn(|axis| self.center[axis] + length * self.right[axis])
     }
@@ -111,13 +121,13 @@ impl Camera {
         [self.nearest_of(grid), corners(grid).map(|p| self.project(p)[2]).fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// The depth of the nearest corner of `grid`, which may be a part of the one that depths are counted from.
+    /// The depth of the nearest corner of `grid`, which may be a part of the camera's grid.
     pub fn nearest_of(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far rounding can move the projection of any voxel of `grid`: pixels along each axis, and world units of
-    /// depth.
+    /// Bounds of the rounding error in the projection of any voxel of `grid`: pixels along each axis, and world units
+    /// of depth.
     pub fn rounding(&self, grid: &Grid) -> (f64, f64) {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
         let far = corners(grid).map(size).fold(size(self.center), f64::max);
@@ -125,7 +135,7 @@ impl Camera {
         (self.scale * depth + 4.0 * f64::EPSILON * self.size[0].max(self.size[1]) as f64, depth)
     }
 
-    /// The largest scale at which every cell of the grid is within the picture, less a margin.
+    /// The largest scale at which every cell of the grid lies within the picture, with a margin.
     fn fitting_scale(&self, grid: &Grid) -> f64 {
         let half = |axis: [f64; 3]| {
             let reach = |p| dot(axis, minus(p, self.center)).abs();

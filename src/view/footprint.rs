@@ -13,9 +13,9 @@
 //! (2 sigma^2) - tau z gives the factor exp(tau^2 sigma^2 / 2). f is a product of one Gaussian along x and one along y,
 //! so a footprint is a row of weights times a column of weights.
 //!
-//! The cut leaves out little. Take all voxels that lie more than R sigma to one side of a place. Seen from the place
-//! that is R sigma further to that side, each of them weighs at least exp(R^2 / 2) times as much, since (q + R)^2 >=
-//! q^2 + R^2 for q >= 0. A square cut has four sides, so
+//! The cut leaves out little. Take all voxels that lie more than R sigma to one side of a point. At the point R sigma
+//! further to that side, each of them weighs at least exp(R^2 / 2) times as much, since (q + R)^2 >= q^2 + R^2 for q >=
+//! 0. A square cut has four sides, so
 //!
 //! ```text
 //! what lies beyond a cut at radius R sigma <= 4 exp(-R^2 / 2) * largest sum of w_i                        (eq 15)
@@ -25,7 +25,7 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use std::ops::Range;
 
-/// The kernel, as a user gives it.
+/// The settings of the kernel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kernel {
     /// Standard deviation in world units.
@@ -35,9 +35,17 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// With the default sigma, 0.75 of the largest spacing, unless one is given.
+    /// The default kernel of a grid: sigma is 0.75 of the largest spacing, without attenuation.
+    pub fn of_grid(grid: &Grid) -> Self {
+        Self { sigma: 0.75 * grid.largest_spacing(), tau: 0.0 }
+    }
+
+    /// A kernel with the default sigma unless one is given.
+    ///
+    /// # Errors
+    /// A sigma that is not above 0, a tau below 0, or either not finite.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
-        let sigma = sigma.unwrap_or(0.75 * grid.largest_spacing());
+        let sigma = sigma.unwrap_or(Self::of_grid(grid).sigma);
         if !(sigma.is_finite() && sigma > 0.0) {
             return Err(Error::setting("sigma", "takes a number above 0"));
         }
@@ -48,19 +56,19 @@ impl Kernel {
     }
 }
 
-/// A way of splatting, with the error that it leaves in an emission image, relative to the image of the largest |v|.
+/// A splat method, with its error in an emission image, relative to the image of the largest |v|.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Method {
     /// The name in reports.
     pub name: &'static str,
-    /// Where the kernel is cut, in standard deviations.
+    /// Radius of the cut kernel, in standard deviations.
     pub radius: f64,
-    /// How far a sum of weights may be off, as a share of the largest sum anywhere in the plane of the picture. For
-    /// footprints it is 4 exp(-R^2 / 2), what may lie beyond the cut (eq 15).
+    /// Error bound of a sum of weights, as a share of the largest sum anywhere in the picture plane. For footprints it
+    /// is 4 exp(-R^2 / 2), the bound of the weights beyond the cut (eq 15).
     pub stated_error: f64,
 }
 
-/// From the cheapest to the exact one, which stands in for an uncut kernel.
+/// The methods, from the cheapest to the exact one, which stands for an uncut kernel.
 const METHODS: [Method; 6] = [
     Method { name: "footprint-3", radius: 3.0, stated_error: 4.45e-2 },
     Method { name: "footprint-3.5", radius: 3.5, stated_error: 8.75e-3 },
@@ -71,7 +79,7 @@ const METHODS: [Method; 6] = [
 ];
 
 impl Method {
-    /// The slow exact method: the oracle of the others, and what a splat error of 0 asks for.
+    /// The slow exact method: the reference for the others, and the method for a splat error of 0.
     pub const EXACT: Self = Self { name: "exact", radius: 6.0, stated_error: 6.10e-8 };
 
     /// The cheapest method within `error`; the exact one if none is.
@@ -80,12 +88,12 @@ impl Method {
     }
 }
 
-/// The footprint of one view: everything but where a voxel is.
+/// The footprint of a view, at any position and depth.
 #[derive(Debug, Clone, Copy)]
 pub struct Footprint {
     /// Pixels from the centre to the cut.
     pub reach: f64,
-    /// f at its centre.
+    /// f at the centre of the footprint.
     peak: f64,
     tau: f64,
     /// 1 / (2 sigma^2), in pixels.
@@ -102,7 +110,7 @@ impl Footprint {
         let in_pixels = sigma * scale;
         let decay = 0.5 / (in_pixels * in_pixels);
         let peak = cell * libm::exp(tau * tau * sigma * sigma / 2.0) / (2.0 * std::f64::consts::PI * sigma * sigma);
-        // At least a pixel: a voxel far smaller than that must still reach the nearest pixel's centre.
+        // At least one pixel: the footprint of a far smaller voxel must still reach the nearest pixel's centre.
         let reach = (method.radius * in_pixels).max(1.0);
         let usable = [reach, peak, decay].iter().all(|n| n.is_finite() && *n > 0.0) && peak < LARGEST_PEAK;
         if !usable {
@@ -117,9 +125,9 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
-    /// The sum of the weights at a place of `count` voxels in a row, of which the first is `off` pixels from it at
-    /// depth `z`, and each next one a `step` in pixels and in depth from the one before. They should not be much
-    /// further than reach.
+    /// The sum of weights at a point of `count` voxels in a row. The first voxel is `off` pixels from the point at
+    /// depth `z`; each next voxel is a `step` in pixels and a step in depth further. The voxels should not lie much
+    /// further than the reach.
     pub fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
@@ -139,30 +147,30 @@ impl Footprint {
         sum
     }
 
-    /// The weight so many pixels from a voxel, as a share of the one at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
+    /// The weight [x, y] pixels from a voxel, as a share of the weight at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
     pub fn share(&self, [x, y]: [f64; 2]) -> f64 {
         libm::exp(-self.decay * (x * x + y * y))
     }
 
-    /// The standard deviation of its Gaussian, in pixels.
+    /// The standard deviation of the Gaussian, in pixels.
     pub fn deviation(&self) -> f64 {
         (0.5 / self.decay).sqrt()
     }
 
-    /// The sum of a footprint over all pixels, as a multiple of its weight at its centre.
+    /// The sum of a footprint over all pixels, as a multiple of the weight at its centre.
     pub fn area(&self) -> f64 {
         std::f64::consts::PI / self.decay
     }
 
-    /// How far rounding can move a weight, as a share of it, if its place may be off by so many pixels along each axis
-    /// and its depth, at most `depth`, by so many world units.
+    /// Bound of the relative rounding error of a weight, given the errors of its position (in pixels along each axis)
+    /// and of its depth (in world units). The depth is at most `depth`.
     pub fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {
         let across = 2.0 * self.decay * (self.reach + 1.0) * pixels;
         let along = self.tau * (off + 4.0 * f64::EPSILON * depth);
         libm::expm1(2.0 * across + along) + EXPONENTIALS
     }
 
-    /// The pixels along one axis whose centres are within reach of `centre`; `pixels` are there.
+    /// The pixels along one axis whose centres are within reach of `centre`; the axis has `pixels` pixels.
     pub fn span(&self, centre: f64, pixels: usize) -> Range<usize> {
         let first = (centre - self.reach - 0.5).ceil().max(0.0);
         let end = ((centre + self.reach - 0.5).floor() + 1.0).min(pixels as f64);
@@ -171,7 +179,8 @@ impl Footprint {
 
     /// The Gaussian factors of eq 2 at all pixels of `span`, as [`Self::span`] gave it for `centre`.
     ///
-    /// Each is the one before times a quotient that itself changes by a constant factor: two exponentials for a run.
+    /// Each factor is the previous one times a quotient, which itself changes by a constant factor. So a run takes two
+    /// exponentials.
     pub fn weights(&self, centre: f64, span: &Range<usize>, out: &mut Vec<f64>) {
         out.clear();
         let run = if self.decay > STEEP { 1 } else { RUN };
@@ -188,20 +197,23 @@ impl Footprint {
     }
 }
 
-/// Leaves room for sums of 1e20 products with the largest `f32`.
+/// Upper limit of the peak: sums of 1e20 products with the largest `f32` do not overflow.
 const LARGEST_PEAK: f64 = 1e250;
 
-/// Pixels over which quotients are multiplied up; rounding grows with its square, to 3e-13.
+/// Pixels per run of multiplied quotients; rounding grows with its square, to 3e-13.
 const RUN: usize = 64;
-/// More than the exponentials of both axes and of the peak, and the quotients of a run, can be off together.
+/// Upper bound of the joint relative error of the exponentials of both axes and of the peak, and of the quotients of a
+/// run.
 const EXPONENTIALS: f64 = 2e-12;
 
-/// Up to this decay quotients of voxels that are both within reach are numbers.
+/// Up to this decay, quotients of the weights of two voxels within reach neither overflow nor underflow.
 const NARROW: f64 = 30.0;
-/// From a weight that is smaller than the exponential of minus this none is multiplied up: others may be nearer.
+/// Runs do not start from a weight below the exponential of minus this: later voxels may be nearer, and the weight has
+/// too few digits.
 const DEEP: f64 = 600.0;
 
-/// Beyond this decay a weight may underflow where its quotient overflows. A span is then two pixels: each is computed.
+/// Beyond this decay, a weight may underflow while its quotient overflows. A span is then at most two pixels, and each
+/// weight is computed directly.
 const STEEP: f64 = 100.0;
 
 #[cfg(test)]
@@ -236,7 +248,7 @@ mod tests {
                 let (off, step) = ([-f.reach, 0.3 * f.reach], [step, -0.1 * step]);
                 let count = (2.5 * f.reach / step[0]).ceil() as usize;
                 let at = |n: usize| [0, 1].map(|i| off[i] + n as f64 * step[i]);
-                // The last ones begin where weights are no normal numbers, and come nearer.
+                // The last rows start at depths where weights are subnormal or zero, and come nearer.
                 for (z, deeper) in [(3.0, 0.5), (3.0, -0.5), (7e3, -0.5), (7.45e3, -50.0)] {
                     let depth = |n: usize| z + deeper * n as f64;
                     let expected: f64 = (0..count).map(|n| f.at_depth(depth(n)) * f.share(at(n))).sum();

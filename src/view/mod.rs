@@ -1,7 +1,7 @@
-//! The geometry of a view: where a voxel falls in the picture ([`camera`]), and what its kernel covers there
-//! ([`footprint`]).
+//! The geometry of a view: projects voxels into the picture ([`camera`]), and computes the footprint of their kernel
+//! there ([`footprint`]).
 //!
-//! Pure functions of numbers. Nothing here knows what is splatted, or how.
+//! All functions are pure and independent of the data and of the splat backend.
 
 pub mod camera;
 pub mod footprint;

@@ -1,20 +1,20 @@
-//! The basis of [Haar](crate::bibliography), orthonormal on the samples of a window of any length.
+//! The [Haar](crate::bibliography) basis, orthonormal on the samples of a window of any length.
 //!
-//! Each step turns two neighbours, means of m1 and m2 samples, into a sum and a difference by a rotation:
+//! Each step rotates two neighbours, the means of m1 and m2 samples, into a sum and a difference:
 //!
 //! ```text
 //! s = a x1 + b x2    d = b x1 - a x2    a = sqrt(m1 / (m1 + m2))    b = sqrt(m2 / (m1 + m2))              (eq 17)
 //! ```
 //!
-//! With m1 = m2 this is (x1 +- x2) / sqrt 2. A node without a neighbour at the end goes up unchanged. It keeps its
-//! smaller weight, so a constant series still has one coefficient, and a short last window needs no invented frames.
+//! With m1 = m2 this is (x1 +- x2) / sqrt 2. A last node without a neighbour moves up one level unchanged, with its
+//! smaller weight. So a constant series still has one coefficient, and a short last window needs no padding frames.
 //!
-//! Rotations keep sums of squares: the squared error of a series is the sum of the squares of what its coefficients
-//! lost (eq 6).
+//! Rotations preserve sums of squares: the squared error of a series is the sum of the squared errors of its
+//! coefficients (eq 6).
 
 use super::{LANES, Lane, TimeBasis};
 
-/// Haar's basis for one window.
+/// The Haar basis for one window.
 #[derive(Debug)]
 pub struct Haar {
     frames: usize,
@@ -23,7 +23,7 @@ pub struct Haar {
 }
 
 impl Haar {
-    /// For windows of `frames` frames, at least 1.
+    /// Creates the basis for windows of `frames` frames, at least 1.
     pub fn new(frames: usize) -> Self {
         let mut weights = vec![1.0; frames];
         let mut steps = Vec::new();
@@ -97,7 +97,7 @@ fn inverse(steps: &[Vec<(f64, f64)>], coefficients: &[Lane], series: &mut [Lane]
     }
 }
 
-/// Shortens `sums` to its first `pairs` entries, and the odd one at its end where there is one.
+/// Shortens `sums` to its first `pairs` entries, followed by the odd last one if there is one.
 fn carry_odd(sums: &mut Vec<Lane>, pairs: usize) {
     if sums.len() > 2 * pairs {
         sums[pairs] = sums[2 * pairs];

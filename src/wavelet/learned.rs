@@ -1,12 +1,12 @@
-//! An orthonormal basis of the window's own series: the principal components that the encoder found (eq 20).
+//! An orthonormal basis learned from the window's own series: the principal components found by the encoder (eq 20).
 //!
-//! The file stores the first functions as 16-bit numbers. They are made orthonormal one after another, by the
-//! Gram-Schmidt process done twice, since once leaves rounding errors. Haar functions complete the basis. Where Haar
-//! functions depend on those before them, functions of single frames follow.
+//! The file stores the first functions as 16-bit numbers. The Gram-Schmidt process, applied twice to remove rounding
+//! errors, makes them orthonormal one after another. Haar functions complete the basis. If Haar functions depend on
+//! earlier ones, functions of single frames follow.
 
 use super::{Haar, LANES, Lane, TimeBasis, synthesis};
 
-/// What a value of a stored function counts.
+/// The unit of a stored function's values.
 const UNIT: f64 = 1.0 / 32768.0;
 
 /// Orthonormal functions.
@@ -20,8 +20,8 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// The basis whose first functions are those of `functions` (`frames` values each, in units of 2^-15), made orthonormal
-    /// one after another; Haar functions complete it.
+    /// Creates a basis from `functions` (`frames` values each, in units of 2^-15), made orthonormal one after another,
+    /// and completed by Haar functions.
     pub fn new(functions: &[i16], frames: usize) -> Self {
         let learned = functions.chunks_exact(frames).map(|row| row.iter().map(|v| f64::from(*v) * UNIT).collect());
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(frames);
@@ -40,17 +40,17 @@ impl Learned {
         Self { rows, columns, frames }
     }
 
-    /// Functions as a file stores them.
+    /// Rounds a function to the numbers that a file stores.
     pub fn quantise(row: &[f64]) -> impl Iterator<Item = i16> {
         row.iter().map(|v| (v / UNIT).round().clamp(-32767.0, 32767.0) as i16)
     }
 }
 
-/// The part of a function that is orthogonal to all rows, with norm 1; none if next to nothing is left.
+/// The part of a function that is orthogonal to all rows, with norm 1; none if almost nothing is left.
 fn orthonormal(mut f: Vec<f64>, rows: &[Vec<f64>]) -> Option<Vec<f64>> {
     let before = dot(&f, &f);
     for row in rows.iter().chain(rows) {
-        // Twice: once leaves what rounding made of it.
+        // Twice, because one pass leaves rounding errors.
         let along = dot(&f, row);
         f.iter_mut().zip(row).for_each(|(f, u)| *f -= along * u);
     }
@@ -59,7 +59,7 @@ fn orthonormal(mut f: Vec<f64>, rows: &[Vec<f64>]) -> Option<Vec<f64>> {
     (squares > SMALLEST * before.max(SMALLEST)).then(|| f.into_iter().map(|f| f / norm).collect())
 }
 
-/// Share of a function's energy below which it is taken for a sum of those before it.
+/// The share of a function's energy below which it counts as dependent on the functions before it.
 const SMALLEST: f64 = 1e-10;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -76,7 +76,7 @@ impl TimeBasis for Learned {
     }
 
     fn levels(&self) -> Vec<usize> {
-        // The more important first: as many in each level as in all before it.
+        // The most important first. Each level has as many as all levels before it.
         let k = self.rows.len();
         let ends = (0..).map(|l| (1_usize << l).min(k)).take_while(|end| *end < k).chain([k]);
         let mut before = 0;
@@ -123,5 +123,5 @@ fn products<const N: usize>(factors: &[Vec<f64>; N], lanes: &[Lane]) -> [Lane; N
     sums
 }
 
-/// Sums that are made together: each waits for its last addition.
+/// The number of sums computed together, because each must wait for its last addition.
 const SIDE_BY_SIDE: usize = 4;

@@ -1,11 +1,11 @@
-//! Temporal bases: the series of one window to coefficients and back.
+//! Temporal bases: transform the series of one window to coefficients and back.
 //!
 //! ```text
 //! v(t_j) = sum over k of c_k u_k(t_j)                                                                     (eq 5)
 //! ```
 //!
-//! The rest of the crate only sees [`TimeBasis`]: a linear pair of transforms whose coefficients are ordered from
-//! coarse to fine. [`crate::method`], section 3, lists the bases. Series are transformed [`LANES`] voxels at a time, so
+//! The rest of the crate sees only [`TimeBasis`]: a pair of linear transforms whose coefficients are ordered from
+//! coarse to fine. [`crate::method`], section 3, lists the bases. Transforms work on [`LANES`] voxels at a time, so
 //! that plain loops become vector code.
 
 mod haar;
@@ -23,36 +23,37 @@ use crate::base::error::{Error, Result};
 use std::fmt::Debug;
 use std::ops::Range;
 
-/// Voxels that are transformed together.
+/// The number of voxels transformed together.
 pub const LANES: usize = 8;
 
 /// One sample or coefficient of each of [`LANES`] voxels.
 pub type Lane = [f64; LANES];
 
-/// A basis u_k of the series of one window: v(t) = sum over k of c_k u_k(t) (eq 5).
+/// A basis u_k for the series of one window: v(t) = sum over k of c_k u_k(t) (eq 5).
 pub trait TimeBasis: Send + Sync + Debug {
-    /// Samples in a series: the frames of the window.
+    /// The number of samples in a series, which is the number of frames in the window.
     fn frames(&self) -> usize;
 
-    /// Coefficients K of a series; at least [`Self::frames`].
+    /// The number K of coefficients of a series; at least [`Self::frames`].
     fn coefficients(&self) -> usize;
 
-    /// Number of coefficients in each temporal level, coarse to fine; they add up to K.
+    /// The number of coefficients in each temporal level, coarse to fine; they add up to K.
     fn levels(&self) -> Vec<usize>;
 
-    /// Samples to coefficients: `series` holds [`Self::frames`] lanes, `coefficients` K.
+    /// Transforms samples to coefficients. `series` holds [`Self::frames`] lanes, `coefficients` K lanes.
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]);
 
-    /// Coefficients to samples. Overwrites `coefficients`, which are its working space.
+    /// Transforms coefficients to samples. Overwrites `coefficients`, which serve as scratch.
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]);
 
-    /// What gives the same series from the marked coefficients alone, if all others are zero; none if that saves nothing.
+    /// A basis restricted to the marked coefficients, which gives the same series if all others are zero; none if that
+    /// saves nothing.
     fn only(&self, _marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
         None
     }
 }
 
-/// The basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
+/// Creates the basis of a window of `frames` frames; `functions` are the learned ones, if any ([`Learned::new`]).
 pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis> {
     match kind {
         Basis::Haar => Box::new(Haar::new(frames)),
@@ -62,11 +63,11 @@ pub fn basis(kind: Basis, functions: &[i16], frames: usize) -> Box<dyn TimeBasis
     }
 }
 
-/// An error if whole windows of `frames` frames don't suit the basis.
+/// An error if full windows of `frames` frames do not suit the basis.
 pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
     let (fits, rule) = match kind {
-        Basis::Haar => (frames.is_power_of_two(), "a power of two, as 32"),
-        Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, as 33"),
+        Basis::Haar => (frames.is_power_of_two(), "a power of two, such as 32"),
+        Basis::Multi => (frames >= 3 && (frames - 1).is_power_of_two(), "a power of two plus one, such as 33"),
         Basis::Samples | Basis::Learned => (frames >= 1, "at least one frame"),
     };
     let most = wavesplat_format::limits::MAX_WINDOW_FRAMES as usize;
@@ -77,7 +78,7 @@ pub fn check_window(kind: Basis, frames: usize) -> Result<()> {
     Err(Error::setting("window", problem.to_lowercase()))
 }
 
-/// The basis functions as numbers: `rows[k][t]` is u_k(t), with K rows of `frames` columns.
+/// The values of the basis functions: `rows[k][t]` is u_k(t), with K rows of `frames` columns.
 pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
     (0..basis.coefficients())
         .map(|k| {
@@ -90,13 +91,14 @@ pub fn synthesis(basis: &dyn TimeBasis) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// The largest sum over k of |u_k(t)| (eq 25). A change of at most e in every coefficient moves a sample by at most gain * e.
+/// The largest sum over k of |u_k(t)| (eq 25). If every coefficient changes by at most e, a sample moves by at most
+/// gain * e.
 pub fn gain(synthesis: &[Vec<f64>]) -> f64 {
     let frames = synthesis.first().map_or(0, Vec::len);
     (0..frames).map(|t| synthesis.iter().map(|u| u[t].abs()).sum()).fold(0.0, f64::max)
 }
 
-/// Which coefficients a reader needs who only wants `frames` of the window: those whose function is not zero there.
+/// Which coefficients are needed to decode only `frames` of the window: those whose function is not zero there.
 pub fn needed(synthesis: &[Vec<f64>], frames: &[usize]) -> Vec<bool> {
     synthesis.iter().map(|u| frames.iter().any(|t| u[*t] != 0.0)).collect()
 }
@@ -122,7 +124,7 @@ mod tests {
         (1..=70).flat_map(move |n| kinds.map(|kind| basis(kind, &some_functions(kind, n), n)))
     }
 
-    /// Up to three functions, the third nearly a sum of the others.
+    /// Up to three functions; the third is nearly a sum of the others.
     fn some_functions(kind: Basis, n: usize) -> Vec<i16> {
         let row = |k: usize, t: usize| [3000, (t * 911 % 7919) as i16, (t * 911 % 7919) as i16 + 2999][k];
         let rows = if kind == Basis::Learned { n.min(3) } else { 0 };

@@ -16,14 +16,15 @@
 //! even (-1, -3q, 9, -10q, 9, -3q, -1)/20     odd (-1, -3q, 9, 0, -9, 3q, 1)/10q
 //! ```
 //!
-//! A midpoint's row stands on the fine [midpoint, node, midpoint] of its interval, rows of seven on the fine functions
-//! around their coarse node, rows of four on the end and inwards from it. Straight lines have three coefficients.
+//! A midpoint's row applies to the fine [midpoint, node, midpoint] of its interval. Rows of seven apply to the fine
+//! functions around their coarse node, rows of four to those from the end inwards. Straight lines have three
+//! coefficients.
 //!
 //! The basis is orthonormal for functions, not for samples. Coefficients are scaled by sqrt 2, which eq 18 includes, so
 //! that their squares are near those of samples: for 33 samples, the squared error of samples is 0.96 to 3.67 times the
-//! energy of dropped coefficients. So a bound on samples is checked on samples.
+//! energy of dropped coefficients. So a bound on samples must be checked on samples.
 //!
-//! A window of another length is continued by its last sample up to the next 2N + 1, inside this file only.
+//! A window of another length is extended with its last sample to the next 2N + 1, only within this file.
 
 use super::{LANES, Lane, TimeBasis};
 
@@ -50,7 +51,7 @@ pub struct Multi {
 }
 
 impl Multi {
-    /// For windows of `frames` frames, at least 1.
+    /// Creates the basis for windows of `frames` frames, at least 1.
     pub fn new(frames: usize) -> Self {
         Self { frames, intervals: frames.saturating_sub(1).div_ceil(2).max(1).next_power_of_two() }
     }
@@ -118,7 +119,7 @@ fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
     series.copy_from_slice(&coarse[..series.len()]);
 }
 
-/// What a filter computes: a function of the next coarser level, or a wavelet.
+/// The output of a filter: a function of the next coarser level, or a wavelet.
 enum Target {
     Scaling(usize),
     Wavelet(usize),
@@ -170,7 +171,7 @@ const END_SCALE: f64 = 0.577_350_269_189_625_8; // sqrt(1 / 3)
 /// c = (s + 3/10 (s_left + s_right)) * 5 / (4 sqrt 6) at a midpoint. Times sqrt 2.
 const MID_SCALE: f64 = 0.721_687_836_487_032_2; // 5 / (4 sqrt 3)
 
-/// Samples to the finest coefficients (eq 18).
+/// Transforms samples to the finest coefficients (eq 18).
 #[inline(always)]
 fn prefilter(values: &mut [Lane]) {
     for m in (1..values.len()).step_by(2) {
@@ -182,7 +183,7 @@ fn prefilter(values: &mut [Lane]) {
     for_each_node(values, |value, scale| *value *= scale);
 }
 
-/// The finest coefficients to samples: the inverse of eq 18.
+/// Transforms the finest coefficients to samples: the inverse of eq 18.
 #[inline(always)]
 fn undo_prefilter(values: &mut [Lane]) {
     for_each_node(values, |value, scale| *value /= scale);

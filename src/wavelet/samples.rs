@@ -1,8 +1,8 @@
-//! No transform along time: the samples are the coefficients, and u_k(t) is 1 at t = k and 0 elsewhere (eq 5).
+//! No transform along time: coefficients are samples, and u_k(t) is 1 at t = k and 0 elsewhere (eq 5).
 
 use super::{Lane, TimeBasis};
 
-/// The identity.
+/// The identity transform.
 #[derive(Debug)]
 pub struct Samples(pub(super) usize);
 

@@ -38,7 +38,7 @@ fn written_files_read_back_with_positions_and_times() {
         assert_eq!(report["files"], serde_json::json!(files));
         work.wavesplat(&format!("convert {name} -o {name}.wspl --tolerance 0")).ok();
         assert!(work.wavesplat(&format!("extract {name}.wspl --format raw -o -")).ok().out == part(), "{name}");
-        let back = CoefficientFile::open(&work.path(format!("{name}.wspl")), Access::Read).unwrap();
+        let back = CoefficientFile::open_with(work.path(format!("{name}.wspl")), Access::Read).unwrap();
         assert_eq!((back.grid.spacing, back.grid.origin), ([0.5, 0.25, 2.0], [1.5, 2.0, 38.0]), "{name}");
         assert_eq!(back.metadata().times, [3.375, 3.875, 4.375, 4.875, 5.375], "{name}");
     }

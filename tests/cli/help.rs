@@ -23,7 +23,7 @@ fn begins_with_examples(run: &Run) {
 
 #[test]
 fn long_help_has_headings() {
-    let headings = ["Output:", "What is promised:", "Input:", "How it is coded", "Common options:"];
+    let headings = ["Output:", "Error bound:", "Input:", "How it is coded", "Common options:"];
     let run = Work::new().wavesplat("convert --help").ok();
     let places =
         headings.map(|heading| run.text().find(&format!("\n{heading}")).unwrap_or_else(|| panic!("{heading}")));

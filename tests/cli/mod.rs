@@ -128,7 +128,7 @@ fn all_but_options(work: &Work, file: &str) -> serde_json::Value {
 
 /// The files differ in the options that they remember alone: their windows and samples are the same.
 #[track_caller]
-fn assert_same_but_options(work: &Work, a: &str, b: &str) {
+pub(crate) fn assert_same_but_options(work: &Work, a: &str, b: &str) {
     assert_eq!(all_but_options(work, a), all_but_options(work, b), "{a} and {b}");
     for (file, samples) in [(a, "same_a.raw"), (b, "same_b.raw")] {
         work.wavesplat(&format!("extract {file} -o {samples} --force")).ok();

@@ -61,7 +61,7 @@ fn a_producer_that_dies_within_a_frame_leaves_no_file() {
     let (work, archive) = (Work::new(), small());
     let bytes = archive.bytes();
     let options = "convert - -o raw.wspl --dims 20x14x10 --dtype f32";
-    let kept = "what is finished is kept; --resume";
+    let kept = "the finished windows are kept; --resume";
     work.piped(options, &bytes[..35 * 11_200 + 100]).fails(3, &["-: ", "frame 35", "11200", "100", kept]);
     work.piped("convert - -o few.wspl", &archive.npy()[..9 * 11_200]).fails(3, &["-: ", "frame 8"]);
     work.piped("convert - -o npy.wspl", &archive.npy()[..128 + 32 * 11_200])

@@ -55,7 +55,8 @@ fn a_failing_stage_reports_its_progress() {
     let work = Work::new();
     let archive = Archive::smooth([20, 14, 10], 40);
     let cut = &archive.npy()[..128 + 29 * 11_200];
-    let run = work.piped("convert - -o a.wspl --window 8 --progress json", cut).fails(3, &["what is finished is kept"]);
+    let run =
+        work.piped("convert - -o a.wspl --window 8 --progress json", cut).fails(3, &["the finished windows are kept"]);
     let lines = lines(&run);
     let last = &lines[lines.len() - 1];
     assert!(last["done"].as_u64() >= Some(3), "{}", run.err);

@@ -147,7 +147,7 @@ fn a_stopped_run_resumes_to_the_same_bytes() {
         let (work, archive) = work();
         work.wavesplat(&format!("convert all.npy -o all.wspl {settings}")).ok();
         let from_pipe = format!("convert - -o a.wspl {settings}");
-        work.piped(&from_pipe, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["what is finished is kept"]);
+        work.piped(&from_pipe, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["the finished windows are kept"]);
         let held = if settings.contains("--window 4") { "28" } else { "24" };
         let holds = format!("holds {held} frames of a run");
         work.piped(&from_pipe, &archive.npy()).fails(2, &["a.wspl.part", &holds, "--resume", "--force"]);
@@ -164,7 +164,7 @@ fn a_stopped_run_resumes_to_the_same_bytes() {
 fn runs_are_not_resumed_with_other_frames_or_settings() {
     let (work, archive) = work();
     let args = "convert - -o a.wspl --window 8";
-    work.piped(args, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["what is finished is kept"]);
+    work.piped(args, &archive.npy()[..128 + 29 * 11_200]).fails(3, &["the finished windows are kept"]);
     for (settings, word) in [
         ("--window 16", "another window: 8, now 16"),
         ("--window 8 --tolerance 0.02", "another tolerance: 0.01, now 0.02"),

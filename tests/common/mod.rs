@@ -39,8 +39,8 @@ pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
 
 /// A pointwise bound; missing samples are kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
-    let plain = ConvertConfig::new(basis, window, tolerance, MEMORY);
-    ConvertConfig { missing: MissingPolicy::Mask, level: 1, ..plain }
+    let (coding, missing) = (basis.into(), MissingPolicy::Mask);
+    ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..ConvertConfig::new(tolerance) }
 }
 
 /// A coefficient file in its own folder.
@@ -55,7 +55,7 @@ impl Stored {
     }
 
     pub(crate) fn open(&self) -> CoefficientFile {
-        CoefficientFile::open(&self.path(), Access::Read).unwrap()
+        CoefficientFile::open_with(self.path(), Access::Read).unwrap()
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {
@@ -112,8 +112,7 @@ pub(crate) fn extracted(file: &CoefficientFile) -> Vec<u8> {
 
 /// All samples of one of its channels.
 pub(crate) fn extracted_channel(file: &CoefficientFile, channel: usize) -> Vec<u8> {
-    let config =
-        ExtractConfig { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel, memory: MEMORY };
+    let config = ExtractConfig { channel, memory: MEMORY, ..ExtractConfig::new(file) };
     let mut out = Vec::new();
     extract(file, &config, Path::new("out"), &mut out, &Silent).unwrap();
     out
@@ -134,7 +133,6 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         limited: Default::default(),
         certify: false,
         memory: MEMORY,
-        reserved: 0,
         mode: Default::default(),
     }
 }

@@ -42,7 +42,6 @@ pub(crate) fn projection(
         limited: Default::default(),
         certify: false,
         memory: MEMORY,
-        reserved: 0,
     })
 }
 

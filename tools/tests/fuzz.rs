@@ -75,7 +75,14 @@ fn case(sample: SampleType, basis: Basis, window: usize, tolerance: f64) -> Case
     let mut bytes = vec![0; values.len() * sample.size()];
     store(sample, &values, &mut bytes);
     let (missing, block) = (MissingPolicy::Mask, Some(3));
-    let config = ConvertConfig { missing, block, ..ConvertConfig::new(basis, window, tolerance, 1 << 30) };
+    let config = ConvertConfig {
+        coding: basis.into(),
+        window,
+        missing,
+        block,
+        memory: 1 << 30,
+        ..ConvertConfig::new(tolerance)
+    };
     Case { dims, frames, sample, bytes, config }
 }
 

@@ -1,4 +1,4 @@
-//! What becomes of what lies along a ray.
+//! How the samples along a ray make a pixel.
 
 use clap::{Args, ValueEnum};
 use wavesplat::base::error::{Error, Result};
@@ -7,40 +7,40 @@ use wavesplat::colour::TransferFunction;
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::Mode;
 
-/// Options on what is done along rays.
+/// Options on the samples along rays.
 #[derive(Debug, Args)]
 pub(crate) struct AlongArgs {
-    /// What becomes of what lies along a ray
+    /// How the samples along a ray make a pixel
     #[arg(long, value_enum, default_value = "projection", help_heading = "Along the ray")]
     pub(crate) mode: ModeName,
-    /// Colours and opacities of a composite: a colour map's name or a file. Of --method direct without one, what every sample
-    /// is turned into before it is splatted. --range gives the values of its first and last colour [default: viridis; its
-    /// own values, or those of all frames]
+    /// Colours and opacities of a composite: a colour map's name or a file. For a projection with --method direct,
+    /// samples are turned into these colours before they are splatted. --range gives the values of its first and last
+    /// colour [default: viridis; its own values, or those of all frames]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
     pub(crate) transfer_function: Option<String>,
-    /// Opacities of a composite at shares of the range, as 0:0,0.5:0.1,1:0.8 [default: the file's, or 0 to 1]
+    /// Opacities of a composite at shares of the range, like 0:0,0.5:0.1,1:0.8 [default: the file's, or 0 to 1]
     #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity: Option<OpacityPoints>,
-    /// World units of a path that has such an opacity [default: the largest spacing]
+    /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
-    /// Slabs that the volume is cut into across the view [default: each as thick as the largest spacing]
+    /// Number of slabs that divide the volume by depth [default: each as thick as the largest spacing]
     #[arg(long, value_name = "N", help_heading = "Along the ray")]
     slabs: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ModeName {
-    /// It is averaged or summed up: --quantity, --colormap
+    /// Average or sum the samples: see --quantity, --colormap
     Projection,
-    /// It is coloured and hides what is behind: --transfer-function, --opacity
+    /// Colour the samples; near ones hide far ones: see --transfer-function, --opacity
     Composite,
-    /// The largest value is taken: --colormap
+    /// Show the largest value: see --colormap
     Mip,
 }
 
 impl AlongArgs {
-    /// An error if an option says nothing of the mode; whether a colour map is given.
+    /// An error if an option does not apply to the mode.
     pub(crate) fn check(&self, is_direct: bool, colour_map: bool) -> Result<()> {
         let composite = self.mode == ModeName::Composite;
         let colours = "colours samples along the ray (--mode composite); --colormap colours projections, and wavesplat convert \
@@ -49,7 +49,7 @@ impl AlongArgs {
             (self.opacity.is_some() && !composite, "--opacity: needs --mode composite"),
             (self.opacity_unit.is_some() && !composite, "--opacity-unit: needs --mode composite"),
             (self.slabs.is_some() && self.mode == ModeName::Projection, "--slabs: needs --mode composite or mip"),
-            (composite && colour_map, "--colormap: a composite has the colours of --transfer-function"),
+            (composite && colour_map, "--colormap: a composite takes its colours from --transfer-function"),
             (
                 self.transfer_function.is_some() && self.mode == ModeName::Mip,
                 "--transfer-function: --mode mip takes --colormap",
@@ -59,19 +59,19 @@ impl AlongArgs {
             return Err(Error::usage(what));
         }
         if self.transfer_function.is_some() && self.mode == ModeName::Projection && !is_direct {
-            return Err(Error::usage(format!("--transfer-function: of a coefficient file, {colours}")));
+            return Err(Error::usage(format!("--transfer-function: with a coefficient file, it {colours}")));
         }
         let positive = self.opacity_unit.is_none_or(|unit| unit.is_finite() && unit > 0.0);
         if positive { Ok(()) } else { Err(Error::usage("--opacity-unit: takes a length above 0")) }
     }
 
-    /// The name of the colours of a composite, or of frames.
+    /// The name of the colours of a composite, or of coloured frames.
     pub(crate) fn colours(&self) -> Option<&str> {
         let of_composite = (self.mode == ModeName::Composite).then_some("viridis");
         self.transfer_function.as_deref().or(of_composite)
     }
 
-    /// Whether a composite has colours of no values of their own, nor of a range that was asked for.
+    /// Whether the range of a composite's colours is automatic: neither given nor stored with the colours.
     pub(crate) fn is_automatic(&self, range: Option<Pair>) -> Result<bool> {
         let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite && range.is_none()) else {
             return Ok(false);
@@ -79,13 +79,13 @@ impl AlongArgs {
         Ok(!TransferFunction::open(name)?.is_of_values())
     }
 
-    /// The colours of a composite of a file over the range that was asked for, their own, or that of all samples.
+    /// The colours of a composite of a file, over the given range, their own range, or that of all samples.
     pub(crate) fn of_file(&self, range: Option<Pair>, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
         let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite) else { return Ok(None) };
         stretched(open_colours("--transfer-function", name)?, range, || Ok(file.source_range())).map(Some)
     }
 
-    /// What is to be done with such colours, if there are any.
+    /// The mode with these colours.
     pub(crate) fn mode(&self, colours: Option<&TransferFunction>) -> Result<Mode> {
         let slabs = self.slabs;
         Ok(match (self.mode, colours) {

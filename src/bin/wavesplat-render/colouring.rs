@@ -1,4 +1,4 @@
-//! Which colours the pictures of a run have.
+//! The colours of the pictures of a run.
 
 use crate::Cli;
 use crate::QuantityName;
@@ -10,18 +10,18 @@ use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::render::sink::PictureFormat;
 use wavesplat::render::{Pixel, RenderConfig, Scene};
 
-/// The colours of pictures, and of those of their errors.
+/// The colours of pictures and of pictures of their errors.
 pub(crate) struct Colouring {
-    /// What the numbers of a pixel are.
+    /// The meaning of a pixel's numbers.
     pub(crate) pixel: Pixel,
     pub(crate) map: TransferFunction,
     pub(crate) of_pictures: Scale,
     pub(crate) of_errors: Scale,
-    /// Whether pictures, and those of their errors, are in colours.
+    /// Whether pictures, and pictures of errors, are in colours.
     in_colours: (bool, bool),
 }
 
-/// The values of the first and the last colour, of what is in colours.
+/// The values of the first and the last colour, for pictures that are in colours.
 #[derive(Serialize)]
 pub(crate) struct ColouredPictures {
     pub(crate) range: Option<(f64, f64)>,
@@ -39,7 +39,7 @@ impl Colouring {
 }
 
 impl Cli {
-    /// The colours, over ranges that are given or those of small pictures.
+    /// The colours, over given ranges or those of small pictures.
     pub(crate) fn colouring(
         &self,
         scene: &mut dyn Scene,
@@ -52,28 +52,28 @@ impl Cli {
         let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel, colours);
         let needed = (in_colours && fixed.is_none(), of_errors);
-        let seen = self.seen(scene, config, needed)?;
+        let ranges = self.small_ranges(scene, config, needed)?;
         let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
         let (range, norm) = match pixel {
-            Pixel::Value => self.colour.spread(&map, &seen, in_colours, &self.common)?,
-            _ => (fixed.unwrap_or(seen.up_from_zero()), Norm::Linear),
+            Pixel::Value => self.colour.spread(&map, &ranges, in_colours, &self.common)?,
+            _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
-        self.say_ranges(range, &seen, needed);
+        self.report_ranges(range, &ranges, needed);
         let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
-        let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(seen.errors, Norm::Linear)?);
+        let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
         Ok(Colouring { pixel, of_pictures, of_errors: of_errors_too, in_colours: (in_colours, of_errors), map })
     }
 
-    fn say_ranges(&self, (lo, hi): (f64, f64), seen: &Ranges, (of_pictures, of_errors): (bool, bool)) {
+    fn report_ranges(&self, (lo, hi): (f64, f64), ranges: &Ranges, (of_pictures, of_errors): (bool, bool)) {
         if of_pictures || of_errors {
             self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
         }
         if of_errors {
-            self.common.detail(format_args!("colours of errors from 0 to {:.4e}", seen.errors.1));
+            self.common.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
         }
     }
 
-    /// What the numbers of a pixel are; an error where options or formats have no use for colours.
+    /// The meaning of a pixel's numbers. An error if options or formats cannot be used with colours.
     fn pixel(&self, scene: &dyn Scene, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
         let pixel = if scene.channels() == 1 { config.mode.pixel() } else { Pixel::Channels };
         if pixel == Pixel::Value {
@@ -88,8 +88,9 @@ impl Cli {
         Ok(pixel)
     }
 
-    /// The values of the first and the last colour, where small pictures need not tell. Channels are bright between none and all;
-    /// only their sums along the ray know no end. With a transfer function --range is that of samples.
+    /// The values of the first and the last colour, if small pictures are not needed to find them. Channels range from
+    /// no to full brightness; only their sums along the ray have no limit. With a transfer function, --range applies to
+    /// samples.
     fn fixed_range(&self, pixel: Pixel, colours: Option<&TransferFunction>) -> Option<(f64, f64)> {
         let range = self.colour.range.map(|range| range.0.into());
         let bright = (self.quantity == QuantityName::Mean).then_some((0.0, 1.0));

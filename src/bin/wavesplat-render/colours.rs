@@ -1,4 +1,4 @@
-//! Which colours values have.
+//! The colours of values.
 
 use crate::ranges::Ranges;
 use clap::{Args, ValueEnum};
@@ -10,21 +10,21 @@ use wavesplat::render::sink::PictureFormat;
 /// Options on colours.
 #[derive(Debug, Args)]
 pub(crate) struct ColourArgs {
-    /// Colour map: viridis plasma inferno magma cividis turbo coolwarm grey rainbow, or a file: ParaView's .json (of several
-    /// maps, FILE#NAME) or .csv with value,red,green,blue [default: viridis]
+    /// Colour map: viridis plasma inferno magma cividis turbo coolwarm grey rainbow, or a file: ParaView's .json
+    /// (FILE#NAME selects one of several maps) or .csv with value,red,green,blue [default: viridis]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Colour")]
     colormap: Option<String>,
-    /// Values of the first and the last colour [default: a file's own, or those of small pictures of 16 frames of the archive,
-    /// but for few spots that would take most colours; to both sides of 0 alike with coolwarm]
+    /// Values of the first and the last colour [default: a file's own, or the range in small pictures of 16 frames,
+    /// without a few extreme values that would take most of the colours; symmetric about 0 with coolwarm]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     pub(crate) range: Option<Pair>,
-    /// Spread values over colours evenly, or by their logarithm (no further down than to a ten-thousandth of the largest)
+    /// Map values to colours linearly, or by their logarithm (down to a ten-thousandth of the largest)
     #[arg(long, value_enum, default_value = "linear", help_heading = "Colour")]
     norm: NormName,
     /// Draw a colour bar and the time of each frame into the pictures
     #[arg(long, help_heading = "Colour")]
     pub(crate) annotate: bool,
-    /// Colour of the background, as ffffff
+    /// Background colour, like ffffff
     #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
     pub(crate) background: Rgb,
 }
@@ -45,12 +45,12 @@ impl From<NormName> for Norm {
 }
 
 impl ColourArgs {
-    /// Whether a map was named, so that arrays hold colours too.
+    /// Whether a map was given, so that arrays hold colours too.
     pub(crate) fn is_asked(&self) -> bool {
         self.colormap.is_some()
     }
 
-    /// An error if a format has no colours to draw in.
+    /// An error if a format cannot hold colours or annotations.
     pub(crate) fn check(&self, format: PictureFormat) -> Result<()> {
         if format == PictureFormat::Exr && self.is_asked() {
             return Err(Error::usage("--colormap: an .exr holds numbers as they are; take png, with --depth 16"));
@@ -66,7 +66,7 @@ impl ColourArgs {
         if self.annotate { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
     }
 
-    /// An error if anything is asked of colours that are those of the samples.
+    /// An error if colour options are given for samples that are colours.
     pub(crate) fn refuse_for_colours(&self) -> Result<()> {
         if self.is_asked() {
             let what = "the colours are fixed, since the samples themselves were turned into them";
@@ -78,28 +78,28 @@ impl ColourArgs {
         }
     }
 
-    /// The colours, over the range that was asked for.
+    /// The colours, over the range if one was given.
     pub(crate) fn map(&self) -> Result<TransferFunction> {
         let map = open_colours("--colormap", self.colormap.as_deref().unwrap_or("viridis"))?;
         self.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
     }
 
-    /// The values of the first and the last colour, and how those between are spread.
+    /// The values of the first and the last colour, and the norm between them.
     pub(crate) fn spread(
         &self,
         map: &TransferFunction,
-        seen: &Ranges,
+        ranges: &Ranges,
         in_colours: bool,
         common: &CommonArgs,
     ) -> Result<((f64, f64), Norm)> {
         if !in_colours {
-            return Ok((seen.values, Norm::Linear));
+            return Ok((ranges.values, Norm::Linear));
         }
         let norm = self.norm.into();
         if !map.is_of_values() {
-            return Ok((seen.automatic(norm, map)?, norm));
+            return Ok((ranges.automatic(norm, map)?, norm));
         }
-        let ((lo, hi), (least, most)) = (map.range(), seen.values);
+        let ((lo, hi), (least, most)) = (map.range(), ranges.values);
         if self.range.is_none() && (most < lo || hi < least) {
             let name = self.colormap.as_deref().unwrap_or_default();
             common.note(format_args!(
@@ -111,7 +111,7 @@ impl ColourArgs {
 }
 
 fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
-    let wrong = || "takes six hexadecimal digits, as ffffff".to_string();
+    let wrong = || "takes six hexadecimal digits, such as ffffff".to_string();
     let digits = text.trim_start_matches('#');
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;
     Ok([(number >> 16) as u8, (number >> 8) as u8, number as u8])

@@ -1,11 +1,11 @@
-//! The program's own completions and man page, instead of pictures.
+//! `--generate`: the program's completions and man page, instead of pictures.
 
 use crate::Cli;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
 use wavesplat::base::error::Result;
 use wavesplat::cli::{self, Generated};
 
-/// What the program is asked for.
+/// What the program was asked to do.
 pub(crate) enum Program {
     Render(Box<Cli>),
     Generate(Generated),

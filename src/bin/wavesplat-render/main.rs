@@ -1,4 +1,4 @@
-//! `wavesplat-render`: pictures from coefficient files, or from frames by the conventional method.
+//! `wavesplat-render`: renders pictures from coefficient files, or from frames by the conventional method.
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 mod along;
@@ -60,23 +60,24 @@ Examples:
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render frames/ --method direct -o frame_%04d.png",
     after_help = "\
-An .npy holds float32 (frames, height, width) in units of --quantity, NaN for background; with --colormap, uint8 colours. \
-A PNG holds what made it as text, an .exr as comments. \
-The eye looks along -y with z up at 0,0; azimuth turns it about z, counter-clockwise seen from above: at 90,0 it looks \
-along x. A tau of about 1 / the volume's depth lets the near side stand out."
+An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; with --colormap it \
+holds uint8 colours. A PNG stores its render settings as text, an .exr as comments. \
+View 0,0 looks along -y with z up. Azimuth turns the camera about z, counter-clockwise seen from above: 90,0 looks \
+along x. A tau of about 1 / the volume's depth makes the near side stand out."
 )]
 struct Cli {
-    /// Coefficient file; for --method direct also frames
+    /// Coefficient file; --method direct also takes frames
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// File to write, a pattern as frame_%04d.png, or - for standard output; %v or %03v is the number of the view; a file that
-    /// is no pattern takes all views of one frame, one after another
+    /// File to write, a pattern like frame_%04d.png, or - for standard output. %v or %03v becomes the number of the
+    /// view; a file name without a pattern takes all views of one frame, one after another
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     output: PathBuf,
     /// Replace existing files
     #[arg(long, help_heading = "Output")]
     force: bool,
-    /// Azimuth and elevation in degrees; several views of one run share its reading, and take a name with %v
+    /// Azimuth and elevation in degrees; repeat for more views. The views of one run share its reading, and need %v in
+    /// the file name
     #[arg(
         long = "view",
         value_name = "AZ,EL",
@@ -85,78 +86,81 @@ struct Cli {
         help_heading = "View"
     )]
     views: Vec<Pair>,
-    /// Instead of each view so many, evenly around the vertical axis, beginning with it, and of the smallest scale of all
+    /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
+    /// their scales
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
     orbit: u32,
-    /// Degrees by which the picture turns counter-clockwise
+    /// Turn the picture counter-clockwise by this many degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "View")]
     roll: f64,
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "512x512", help_heading = "View")]
     size: Whole<2>,
-    /// Pixels per world unit [default: the whole volume fits]
+    /// Pixels per world unit [default: fit the whole volume]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "View")]
     scale: Option<f64>,
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
     center: Option<Triple>,
-    /// Only these frames: ranges a:b:step or numbers, with commas between them
+    /// Render only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
     frames: Option<FrameList>,
-    /// Only these voxels: x0:x1,y0:y1,z0:z1
+    /// Render only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX", help_heading = "View")]
     region: Option<RegionSpec>,
-    /// Attenuation per world unit of depth; where weights sum to less than 1 % of the view's largest is background
+    /// Attenuation per world unit of depth. Pixels whose weights sum to less than 1 % of the view's largest are
+    /// background
     #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
     tau: f64,
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
     sigma: Option<f64>,
-    /// What splatting may add to the error: of means as a share of the range, where a pixel's weights are the view's largest
-    /// (elsewhere in inverse proportion); of emissions as one of the brightest that the largest sample could give; 0 asks for
-    /// the exact method [default: half of --tolerance or the file's tolerance, at most 1e-3]
+    /// Error that splatting may add; more is faster. For means it is a share of the value range, at pixels with the
+    /// view's largest weights (elsewhere in inverse proportion to the weights); for emissions, a share of the brightest
+    /// pixel that the largest sample could give. 0 uses the exact method [default: half of --tolerance or the file's
+    /// tolerance, at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     splat_error: Option<f64>,
-    /// Read and splat less, so that pictures may be this share of the range off (emissions, as samples that are): no less
-    /// than the file's largest sample error, or see --error
+    /// Read and splat less: pictures may be off by this share of the value range (emissions: as if samples were). At
+    /// least the file's largest sample error, or see --error
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]
     tolerance: Option<f64>,
-    /// Which error --tolerance limits; both are reported
+    /// Error that --tolerance limits; both are reported
     #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
     error: ErrorName,
-    /// Write pictures of the certified error as well: no pixel is further than this from the picture of the source's
-    /// samples, splatted without a cut (a file or pattern as for -o; .npy in units of --quantity, colours from 0 to the
-    /// largest of small pictures)
+    /// Also write pictures of the certified error: no pixel is further than this from the picture of the source's
+    /// samples, splatted without a cut (a file or pattern like -o; .npy in units of --quantity, colours from 0 to the
+    /// largest error of small pictures)
     #[arg(long, value_name = "OUT", help_heading = "Error")]
     error_image: Option<PathBuf>,
-    /// What a pixel means
+    /// Quantity that a pixel shows
     #[arg(long, value_enum, default_value = "mean", help_heading = "Along the ray")]
     quantity: QuantityName,
     #[command(flatten)]
     colour: ColourArgs,
     #[command(flatten)]
     along: AlongArgs,
-    /// From coefficients, or frame by frame (the conventional method)
+    /// Render from coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     method: MethodName,
-    /// png, npy, y4m, rgb24, gray16, apng (a moving PNG), sheet (all pictures in one PNG) or, if it was built in, exr [default:
-    /// by the ending of OUT; png for -]
+    /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), or exr if
+    /// it was built in [default: by the extension of OUT; png for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<PictureFormat>,
-    /// Bits a channel of a PNG: 8, or 16 (with --colormap grey, of one channel)
+    /// Bits per channel of a PNG: 8, or 16 (with --colormap grey, a single channel)
     #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth, help_heading = "Output")]
     depth: Depth,
-    /// Write what --json prints to a file as well
+    /// Also write the --json report to a file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     sidecar: Option<PathBuf>,
-    /// Frames a second of a y4m or apng
+    /// Frames per second of a y4m or apng
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
     fps: u32,
     /// A value that means "missing" in frames, besides NaN and infinities
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = "Input")]
     missing_value: Option<f64>,
-    /// Show damaged and lost blocks of a coefficient file as missing samples, and the rest; exit code 3. Nothing is certified
-    /// then
+    /// Show damaged and lost blocks of a coefficient file as missing samples, and render the rest; exit code 3. No
+    /// error is certified then
     #[arg(long, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Input")]
     skip_damaged: bool,
     #[command(flatten)]
@@ -175,9 +179,9 @@ enum QuantityName {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ErrorName {
-    /// The largest of any sample, for sure
+    /// The largest error of any sample, guaranteed
     Certified,
-    /// The root mean square over the pixels, as it is estimated
+    /// The root mean square error over the pixels, estimated
     Expected,
 }
 
@@ -209,8 +213,8 @@ impl Cli {
         let metadata = file.as_ref().map(|file| file.metadata());
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
-        config.reserved = self.reserved(&targets, &config)?;
-        let colours = self.without_spots(scene.as_mut(), &mut config, colours)?;
+        config.memory = self.memory_besides_sinks(&targets, &config)?;
+        let colours = self.without_extremes(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
@@ -223,7 +227,7 @@ impl Cli {
         self.note_errors(&report);
         let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
         if let (Some(read), Some(bytes)) = (file_bytes_read, file_bytes) {
-            self.common.detail(format_args!("{read} bytes were read of the file, which has {bytes}"));
+            self.common.detail(format_args!("{read} of the file's {bytes} bytes were read"));
         }
         let coloured = colouring.coloured();
         let reported = Reported { report: &report, picture: &provenance, coloured, file_bytes_read, file_bytes };
@@ -231,7 +235,7 @@ impl Cli {
         file.map_or(Ok(()), |file| file.refuse_skipped())
     }
 
-    /// Notes on the errors of pictures.
+    /// Prints notes on the errors of pictures.
     fn note_errors(&self, report: &RenderReport) {
         let RenderReport { certified_sample_error, expected_error, left_out, .. } = report;
         if self.tolerance.is_some() && self.along.mode != ModeName::Projection {
@@ -251,7 +255,7 @@ impl Cli {
         }
     }
 
-    /// Prints and writes what is asked for of it.
+    /// Writes the sidecar and prints the report, if asked for.
     fn report(&self, reported: &Reported<'_>) -> Result<()> {
         if let Some(path) = &self.sidecar {
             let mut out = Output::create(path, self.force)?;
@@ -261,13 +265,20 @@ impl Cli {
         self.common.report(reported, self.output == Path::new(STANDARD))
     }
 
-    /// Bytes that the sinks take for themselves.
-    fn reserved(&self, (pictures, errors): &(Targets, Option<Targets>), config: &RenderConfig) -> Result<usize> {
+    /// Bytes of memory that are left for rendering.
+    fn memory_besides_sinks(
+        &self,
+        (pictures, errors): &(Targets, Option<Targets>),
+        config: &RenderConfig,
+    ) -> Result<usize> {
         let errors = errors.as_ref().map_or(Ok(0), |errors| errors.memory(self.depth, config))?;
-        Ok(pictures.memory(self.depth, config)? + errors)
+        let taken = pictures.memory(self.depth, config)? + errors;
+        config.memory.checked_sub(taken).ok_or_else(|| {
+            Error::usage(format!("--memory: writing these pictures takes {}MiB", taken.div_ceil(1 << 20)))
+        })
     }
 
-    /// What is to be written for pictures, and for their errors: nothing twice, and nothing that is read.
+    /// The files for pictures and for their errors. No file may be written twice, and no input may be overwritten.
     fn targets(&self, config: &RenderConfig) -> Result<(Targets, Option<Targets>)> {
         if self.format.is_none() {
             refuse_video(&self.inputs, &self.output)?;
@@ -309,18 +320,18 @@ impl Cli {
         Output::check(path, self.force)
     }
 
-    /// What is rendered, and the file that it is from.
+    /// Opens the scene to render, and its file.
     fn scene(&self) -> Result<Opened> {
         let coefficients = self.method == MethodName::Coefficients;
         if let [only] = self.inputs.as_slice()
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
         {
             if only == Path::new(STANDARD) {
-                return Err(Error::usage("-: a coefficient file is read from its end, so not from a pipe"));
+                return Err(Error::usage("-: a coefficient file is read from its end, so it cannot come from a pipe"));
             }
             self.input.refuse_for_coefficients()?;
             self.along.check(false, self.colour.is_asked())?;
-            let file = CoefficientFile::open(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
+            let file = CoefficientFile::open_with(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
             let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
             let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
             let unit = setting(file.metadata(), "time-units").map(String::from);
@@ -336,7 +347,9 @@ impl Cli {
             return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
         }
         if self.inputs == [PathBuf::from(STANDARD)] {
-            return Err(Error::usage("--method direct reads frames more than once, so not from standard input"));
+            return Err(Error::usage(
+                "--method direct reads frames more than once, so they cannot come from standard input",
+            ));
         }
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
@@ -393,41 +406,40 @@ impl Cli {
             certify: self.error_image.is_some(),
             mode: self.along.mode(colours)?,
             memory: self.common.memory.0,
-            reserved: 0,
         })
     }
 
-    /// All views, each with those of its orbit.
+    /// All views, including those of orbits.
     fn views(&self, grid: &Grid) -> Result<Vec<View>> {
         let orbits = self.views.iter().map(|first| self.orbit(first.0, grid));
         Ok(orbits.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The views of an orbit, all of one scale; where nobody says it, such that all is beside what is drawn.
+    /// The views of an orbit, with a common scale. Unless a scale or a centre is given, the volume fits beside the annotation.
     fn orbit(&self, [azimuth, elevation]: [f64; 2], grid: &Grid) -> Result<Vec<View>> {
         let (roll, size, center) = (self.roll, self.size.0, self.center.map(|c| c.0));
         let first = View { azimuth, elevation, roll, size, scale: self.scale, center };
         let fits = self.scale.is_none() && center.is_none() && self.colour.annotate;
-        let room = if fits { room(size) } else { 0 };
-        if self.orbit == 1 && room == 0 {
+        let margin = if fits { room(size) } else { 0 };
+        if self.orbit == 1 && margin == 0 {
             return Ok(vec![first]);
         }
         let turned = |n| (azimuth + f64::from(n) * 360.0 / f64::from(self.orbit)).rem_euclid(360.0);
         let turned = |n| if self.orbit == 1 { azimuth } else { turned(n) };
         let mut views: Vec<View> = (0..self.orbit).map(|n| View { azimuth: turned(n), ..first }).collect();
-        let narrow = |view: &View| Camera::new(&View { size: [size[0] - room, size[1]], ..*view }, grid);
+        let narrow = |view: &View| Camera::new(&View { size: [size[0] - margin, size[1]], ..*view }, grid);
         let cameras = views.iter().map(narrow).collect::<Result<Vec<_>>>()?;
         let scale = cameras.iter().map(|camera| camera.scale).fold(f64::INFINITY, f64::min);
         for (view, camera) in views.iter_mut().zip(&cameras) {
             view.scale = Some(scale);
-            if room > 0 {
-                view.center = Some(camera.beside(room as f64 / 2.0 / scale));
+            if margin > 0 {
+                view.center = Some(camera.beside(margin as f64 / 2.0 / scale));
             }
         }
         Ok(views)
     }
 
-    /// The error that samples may have under a looser tolerance, in their unit.
+    /// The allowed sample error under a looser tolerance, in the unit of the samples.
     fn allowed(&self, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
         let Some(file) = file.filter(|_| self.method == MethodName::Coefficients) else {
             return Err(Error::usage("--tolerance: leaves out coefficients, so it needs --method coefficients"));
@@ -448,7 +460,7 @@ impl Cli {
 
 const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
 
-/// Says what to do about a file that holds no coefficients.
+/// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
     let named_so = path.extension().is_some_and(|e| e == "wspl");
@@ -458,27 +470,27 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     error
 }
 
-/// What is rendered.
+/// The scene to render.
 struct Opened {
     scene: Box<dyn Scene>,
-    /// The file that it is from.
+    /// The coefficient file of the scene.
     file: Option<Arc<CoefficientFile>>,
     /// The times of frames.
     annotation: Annotation,
-    /// What samples are turned into, before they are splatted or along the ray.
+    /// The colours of samples, applied before splatting or along the ray.
     colours: Option<TransferFunction>,
 }
 
-/// What `--json` says.
+/// The report of `--json`.
 #[derive(Serialize)]
 struct Reported<'a> {
     #[serde(flatten)]
     report: &'a RenderReport,
     #[serde(flatten)]
     coloured: ColouredPictures,
-    /// What travels with every picture; of each view `views` says it.
+    /// The settings stored in every picture; `views` has those of each view.
     picture: &'a Provenance,
-    /// Bytes of the coefficient file that were read, directory and all, and those that it has.
+    /// Bytes read of the coefficient file, including its directory, and its size.
     file_bytes_read: Option<u64>,
     file_bytes: Option<u64>,
 }

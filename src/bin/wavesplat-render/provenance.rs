@@ -1,4 +1,4 @@
-//! What the pictures of a run are made with.
+//! The settings stored in the pictures of a run.
 
 use crate::along::ModeName;
 use crate::colouring::Colouring;
@@ -10,7 +10,7 @@ use wavesplat::render::sink::{Provenance, Shows};
 use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene};
 
 impl Cli {
-    /// What pictures are made with.
+    /// The settings that pictures are rendered with.
     pub(crate) fn provenance(
         &self,
         scene: &dyn Scene,
@@ -63,7 +63,7 @@ impl Cli {
         }
     }
 
-    /// With what is known of a file.
+    /// Adds what is known about the coefficient file.
     fn of_file(&self, provenance: Provenance, file: &CoefficientFile, config: &RenderConfig) -> Provenance {
         let m = file.metadata();
         let reached = m.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
@@ -78,7 +78,7 @@ impl Cli {
     }
 }
 
-/// With what turns samples into colours, before the transform or along the ray.
+/// Adds the colours of samples, applied before the transform or along the ray.
 fn of_transfer(
     provenance: Provenance,
     scene: &dyn Scene,
@@ -93,7 +93,7 @@ fn of_transfer(
     Provenance { opacity: Some(transfer.opacity_words()), opacity_unit: Some(unit), ..provenance }
 }
 
-/// With the colours that pixels have.
+/// Adds the colours of pixels.
 fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> Provenance {
     let norm = match scale.norm() {
         Norm::Linear => "linear",
@@ -109,8 +109,8 @@ fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> P
     }
 }
 
-/// What pictures of errors are made with, of what the pictures are.
-pub(crate) fn made_of_errors(provenance: &Provenance, colouring: &Colouring) -> Provenance {
+/// The settings stored in pictures of errors.
+pub(crate) fn error_provenance(provenance: &Provenance, colouring: &Colouring) -> Provenance {
     let provenance = Provenance {
         shows: Shows::CertifiedError,
         colormap: None,

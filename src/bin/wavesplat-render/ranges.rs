@@ -1,4 +1,4 @@
-//! The values that colours are spread over, where nobody says them: those of small pictures.
+//! The default range of colours, taken from small pictures.
 
 use crate::Cli;
 use wavesplat::base::error::{Error, Result};
@@ -6,20 +6,20 @@ use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};
 use wavesplat::render::{Mode, Pixel, RenderConfig, Scene, check, render};
 
-/// Slabs of small pictures that only a range is judged by.
+/// Slabs of small pictures that serve only to find a range.
 const FEW_SLABS: usize = 32;
 
-/// Pixels that a range is judged by, at most.
-const MOST_SEEN: usize = 1 << 20;
+/// The largest number of pixels used to find a range.
+const MOST_PIXELS: usize = 1 << 20;
 
-/// The range of ascending values, without the outermost ones where a few spots would take most of the colours: at either end
-/// at most one value in 200, and only if those take up two fifths of the range.
-fn without_spots(seen: &[f32]) -> (f64, f64) {
-    let few = seen.len() / 200;
-    let at = |n: usize| f64::from(seen[n]);
-    let (lo, hi, low, high) = (at(0), at(seen.len() - 1), at(few), at(seen.len() - 1 - few));
-    let (spots, nothing) = (0.4 * (hi - lo), 0.05 * (hi - lo));
-    let clipped = |end: f64, inner: f64| if (end - inner).abs() >= spots && high - low > nothing { inner } else { end };
+/// The range of ascending values. Extreme values are cut off if a few of them would take most of the colours: at either
+/// end at most one value in 200, and only if those take up two fifths of the range.
+fn without_extremes(values: &[f32]) -> (f64, f64) {
+    let few = values.len() / 200;
+    let at = |n: usize| f64::from(values[n]);
+    let (lo, hi, low, high) = (at(0), at(values.len() - 1), at(few), at(values.len() - 1 - few));
+    let (large, least) = (0.4 * (hi - lo), 0.05 * (hi - lo));
+    let clipped = |end: f64, inner: f64| if (end - inner).abs() >= large && high - low > least { inner } else { end };
     (clipped(lo, low), clipped(hi, high))
 }
 
@@ -38,8 +38,8 @@ impl Default for Ranges {
 }
 
 impl Ranges {
-    /// Of small pictures of frames spread over the archive: the same for every frame, whichever are asked for. (0, 1) if
-    /// they show nothing; errors begin at 0.
+    /// The ranges in small pictures of frames spread over the archive. They do not depend on the frames to render. If
+    /// the pictures are empty, the range is (0, 1). Errors begin at 0.
     pub(crate) fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
         const PIXELS: f64 = 64.0;
         const FRAMES: usize = 16;
@@ -53,22 +53,23 @@ impl Ranges {
         small.frames.dedup();
         let mut ranges = Self::default();
         let pixels = small.frames.len() * small.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
-        let (step, mut seen) = (pixels.div_ceil(MOST_SEEN).max(1), Vec::new());
+        let (step, mut values) = (pixels.div_ceil(MOST_PIXELS).max(1), Vec::new());
         let report = render(scene, &small, &Silent, &mut |rendered| {
-            seen.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
+            values.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
             Ok(())
         })?;
-        seen.sort_unstable_by(f32::total_cmp);
-        if !seen.is_empty() {
-            ranges.values = without_spots(&seen);
-            ranges.positive = seen.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
+        values.sort_unstable_by(f32::total_cmp);
+        if !values.is_empty() {
+            ranges.values = without_extremes(&values);
+            ranges.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
         ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
         Ok(ranges)
     }
 
-    /// Colours over the range of all values, but for few spots that would take most of them; these are of largest values.
-    pub(crate) fn without_spots(&self, colours: &TransferFunction) -> Result<TransferFunction> {
+    /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would
+    /// take most of the colours do not count.
+    pub(crate) fn without_extremes(&self, colours: &TransferFunction) -> Result<TransferFunction> {
         let ((lo, hi), most) = (colours.range(), self.values.1);
         if !(0.0 < most && most < hi) {
             return Ok(colours.clone());
@@ -76,12 +77,12 @@ impl Ranges {
         colours.over((if lo < 0.0 { lo * most / hi } else { lo.min(0.5 * most) }, most))
     }
 
-    /// From 0 to the largest.
+    /// The range from 0 to the largest value.
     pub(crate) fn up_from_zero(&self) -> (f64, f64) {
         (0.0, self.values.1)
     }
 
-    /// What colours are spread over where nobody says it.
+    /// The default range of colours.
     pub(crate) fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
         const DECADES: f64 = 1e-4;
         let (lo, hi) = self.values;
@@ -95,8 +96,8 @@ impl Ranges {
 }
 
 impl Cli {
-    /// What small pictures show, if any of them are needed: of pictures, or of their errors.
-    pub(crate) fn seen(
+    /// The ranges in small pictures, if any are needed: of pictures, or of their errors.
+    pub(crate) fn small_ranges(
         &self,
         scene: &mut dyn Scene,
         config: &RenderConfig,
@@ -105,13 +106,13 @@ impl Cli {
         if !of_pictures && !of_errors {
             return Ok(Ranges::default());
         }
-        check(scene, config)?; // or small pictures would be made in vain, and what they need be named
+        check(scene, config)?; // so that errors come before small pictures are rendered, and name the full size
         let mode = if config.mode.is_projection() { Mode::Projection } else { Mode::Mip { slabs: Some(FEW_SLABS) } };
         Ranges::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
     }
 
-    /// The colours of a composite that nobody gave a range for, by the largest values that small pictures show.
-    pub(crate) fn without_spots(
+    /// The colours of a composite without a given range, up to the largest value of small pictures.
+    pub(crate) fn without_extremes(
         &self,
         scene: &mut dyn Scene,
         config: &mut RenderConfig,
@@ -121,7 +122,7 @@ impl Cli {
         if !self.along.is_automatic(self.colour.range)? {
             return Ok(colours);
         }
-        let colours = self.seen(scene, config, (true, false))?.without_spots(all)?;
+        let colours = self.small_ranges(scene, config, (true, false))?.without_extremes(all)?;
         let (lo, hi) = colours.range();
         self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
         config.mode = self.along.mode(Some(&colours))?;

@@ -1,8 +1,8 @@
-//! Where pictures go.
+//! The sinks that write pictures.
 
 use crate::Cli;
 use crate::colouring::Colouring;
-use crate::provenance::made_of_errors;
+use crate::provenance::error_provenance;
 use crate::targets::Targets;
 use std::sync::Arc;
 use wavesplat::base::error::Result;
@@ -10,30 +10,30 @@ use wavesplat::render::annotate::Annotation;
 use wavesplat::render::sink::{Provenance, Sink, SinkConfig};
 use wavesplat::render::{Pixel, RenderConfig, Rendered};
 
-/// Where the pictures of each view go, and those of their errors: all views may go to one.
+/// The sinks of pictures and of their errors: one for each view, or one for all.
 pub(crate) struct Sinks {
     pictures: Vec<Sink>,
     errors: Vec<Sink>,
 }
 
 impl Sinks {
-    /// Writes what is to be seen of a frame.
+    /// Writes one rendered picture, and its error.
     pub(crate) fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
         for sinks in [&mut self.errors, &mut self.pictures] {
-            let place = if sinks.len() == 1 { 0 } else { rendered.view };
-            sinks.get_mut(place).map_or(Ok(()), |sink| sink.picture(rendered))?;
+            let index = if sinks.len() == 1 { 0 } else { rendered.view };
+            sinks.get_mut(index).map_or(Ok(()), |sink| sink.picture(rendered))?;
         }
         Ok(())
     }
 
-    /// Gives all files their final names.
+    /// Completes all files under their final names.
     pub(crate) fn finish(self) -> Result<()> {
         self.errors.into_iter().chain(self.pictures).try_for_each(Sink::finish)
     }
 }
 
 impl Cli {
-    /// Opens them.
+    /// Opens the sinks of a run.
     pub(crate) fn sinks(
         &self,
         config: &RenderConfig,
@@ -60,7 +60,7 @@ impl Cli {
         };
         let of_errors = SinkConfig {
             format: errors.format,
-            provenance: Arc::new(made_of_errors(provenance, colouring)),
+            provenance: Arc::new(error_provenance(provenance, colouring)),
             pixel: if *pixel == Pixel::Light { Pixel::Value } else { *pixel },
             colours: of_errors.clone(),
             coloured_array: false,

@@ -1,4 +1,4 @@
-//! Which files pictures go to.
+//! The files that pictures go to.
 
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -6,7 +6,7 @@ use wavesplat::base::output::{STANDARD, names_of_views};
 use wavesplat::render::RenderConfig;
 use wavesplat::render::sink::{Depth, PictureFormat};
 
-/// Where pictures go: a name for each view, or one for all.
+/// The files of pictures: one for each view, or one for all.
 pub(crate) struct Targets {
     pub(crate) format: PictureFormat,
     pub(crate) names: Vec<PathBuf>,
@@ -20,13 +20,13 @@ impl Targets {
         Ok(Self { format, names: names_of_views(path, config.views.len(), joined)? })
     }
 
-    /// Which view and which frame each picture is of that goes to the name of such a number.
+    /// The view and the frame of each picture in the file of this number.
     pub(crate) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
         let views = if self.names.len() == 1 { 0..config.views.len() } else { name..name + 1 };
         views.flat_map(|view| config.frames.iter().map(move |frame| (view, *frame))).collect()
     }
 
-    /// Bytes that writing takes.
+    /// Bytes of memory that writing takes.
     pub(crate) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
         let each = config.frames.len() * config.views.len() / self.names.len();
         Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())

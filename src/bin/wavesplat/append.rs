@@ -19,25 +19,25 @@ Examples:
   wavesplat append run.wspl more/
   wavesplat append run.wspl frames/ --frames 400:",
     after_help = "\
-The new frames are coded as the others were, in windows after theirs; the region that was converted is chosen again. Whole \
-windows come out as if all frames had been converted at once. The file is copied, and its successor takes its name when it is \
-complete: whoever reads the old one meanwhile is not disturbed, and a kill costs nothing that was there. Where --frames \
-begins at the end of what is there so far, nothing is done, and that is no error."
+The new frames are coded with the file's settings and region, in windows after the existing ones. Full windows are the same as \
+if all frames had been converted at once. The command works on a copy that replaces the file when it is complete: programs that \
+read the old file are not disturbed, and a killed run loses nothing. If --frames begins at the end of the frames that exist so \
+far, the command does nothing and succeeds."
 )]
 pub(crate) struct AppendArgs {
     /// Coefficient file
     file: PathBuf,
-    /// The frames that come next: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
+    /// The next frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// Only these frames of INPUTS: a:b, a:b:step, the end left out
+    /// Add only these frames of INPUTS: a:b or a:b:step, without b
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<FrameRange>,
-    /// Go on with what an earlier run of this command left unfinished, if it did, to the same bytes; and do nothing if FILE
-    /// ends with these frames already
+    /// Continue an unfinished earlier run of this command, to the same bytes; do nothing if FILE ends with these frames
+    /// already
     #[arg(long)]
     resume: bool,
-    /// Begin anew, whatever an earlier run left unfinished
+    /// Start over, and discard what an earlier run left unfinished
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     #[command(flatten)]
@@ -50,8 +50,8 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     args.common.start()?;
     let linked = args.file.is_symlink().then(|| args.file.canonicalize()).transpose();
     let linked = linked.map_err(|e| Error::io(&args.file, "opening", e))?;
-    let path = linked.unwrap_or(args.file.clone()); // what is replaced is not the link
-    let file = CoefficientFile::open(&path, args.input.access())?;
+    let path = linked.unwrap_or(args.file.clone()); // replaces the file, not the link to it
+    let file = CoefficientFile::open_with(&path, args.input.access())?;
     let config = args.config(&file)?;
     let source = args.input.open_again(&file, &args.inputs, None, &args.common)?;
     if let (Some(asked), Some(all)) = (args.frames, source.archive().frames)
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let mut source = narrow(source, args.frames, None)?;
     let timed = source.archive().times.is_empty() == file.metadata().times.is_empty();
     if !timed {
-        return Err(Error::usage("either the file or the new frames say their times: both must, or neither"));
+        return Err(Error::usage("either the file or the new frames have times: both must, or neither"));
     }
     spare_inputs(&args.inputs, &path)?;
     if !args.force && !part_of(&path).exists() && args.has_them(&file, source.as_mut())? {
@@ -76,12 +76,12 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
 }
 
 impl AppendArgs {
-    /// Whether the file ends with these frames, as `--resume` allows; an error if it has them and nothing was said.
+    /// Whether the file ends with these frames, if `--resume` allows that; without it, an error.
     fn has_them(&self, file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
         if self.is_streamed() {
             let what =
-                "--resume: nothing tells whether a stream was appended already; to append it, leave --resume out";
-            return if self.resume { Err(Error::usage(what)) } else { Ok(false) }; // it is read once
+                "--resume: a stream cannot be compared with the file's last frames; leave --resume out to append it";
+            return if self.resume { Err(Error::usage(what)) } else { Ok(false) }; // a stream can be read only once
         }
         let refused = |what: String| Err(Error::usage(format!("{}: {what}", self.file.display())));
         match ends_with(file, source)? {
@@ -101,6 +101,6 @@ impl AppendArgs {
 
     fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
         let config = of_file(file.metadata(), self.common.memory.0);
-        config.ok_or_else(|| Error::input(&self.file, "does not say how it was made: nothing to append by"))
+        config.ok_or_else(|| Error::input(&self.file, "has no settings of its conversion, so nothing can be appended"))
     }
 }

@@ -29,90 +29,92 @@ Examples:
     after_help = after_help()
 )]
 pub(crate) struct ConvertArgs {
-    /// Frame files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
+    /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Coefficient file to write, or - for standard output
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     output: PathBuf,
-    /// Replace an existing file, and what an earlier run left unfinished unless --resume goes on with that
+    /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
     #[arg(long, help_heading = "Output")]
     force: bool,
-    /// Go on with what an earlier run of this command left unfinished, if it did: to the same bytes
+    /// Continue an unfinished earlier run of this command, to the same bytes
     #[arg(long, help_heading = "Output")]
     resume: bool,
-    /// Largest error as a share of what the bound refers to; 0 keeps every bit
-    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = share, allow_hyphen_values = true, help_heading = PROMISE)]
+    /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit
+    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     tolerance: f64,
-    /// What the tolerance bounds
-    #[arg(long, value_enum, default_value = "pointwise", help_heading = PROMISE)]
+    /// Error that the tolerance limits
+    #[arg(long, value_enum, default_value = "pointwise", help_heading = ERROR_BOUND)]
     bound: BoundName,
-    /// Value range that the tolerance refers to, instead of that of the frames so far; for --bound pointwise and rms. With
-    /// --transfer-function: the values of its first and last colour [default: its own, or the range of all frames]
-    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = PROMISE)]
+    /// Value range that the tolerance refers to, instead of the range of the frames so far; for --bound pointwise and
+    /// rms. With --transfer-function: the values of its first and last colour [default: its own, or the range of all
+    /// frames]
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     range: Option<Pair>,
-    /// NaN, infinities and the missing value: refuse them, or keep them as they are
-    /// [default: error; mask with --missing-value, and where files declare a value for what is missing]
-    #[arg(long, value_enum, help_heading = PROMISE)]
+    /// What to do with NaN, infinities and the missing value: reject them, or keep them as they are [default: error;
+    /// mask with --missing-value, and for files that declare a missing value]
+    #[arg(long, value_enum, help_heading = ERROR_BOUND)]
     missing: Option<MissingName>,
     /// A value that means "missing"
-    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = PROMISE)]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     missing_value: Option<f64>,
-    /// For --bound relative: samples smaller than this may be as wrong as one of this size. Say where values stop to
-    /// matter: with 0, zeros must come back as zeros, and values near zero cost most of the file [default: 0]
-    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = PROMISE)]
+    /// For --bound relative: samples smaller than this may have the error of a sample of this size. Choose the
+    /// magnitude below which values do not matter: with 0, zeros must come back as zeros, and values near zero take
+    /// most of the file [default: 0]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     floor: Option<f64>,
-    /// For --bound sampled: random pixels on each of three faces [default: 300]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true, help_heading = PROMISE)]
+    /// For --bound sampled: number of random pixels on each of three faces [default: 300]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     samples: Option<u32>,
-    /// For --bound sampled: another seed takes other pixels [default: 0]
-    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = PROMISE)]
+    /// For --bound sampled: seed of the random pixels [default: 0]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     seed: Option<u64>,
     #[command(flatten)]
     select: SelectArgs,
     #[command(flatten)]
     input: InputArgs,
-    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's file.
-    /// The tolerance is a share of full brightness then
+    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's
+    /// file. The tolerance is then a share of full brightness
     #[arg(long, value_name = "F", help_heading = CODING)]
     transfer_function: Option<String>,
-    /// What series, or samples, are made of
+    /// Transform along time
     #[arg(long, value_enum, default_value = "auto", help_heading = CODING)]
     basis: BasisName,
-    /// What coefficients are predicted from in space [default: none for haar and multi, else auto]
+    /// Prediction of coefficients in space [default: none for haar and multi, else auto]
     #[arg(long, value_enum, help_heading = CODING)]
     space: Option<SpaceName>,
     /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
     #[arg(long, value_name = "T", help_heading = CODING)]
     window: Option<usize>,
-    /// Voxels a side of a block [default: up to 48, up to 32 without a pyramid; less for long windows]
+    /// Block edge in voxels [default: up to 48, up to 32 without a pyramid; less for long windows]
     #[arg(long, value_name = "N", help_heading = CODING)]
     block: Option<usize>,
-    /// zstd level
+    /// Compression level of zstd
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=19), help_heading = CODING)]
     level: i32,
     #[command(flatten)]
     common: CommonArgs,
 }
 
-/// Headings of the help.
-const PROMISE: &str = "What is promised";
+/// The headings of the help.
+const ERROR_BOUND: &str = "Error bound";
 const CODING: &str = "How it is coded (the defaults are good)";
 
-/// The end of the help: what inputs may be, and what else should be known.
+/// The end of the help: the input formats, resuming, and the bounds.
 fn after_help() -> String {
     let extensions: Vec<String> = extensions().map(|ending| format!(".{ending}")).collect();
     format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{TO_KNOW}", extensions.join(" "))
 }
 
 const TO_KNOW: &str = "\
-A run that is stopped or killed leaves its finished windows in run.wspl.part; the name run.wspl appears only when all is done. \
-With --resume the same command goes on there (frames that were converted are read again and compared); a producer behind a \
-pipe must begin at its first frame again.
+A stopped or killed run leaves its finished windows in run.wspl.part; run.wspl itself appears only when it is complete. \
+With --resume, the same command continues there (converted frames are read again and compared); a program that writes into a \
+pipe must start from its first frame again.
 
 The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass; \
---range fixes the range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
-every view is then within the tolerance of its own value, but for what the cut of the splat adds (a share of the range: \
+--range sets a fixed range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
+every view is then within the tolerance of its own value, plus the error of splatting (a share of the range: \
 wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker \
 than the mean, and single frames, may be off by many times the tolerance.";
 
@@ -122,21 +124,21 @@ enum BasisName {
     Haar,
     /// The multiwavelet of Geronimo, Hardin and Massopust
     Multi,
-    /// Orthonormal functions that suit the window's own series
+    /// Orthonormal functions learned from the window's own series
     Learned,
-    /// No functions of time: samples are predicted in space and time
+    /// No transform along time: samples are predicted in space and time
     Pyramid,
-    /// learned or pyramid, and their variants: what makes some boxes of the window smallest
+    /// learned or pyramid, with the variant that makes some boxes of the window smallest
     Auto,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum SpaceName {
-    /// Each series by itself
+    /// No prediction: each series by itself
     None,
     /// From two neighbours along an axis
     Linear,
-    /// From four
+    /// From four neighbours along an axis
     Cubic,
     /// linear or cubic, whichever makes some boxes smaller
     Auto,
@@ -150,16 +152,16 @@ enum BoundName {
     Rms,
     /// Every sample v: error <= tolerance x max(|v|, floor)
     Relative,
-    /// The paper's rule, AN ESTIMATE, NOT A GUARANTEE: as rms, but of tolerance x the mean of random pixels (their
-    /// absolute values), which leaves the relative error of most pixels below the tolerance, and of some not
+    /// The paper's rule, AN ESTIMATE, NOT A GUARANTEE: as rms, but relative to the mean absolute value of random
+    /// pixels. The relative error of most pixels, but not all, stays below the tolerance
     Sampled,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum MissingName {
-    /// Refuse, naming the first
+    /// Reject the input, and name the first one
     Error,
-    /// Keep as they are; they are splatted as nothing
+    /// Keep them; they add nothing to pictures
     Mask,
 }
 
@@ -170,14 +172,14 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     spare_inputs(&args.inputs, &args.output)?;
     let config = args.of_archive(config, source.as_mut())?;
     if args.resume && !args.force && args.output.is_file() {
-        return args.see_that_it_is_complete(&config, source.archive());
+        return args.check_complete(&config, source.archive());
     }
     let (out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
     let begun = begun.map(|unfinished| PartialFile { unfinished, before: 0 });
     finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
 }
 
-/// Converts what is left, and gives the file its name if what it replaces is `still` the same.
+/// Converts the remaining frames, and commits the output if `still` confirms that the file it replaces is unchanged.
 pub(crate) fn finish(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
@@ -192,7 +194,8 @@ pub(crate) fn finish(
         if let Some(part) =
             out.part().filter(|_| out.is_kept() && !error.is_usage() && !matches!(error, Error::Changed { .. }))
         {
-            common.note(format_args!("{}: what is finished is kept; --resume goes on with it", part.display()));
+            common
+                .note(format_args!("{}: the finished windows are kept; --resume continues after them", part.display()));
         }
     })?;
     out.commit_if(|part| resume::check(part).and_then(|()| still()))?;
@@ -201,8 +204,8 @@ pub(crate) fn finish(
 }
 
 impl ConvertArgs {
-    /// Nothing is left to do where an earlier run came to its end.
-    fn see_that_it_is_complete(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
+    /// Checks that the output is complete, so that nothing is left to do.
+    fn check_complete(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
         let name = self.output.display();
         if !resume::is_complete(&self.output, &open_partial(config, archive)?, archive.frames)? {
             let what = "is complete, but with other settings or frames; --force replaces it, append adds frames";
@@ -225,7 +228,7 @@ impl ConvertArgs {
                 (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
             },
             missing_value: self.missing_value,
-            colours: None, // which may depend on the frames
+            colours: None, // may depend on the frames
             block: self.block,
             level: self.level,
             memory: self.common.memory.0,
@@ -233,7 +236,7 @@ impl ConvertArgs {
         })
     }
 
-    /// Completes a configuration by what the archive says, and what may depend on its frames.
+    /// Completes a configuration with settings of the archive and of its frames.
     fn of_archive(&self, config: ConvertConfig, source: &mut dyn FrameSource) -> Result<ConvertConfig> {
         let declared = source.archive().missing.is_some();
         let missing_value = source.archive().missing_value(config.missing_value);
@@ -241,7 +244,7 @@ impl ConvertArgs {
         Ok(ConvertConfig { colours: self.colours(source, missing_value)?, missing, missing_value, ..config })
     }
 
-    /// The colours that samples are turned into, if they are.
+    /// The colours for samples, if samples are turned into colours.
     fn colours(&self, source: &mut dyn FrameSource, missing_value: Option<f64>) -> Result<Option<TransferFunction>> {
         let Some(name) = &self.transfer_function else { return Ok(None) };
         spare_inputs(&[PathBuf::from(name)], &self.output)?;
@@ -303,7 +306,7 @@ impl ConvertArgs {
         Ok(SchemeConstraint { basis, space })
     }
 
-    /// What `append` and `verify --against` must know to read the same samples again.
+    /// The settings that `append` and `verify --against` need to read the same samples again.
     fn settings(&self) -> Vec<(String, String)> {
         let frames = self.select.frames.map(|f| ("frames".to_string(), f.to_string()));
         let region = self.select.region.map(|r| ("region".to_string(), r.to_string()));
@@ -312,7 +315,7 @@ impl ConvertArgs {
     }
 }
 
-/// Pixels on each face, as in the paper.
+/// The default number of pixels on each face, as in the paper.
 const SAMPLES: u32 = 300;
 
 fn summary(r: &ConvertReport, bound: Bound) -> String {

@@ -11,7 +11,7 @@ use wavesplat::extract::{Contents, ExtractConfig, ExtractReport, Files, SampleFo
 use wavesplat::file::CoefficientFile;
 use wavesplat::source::CHANNELS;
 
-/// Decode frames back to samples
+/// Decode a coefficient file back to samples
 #[derive(Debug, Args)]
 #[command(
     before_help = "\
@@ -25,37 +25,37 @@ Examples:
     after_help = "\
 Formats, by the ending of OUT:
   .npy   NumPy array (frames, z, y, x), with one header for all frames
-  .raw   the samples alone, little-endian
-  .nrrd  NRRD of x y z t, of one frame x y z
-  .nhdr  its header, with the samples in a .raw beside it
-  .vti   VTK's image data: one file for each frame, numbered as in out_%04d.vti
-  .pvd   ParaView's list of .vti files and their times; they are in a folder beside it
-  .nc    NetCDF (time, z, y, x) with times and positions: CDF-2, of unsigned samples CDF-5
-The samples keep their type, but f16 becomes f32 where a format lacks it. Places, times and
-units go with them where the format has room for these."
+  .raw   only the samples, little-endian
+  .nrrd  NRRD with x y z t, or x y z for one frame
+  .nhdr  NRRD header, with the samples in a .raw beside it
+  .vti   VTK image data: one file for each frame, numbered as in out_%04d.vti
+  .pvd   ParaView list of .vti files and their times; the files are in a folder beside it
+  .nc    NetCDF (time, z, y, x) with times and positions: CDF-2, or CDF-5 for unsigned samples
+The samples keep their type, but f16 becomes f32 in formats without it. Positions, times and
+units are written if the format can store them."
 )]
 pub(crate) struct ExtractArgs {
     /// Coefficient file
     file: PathBuf,
-    /// File to write, a pattern as out_%04d.vti where each frame has its own, or - for standard output
+    /// File to write, a pattern like out_%04d.vti if each frame has its own file, or - for standard output
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     output: PathBuf,
     /// Replace an existing file
     #[arg(long, help_heading = "Output")]
     force: bool,
-    /// Only these frames: ranges a:b:step or numbers, with commas between them
+    /// Extract only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<FrameList>,
-    /// Only these voxels: x0:x1,y0:y1,z0:z1
+    /// Extract only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
-    /// Of a file of colours: red, green or blue
+    /// Channel of a file of colours: red, green or blue
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
-    /// npy raw nrrd nhdr vti pvd nc [default: by the ending of OUT; npy for -]
+    /// Format: npy raw nrrd nhdr vti pvd nc [default: by the extension of OUT; npy for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<SampleFormat>,
-    /// Take damaged and lost blocks for missing samples (NaN, or the declared value, or 0) and give the rest; exit code 3
+    /// Extract damaged and lost blocks as missing samples (NaN, or the declared value, or 0), and the rest; exit code 3
     #[arg(long)]
     skip_damaged: bool,
     /// Read the file instead of mapping it
@@ -65,12 +65,12 @@ pub(crate) struct ExtractArgs {
     common: CommonArgs,
 }
 
-/// What `--json` says.
+/// The report of `--json`.
 #[derive(Debug, Serialize)]
 struct Extracted {
     #[serde(flatten)]
     report: ExtractReport,
-    /// The files that were written, - for standard output.
+    /// The written files; `-` is standard output.
     files: Vec<PathBuf>,
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
     let access = Access::unless(args.no_mmap);
-    let mut file = CoefficientFile::open(&args.file, access)?;
+    let mut file = CoefficientFile::open_with(&args.file, access)?;
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }
@@ -98,16 +98,13 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let progress = args.common.progress("extract", "frames");
     let report = extract_to(&file, &config, &mut |samples| sink.write(samples), &progress)?;
     sink.finish()?;
-    args.common.detail(format_args!(
-        "{} bytes were read of the file, which has {}",
-        report.file_bytes_read, report.file_bytes
-    ));
+    args.common.detail(format_args!("{} of the file's {} bytes were read", report.file_bytes_read, report.file_bytes));
     args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
 }
 
 impl ExtractArgs {
-    /// The channel that is meant; of a file of colours one must be named.
+    /// The chosen channel; for a file of colours one must be named.
     fn channel(&self, file: &CoefficientFile) -> Result<usize> {
         let name = self.file.display();
         match (file.colour_transform(), self.channel) {
@@ -115,7 +112,7 @@ impl ExtractArgs {
             (None, None) => Ok(0),
             (Some(_), None) => {
                 let channels = CHANNELS.join(", ");
-                Err(Error::usage(format!("{name}: holds colours, of which --channel chooses one of {channels}")))
+                Err(Error::usage(format!("{name}: holds colours; choose a channel with --channel, one of {channels}")))
             }
             (None, Some(_)) => {
                 Err(Error::usage(format!("--channel: is for a file of colours, and {name} holds values")))

@@ -1,4 +1,4 @@
-//! `wavesplat`: converts archives to coefficient files and looks after them.
+//! `wavesplat`: converts archives to coefficient files, and inspects, checks and extracts them.
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 mod append;
@@ -27,7 +27,7 @@ Examples:
   wavesplat extract run.wspl --frames 10:20 -o part.npy
   wavesplat recover damaged.wspl -o saved.wspl
   wavesplat convert --help",
-    after_help = "Pictures are made by wavesplat-render."
+    after_help = "wavesplat-render renders pictures of coefficient files."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -49,7 +49,7 @@ enum Command {
 Examples:
   wavesplat generate completions bash > /etc/bash_completion.d/wavesplat
   wavesplat generate man -o /usr/local/share/man/man1",
-        after_help = "Of pictures: wavesplat-render --generate completions-bash, wavesplat-render --generate man."
+        after_help = "For wavesplat-render: wavesplat-render --generate completions-bash, wavesplat-render --generate man."
     )]
     Generate(GenerateArgs),
 }

@@ -9,7 +9,7 @@ use wavesplat::cli::{CommonArgs, print, spare_inputs};
 use wavesplat::file::recover::{RecoverReport, recover};
 use wavesplat::file::resume;
 
-/// Save what is whole of a damaged coefficient file
+/// Save the undamaged blocks of a damaged coefficient file
 #[derive(Debug, Args)]
 #[command(
     before_help = "\
@@ -17,10 +17,9 @@ Examples:
   wavesplat recover damaged.wspl -o saved.wspl
   wavesplat recover run.wspl.part -o run-so-far.wspl",
     after_help = "\
-A new file is written, and the damaged one is not touched. Blocks of which anything is damaged are lost in the new file: they \
-are listed here, and whatever reads them says so (--skip-damaged leaves them out). If no block is lost, the new file is the \
-one that was damaged, byte for byte (where the end of a file is gone, some statistics are counted anew). Exit code 3 if anything \
-is lost."
+The damaged file is not changed; a new file is written. Any damage to a block loses the whole block: lost blocks are listed, \
+and reading them is an error (--skip-damaged leaves them out). If no block is lost, the new file has the bytes of the original \
+(if the end of the file is missing, some statistics are recomputed). Exit code 3 if anything is lost."
 )]
 pub(crate) struct RecoverArgs {
     /// Damaged or unfinished coefficient file
@@ -63,10 +62,9 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
 
 fn lost(r: &RecoverReport) -> Option<String> {
     let (blocks, behind) = (r.blocks_lost, r.blocks_left_behind);
-    let more =
-        if behind > 0 { format!(", and {behind} more of windows that nothing describes") } else { String::new() };
+    let more = if behind > 0 { format!(", and {behind} more of windows without a record") } else { String::new() };
     let what = format!("{blocks} of {} blocks are lost{more}", r.blocks);
-    let end = "its end is gone, and with it all frames after these, if there were any";
+    let end = "its end is gone, with all frames after these if there were any";
     match (blocks + behind > 0, r.all_known) {
         (false, true) => None,
         (false, false) => Some(end.into()),
@@ -85,10 +83,10 @@ fn text(r: &RecoverReport) -> String {
         text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}{channel}\n");
     }
     for window in &r.windows_undescribed {
-        text += &format!("  nothing says how window {window} was coded\n");
+        text += &format!("  the record of window {window} is lost\n");
     }
     if r.blocks_left_behind > 0 {
-        text += &format!("  left behind: {} blocks of later windows that nothing describes\n", r.blocks_left_behind);
+        text += &format!("  left out: {} blocks of later windows without a record\n", r.blocks_left_behind);
     }
     text
 }

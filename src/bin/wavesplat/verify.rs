@@ -9,7 +9,7 @@ use wavesplat::file::report::BoundReport;
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
 
-/// Check a coefficient file, and its promise against the source
+/// Check a coefficient file for damage, and its error bound against the source
 #[derive(Debug, Args)]
 #[command(
     before_help = "\
@@ -17,18 +17,18 @@ Examples:
   wavesplat verify run.wspl
   wavesplat verify run.wspl --against frames/",
     after_help = "\
-Every byte is checked; exit code 3 and a list of what is damaged if any is not as it was written. With --against, every \
-sample is decoded and compared; exit code 4 if any is outside the bound, or further off than its block says. Of a file with a sampled bound, \
-an estimate, what is checked is the rms of each series. \
-The frames and the region that were converted are remembered and chosen again, but for --frames."
+Every byte is checked; exit code 3 and a list of damaged places if any byte has changed. With --against, every \
+sample is decoded and compared; exit code 4 if an error exceeds the bound, or the largest error stated for its block. A sampled \
+bound is an estimate: for it, the rms error of each series is checked. \
+The file stores which frames and region were converted, and they are chosen again; --frames chooses other frames."
 )]
 pub(crate) struct VerifyArgs {
     /// Coefficient file
     file: PathBuf,
-    /// The frames it was made from
+    /// The frames that the file was converted from
     #[arg(long, value_name = "INPUT", num_args = 1..)]
     against: Vec<PathBuf>,
-    /// Which frames of INPUT the file holds: a:b, a:b:step, the end left out [default: those that were converted first]
+    /// The frames of INPUT that the file holds: a:b or a:b:step, without b [default: those that were converted first]
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true, requires = "against")]
     frames: Option<FrameRange>,
     #[command(flatten)]
@@ -39,7 +39,7 @@ pub(crate) struct VerifyArgs {
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
-    let file = CoefficientFile::open(&args.file, args.input.access())?;
+    let file = CoefficientFile::open_with(&args.file, args.input.access())?;
     let mut source = args.source(&file)?;
     let source: Option<&mut dyn FrameSource> = match &mut source {
         Some(source) => Some(source.as_mut()),
@@ -54,7 +54,8 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     }
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
-        let what = format!("damaged in {count} places, the first: {first}; wavesplat recover saves what is whole");
+        let what =
+            format!("damaged in {count} places, the first: {first}; wavesplat recover saves the undamaged blocks");
         return Err(Error::input(&args.file, what));
     }
     match report.against.as_ref().and_then(missed) {
@@ -63,7 +64,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     }
 }
 
-/// What was promised and not kept.
+/// Describes a missed error bound.
 fn missed(c: &Comparison) -> Option<String> {
     if c.series_outside > 0 {
         let (outside, share) = (c.series_outside, c.largest_share_of_bound);
@@ -84,7 +85,7 @@ impl VerifyArgs {
             return Ok(None);
         }
         let source = self.input.open_again(file, &self.against, self.frames, &self.common)?;
-        // What was appended may be of the same archive: all of it is meant then, and not what was first taken.
+        // Appended frames may come from the same archive: then all its frames count, not those converted first.
         let is_all = self.frames.is_some() || source.archive().frames == Some(file.frames());
         let first = if is_all { None } else { remembered(file, "frames")? };
         narrow(source, first, None).map(Some)
@@ -96,7 +97,7 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {} places", r.damaged) };
     let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);
     if r.unchecked > 0 {
-        text += &format!("  {} more blocks could not be checked: what lists them is damaged\n", r.unchecked);
+        text += &format!("  {} more blocks could not be checked: their directory is damaged\n", r.unchecked);
     }
     let shown = r.damage.len().min(MOST_SHOWN);
     r.damage[..shown].iter().for_each(|damage| text += &format!("  {damage}\n"));
@@ -114,5 +115,5 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     text
 }
 
-/// Damaged places that are listed.
+/// The largest number of damaged places listed.
 const MOST_SHOWN: usize = 20;

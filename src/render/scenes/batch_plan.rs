@@ -1,4 +1,4 @@
-//! What a batch of frames of a coefficient file splats: which coefficients or values, into which planes.
+//! The plan of a frame batch of a coefficient file: which coefficients or values are splatted into which planes.
 
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
@@ -9,20 +9,20 @@ use crate::render::scene::BatchRequest;
 use crate::wavelet::needed;
 use wavesplat_format::Window;
 
-/// What of a file is splatted.
+/// The data of a file that are splatted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SplatSource {
-    /// Coefficients.
+    /// The wavelet coefficients.
     Coefficients,
     /// The decoded samples of every frame: the conventional method.
     Samples,
 }
 
-/// Decided once for a batch, before any block is read.
+/// The plan of a batch, made once before any block is read.
 pub(super) struct BatchPlan {
     pub(super) what: SplatSource,
     pub(super) codec: WindowCodec,
-    /// Counted from the first frame of the window.
+    /// Frame numbers, counted from the first frame of the window.
     pub(super) frames: Vec<usize>,
     /// For each coefficient, whether the frames need it.
     pub(super) wanted: Vec<bool>,
@@ -34,7 +34,7 @@ pub(super) struct BatchPlan {
 }
 
 impl BatchPlan {
-    /// The plan for the frames of a request, which are all of one window.
+    /// The plan for the frames of a request, which all belong to one window.
     pub(super) fn new(
         file: &CoefficientFile,
         what: SplatSource,
@@ -54,7 +54,8 @@ impl BatchPlan {
     }
 }
 
-/// What holds in every frame, and what each level part that is left out counts in a frame.
+/// Number of error planes: one for the error that holds in every frame, and one for each level part that may be left
+/// out.
 pub(super) fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     match (config.certify, config.allowed) {
         (false, _) => 0,
@@ -63,13 +64,13 @@ pub(super) fn error_planes(config: &RenderConfig, levels: usize) -> usize {
     }
 }
 
-/// Whether most coefficients of so many series are not zero. Measured: from about half of them on, all planes of a
-/// pixel are added faster.
+/// Whether most coefficients of `series` series are nonzero. As measured, splatting all planes of a pixel at a time is
+/// faster if more than about half are.
 fn is_dense(window: &Window, series: usize) -> bool {
     window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
 }
 
-/// The planes of a batch of `frames` frames that needs `kept` coefficients.
+/// The layout of a batch of `frames` frames that needs `kept` coefficients.
 fn layout(
     file: &CoefficientFile,
     codec: &WindowCodec,
@@ -95,8 +96,8 @@ fn layout(
     }
 }
 
-/// Whether so few frames of a window are asked for that their values are less work than the coefficients that they
-/// need. Judged by all that are asked for, not by a batch, whose frames depend on the memory that there is.
+/// Whether splatting the values of the requested frames is less work than splatting the coefficients that they need.
+/// This counts all requested frames of the window and not those of a batch, whose size depends on the memory.
 fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
     let range = file.window_range(window);
     let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();
@@ -104,5 +105,6 @@ fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &
     COEFFICIENTS_FOR_A_VALUE * asked.len() <= needed
 }
 
-/// Measured: with half as many frames as coefficients both take as long, with a quarter values a fifth less.
+/// As measured, values and coefficients take the same time for half as many frames as coefficients; for a quarter,
+/// values take a fifth less.
 const COEFFICIENTS_FOR_A_VALUE: usize = 4;

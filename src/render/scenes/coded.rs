@@ -1,4 +1,4 @@
-//! A block of a file that has been read, as what it adds to the planes of its plan.
+//! A decoded block of a file: its values in the planes of a batch plan.
 
 use super::batch_plan::{BatchPlan, SplatSource};
 use crate::base::error::Result;
@@ -8,29 +8,29 @@ use crate::codec::decode::Block;
 use crate::codec::field::Field;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 
-/// A block of a file that has been read.
+/// A decoded block of a file.
 pub(super) struct CodedBlock<'a> {
     plan: &'a BatchPlan,
     block: Block,
-    /// What its samples may be off by, for each error plane.
+    /// The error of its samples, for each error plane.
     errors: Vec<f64>,
     dense: Dense,
-    /// What overrides coefficients, for each plane; empty if nothing does.
+    /// For each plane, the values that correct the coefficients at single voxels; empty if there are none.
     few: Vec<Vec<(u32, f64)>>,
 }
 
-/// What most voxels add.
+/// The dense values of a block.
 enum Dense {
-    /// Samples to frames; here those of the whole window.
+    /// Decoded samples of all frames of the window.
     Samples(Buffer<u8>),
-    /// What coefficients give to frames: `frame of the plan * voxels + voxel`; empty if all are zero.
+    /// Values of the plan's frames, computed from the coefficients: `frame * voxels + voxel`; empty if all are zero.
     Values(Vec<f64>),
-    /// Coefficients, here what all codes give if that was needed at once.
+    /// Coefficients. The field holds all of them if they had to be decoded together.
     Coefficients(Option<Field<'static>>),
 }
 
 impl<'a> CodedBlock<'a> {
-    /// Of a block of a plan whose samples may be off by so much.
+    /// A block with the errors of its samples, one for each error plane.
     pub(super) fn new(plan: &'a BatchPlan, block: Block, errors: Vec<f64>) -> Self {
         let codec = &plan.codec;
         if block.exact.is_some() || plan.what == SplatSource::Samples {
@@ -46,31 +46,31 @@ impl<'a> CodedBlock<'a> {
         Self { plan, block, errors, dense, few }
     }
 
-    fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, room: &'r mut Scratch) -> PlaneValues<'r> {
+    fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, scratch: &'r mut Scratch) -> PlaneValues<'r> {
         let Self { plan, block, .. } = self;
         let Some((frame, absent)) = plan.layout.samples(plane) else { return PlaneValues::Nothing };
         let bytes = samples.len() / plan.codec.frames();
-        room.bytes.clear();
-        room.bytes.extend_from_slice(&samples[plan.frames[frame] * bytes..][..bytes]);
+        scratch.bytes.clear();
+        scratch.bytes.extend_from_slice(&samples[plan.frames[frame] * bytes..][..bytes]);
         let first = plan.frames[frame] * block.voxels;
-        // An exact block may do without a mask.
+        // An exact block may have no mask.
         let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || plan.codec.is_missing(v);
         match plan.layout.absent {
-            true => room.masked(plan.codec.sample, absent, is_missing),
-            false => room.samples(plan.codec.sample),
+            true => scratch.masked(plan.codec.sample, absent, is_missing),
+            false => scratch.samples(plan.codec.sample),
         }
     }
 
-    /// The same error for all voxels but those that have no sample.
-    fn plane_of_errors<'r>(&self, error: f64, room: &'r mut Scratch) -> PlaneValues<'r> {
+    /// The same error for every voxel; 0 for voxels without any sample.
+    fn plane_of_errors<'r>(&self, error: f64, scratch: &'r mut Scratch) -> PlaneValues<'r> {
         if error == 0.0 {
             return PlaneValues::Nothing;
         }
         let coded = !matches!(self.dense, Dense::Samples(_));
         let error = |voxel| if coded && misses_all(self.plan, &self.block, voxel) { 0.0 } else { error };
-        room.double.clear();
-        room.double.extend((0..self.block.voxels).map(error));
-        PlaneValues::Double(&room.double)
+        scratch.double.clear();
+        scratch.double.extend((0..self.block.voxels).map(error));
+        PlaneValues::Double(&scratch.double)
     }
 }
 
@@ -79,19 +79,19 @@ impl BlockPlanes for CodedBlock<'_> {
         self.block.voxels
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         let Self { plan, block, errors, dense, few } = self;
         let voxels = block.voxels;
         if let Some(error) = plane.checked_sub(plan.layout.first_error()) {
-            return Ok(self.plane_of_errors(errors[error], room));
+            return Ok(self.plane_of_errors(errors[error], scratch));
         }
         let few =
             few.get(plane).filter(|few| !few.is_empty()).map_or(PlaneValues::Nothing, |few| PlaneValues::Few(few));
         Ok(match dense {
-            Dense::Samples(samples) => self.plane_of_samples(samples, plane, room),
+            Dense::Samples(samples) => self.plane_of_samples(samples, plane, scratch),
             Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
             Dense::Coefficients(field) if plane < plan.layout.coefficients => {
-                coefficients(plan, block, field.as_ref(), plan.kept[plane], room)
+                coefficients(plan, block, field.as_ref(), plan.kept[plane], scratch)
             }
             Dense::Coefficients(_) => few,
         })
@@ -110,34 +110,35 @@ fn coefficients<'a>(
     block: &'a Block,
     field: Option<&'a Field<'_>>,
     k: usize,
-    room: &'a mut Scratch,
+    scratch: &'a mut Scratch,
 ) -> PlaneValues<'a> {
     match field {
-        Some(field) => field.plane(k, block.voxels, &mut room.double).into(),
-        None => block.plane(&plan.codec, k, (&mut room.single, &mut room.double)).into(),
+        Some(field) => field.plane(k, block.voxels, &mut scratch.double).into(),
+        None => block.plane(&plan.codec, k, (&mut scratch.single, &mut scratch.double)).into(),
     }
 }
 
-/// What coefficients give in each frame of a plan, and what overrides that, which is taken out of `few`.
+/// The values of each frame of a plan: computed from the coefficients, plus the corrections in `few`, which are removed
+/// from there.
 fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut [Vec<(u32, f64)>]) -> Vec<f64> {
     if block.codes.is_empty() && few.is_empty() {
         return Vec::new();
     }
     let mut values = vec![0.0; plan.frames.len() * block.voxels];
-    let room = &mut Scratch::default();
+    let scratch = &mut Scratch::default();
     for k in &plan.kept {
-        let amounts = coefficients(plan, block, field, *k, room);
+        let coefficients = coefficients(plan, block, field, *k, scratch);
         for (frame, values) in plan.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
-            amounts.add_to(plan.codec.synthesis[*k][*frame], values);
+            coefficients.add_to(plan.codec.synthesis[*k][*frame], values);
         }
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
-        few.drain(..).for_each(|(voxel, amount)| values[voxel as usize] += amount);
+        few.drain(..).for_each(|(voxel, value)| values[voxel as usize] += value);
     }
     values
 }
 
-/// What overrides the coefficients of a block, for each plane of a plan; empty if nothing does.
+/// For each plane of a plan, the values that correct the coefficients at single voxels; empty if there are none.
 fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
     let (layout, codec) = (&plan.layout, &plan.codec);
     if !block.overrides() {
@@ -146,8 +147,8 @@ fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<
     let mut few = vec![Vec::new(); layout.planes()];
     let whole = field.is_none().then(|| block.field(codec));
     let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.frames));
-    for (voxel, frame, amount) in samples.into_iter().flatten() {
-        few[layout.value(frame)].push((voxel as u32, amount));
+    for (voxel, frame, value) in samples.into_iter().flatten() {
+        few[layout.value(frame)].push((voxel as u32, value));
     }
     for voxel in (0..block.voxels).filter(|_| layout.absent) {
         let mut add = |plane: usize| few[plane].push((voxel as u32, 1.0));
@@ -161,13 +162,13 @@ fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<
     few
 }
 
-/// Whether a voxel has no sample, judged by the window and not by the plan, whose frames depend on the memory there is.
+/// Whether a voxel has no sample in the whole window. This does not use the plan's frames, which depend on the memory.
 fn misses_all(plan: &BatchPlan, block: &Block, voxel: usize) -> bool {
     (0..plan.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
 }
 
-/// What must be added to single frames because coefficients don't give it: an outlier's sample less what they give,
-/// and for a missing sample minus what they give. (voxel, frame of the plan, amount), ascending.
+/// The corrections of single frames, as (voxel, frame of the plan, value), ascending. For an outlier the correction is
+/// its sample minus the value from the coefficients; for a missing sample it is minus that value.
 fn overridden_samples(
     block: &Block,
     codec: &WindowCodec,
@@ -176,20 +177,21 @@ fn overridden_samples(
 ) -> Vec<(usize, usize, f64)> {
     let mut wanted = vec![None; codec.frames()];
     frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
-    let place = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
+    let locate = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
     let mut samples = vec![0.0; block.outliers.positions.len()];
     crate::base::sample::load(codec.sample, &block.outliers.samples, &mut samples);
     let outliers = block.outliers.positions.iter().map(|p| *p as usize).zip(samples);
     let missing = block.missing.0.iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| (i, 0.0));
     let mut targets: Vec<_> = outliers
         .chain(missing)
-        .filter_map(|(index, sample)| place(index).map(|(voxel, f, t)| (voxel, f, t, sample)))
+        .filter_map(|(index, sample)| locate(index).map(|(voxel, f, t)| (voxel, f, t, sample)))
         .collect();
     targets.sort_unstable_by_key(|(voxel, f, _, _)| (*voxel, *f));
     subtract_series(block, codec, field, &targets)
 }
 
-/// Turns (voxel, frame of the plan, frame of the window, sample) into (voxel, frame, sample - what the codes give).
+/// Turns (voxel, frame of the plan, frame of the window, sample) into (voxel, frame of the plan, sample - decoded
+/// value).
 fn subtract_series(
     block: &Block,
     codec: &WindowCodec,

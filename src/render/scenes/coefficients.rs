@@ -9,7 +9,7 @@ use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
-use crate::file::CoefficientFile;
+use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
 use crate::render::layout::Layout;
@@ -28,9 +28,16 @@ pub struct CoefficientScene {
 }
 
 impl CoefficientScene {
-    /// Of an open file.
+    /// A scene of an open file.
     pub fn new(file: impl Into<Arc<CoefficientFile>>, what: SplatSource) -> Self {
         Self { file: file.into(), what }
+    }
+}
+
+impl From<CoefficientFile> for CoefficientScene {
+    /// Splats the file's coefficients.
+    fn from(file: CoefficientFile) -> Self {
+        Self::new(file, SplatSource::Coefficients)
     }
 }
 
@@ -51,6 +58,10 @@ impl Scene for CoefficientScene {
         Some(self.file.frames())
     }
 
+    fn tolerance(&self) -> Option<f64> {
+        Some(self.file.metadata().tolerance)
+    }
+
     fn batch_end(&self, frame: usize) -> usize {
         self.file.window_range(self.file.window_of(frame)).end
     }
@@ -63,7 +74,7 @@ impl Scene for CoefficientScene {
 
     fn block_bytes(&self) -> usize {
         let windows = &self.file.metadata().windows;
-        // Codes, payload and samples; what a pyramid gives; where samples are missing, a mask and overrides.
+        // Codes, payload and samples; decoded values of a pyramid; a mask and corrections if samples are missing.
         let refined = if windows.iter().any(|w| w.pyramid.is_some()) { 8 } else { 0 };
         let missing = (0..windows.len() as u32).any(|window| self.file.has_missing(window));
         let missing = if missing { 1 + 32 + 24 } else { 0 };
@@ -75,7 +86,7 @@ impl Scene for CoefficientScene {
     }
 }
 
-/// Some frames of one window of a file.
+/// A batch of frames of one window of a file.
 pub(super) struct CoefficientBatch<'a> {
     file: &'a CoefficientFile,
     window: u32,
@@ -85,8 +96,10 @@ pub(super) struct CoefficientBatch<'a> {
     selector: BlockSelector,
     selection: Selection,
     errors: SampleErrors,
-    /// The leaf that was read last: blocks come in order.
+    /// The last leaf of the directory that was read. Blocks come in order, so most reads hit it.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
+    /// The last blocks that were read together, if the storage prefers that.
+    fetched: Mutex<Option<Arc<BlockBatch<'a>>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
@@ -103,15 +116,16 @@ impl<'a> CoefficientBatch<'a> {
             selection: Selection::default(),
             errors: SampleErrors::default(),
             leaf: Mutex::default(),
+            fetched: Mutex::default(),
         };
         batch.select(request.config)?;
         Ok(batch)
     }
 
-    /// Decides what is read: the rule first, then every block by that rule.
+    /// Selects the parts to read: first decides the rule, then applies it to every block.
     fn select(&mut self, config: &RenderConfig) -> Result<()> {
         let region = config.region.unwrap_or(self.file.grid.whole());
-        // Decoded samples are rounded to their type, so an error of parts that are left out would not be all of it.
+        // Decoded samples are rounded to their type, so the bound for left-out parts would not cover their whole error.
         if let Some(allowed) = config.allowed.filter(|_| self.plan.what != SplatSource::Samples) {
             let rule = self.rule(allowed, config.limited, &region)?;
             self.selector.rule = rule;
@@ -138,7 +152,7 @@ impl<'a> CoefficientBatch<'a> {
         Ok(())
     }
 
-    /// What may be left out so that an error keeps within what is allowed.
+    /// The rule that leaves out as much as the allowed error permits.
     fn rule(&self, allowed: f64, limited: Limit, region: &Region) -> Result<Rule> {
         let (Limit::Expected, [view, ..]) = (limited, self.views) else { return Ok(Rule::Within(allowed)) };
         let mut cheapest = RateAllocator::new(&self.selector);
@@ -159,16 +173,17 @@ impl<'a> CoefficientBatch<'a> {
         }
     }
 
-    /// A range that holds the samples of a block as they are splatted.
+    /// A range that holds the samples of a block as splatted.
     fn range(&self, entry: &BlockEntry, kept: &KeptParts) -> (f64, f64) {
         let BlockStats { min, max, reached, .. } = entry.stats;
-        // With less than all parts, samples are as near to the source's as those of all, and that near again.
+        // Without all parts, samples differ from the source by `certified`, and the source differs from the stored
+        // range by `reached`.
         let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
         let off = off + rounding(self.plan.codec.sample, magnitude((min, max)));
         (min - off, max + off)
     }
 
-    /// Adds to each view what the errors of a block are expected to come to.
+    /// Adds the expected mean square error that a block causes in each view.
     fn expect(&self, entry: &BlockEntry, kept: &KeptParts, sums: &mut [f64]) {
         let [first, others @ ..] = sums else { return };
         *first += kept.expected;
@@ -177,15 +192,15 @@ impl<'a> CoefficientBatch<'a> {
         }
     }
 
-    /// The errors of samples, of which none in the region is further off than `certified`, and none is made of terms
-    /// that sum to more than `absolute_sum`.
+    /// Error bounds of the samples. Every sample in the region has an error of at most `certified` and a sum of
+    /// absolute terms of at most `absolute_sum`.
     fn sample_errors(&self, certified: f64, absolute_sum: f64) -> SampleErrors {
         let record = &self.file.metadata().windows[self.window as usize];
         let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
         let frame = FrameBounds {
             error: record.reached.max(certified),
             range,
-            // An outlier adds its sample less what the coefficients give.
+            // An outlier adds its sample minus the value from the coefficients.
             absolute_sum: 2.0 * absolute_sum + magnitude(range),
         };
         let of_part = |gains: &Vec<f64>| self.plan.frames.iter().map(|f| gains[*f]).collect();
@@ -196,19 +211,19 @@ impl<'a> CoefficientBatch<'a> {
         }
     }
 
-    /// What is read of a block.
+    /// The parts of a block to read.
     fn keep(&self, entry: &BlockEntry) -> KeptParts {
         self.selector.keep(&self.view_of(entry, self.views.first()))
     }
 
-    /// A block as a view sees it; without a view, it influences no pixel.
+    /// A block with its influence on a view; without a view, it influences no pixel.
     fn view_of<'b>(&self, entry: &'b BlockEntry, view: Option<&Expectation<'_>>) -> BlockView<'b> {
         let region = self.file.blocks.region(entry.id.block as usize);
         let influence = view.map(|view| view.of_block(&region)).unwrap_or_default();
         BlockView { entry, voxels: region.voxels(), influence }
     }
 
-    /// The parts that say nothing of the group's frames.
+    /// The parts that the batch's frames do not need.
     fn of_other_frames(&self, entry: &BlockEntry) -> LeftOut {
         let needs = |part: &PartEntry| match part.kind {
             PartKind::Level(level) => self.plan.codec.needs_part(level.into(), &self.plan.wanted),
@@ -236,11 +251,22 @@ impl<'a> CoefficientBatch<'a> {
         Ok(last.clone())
     }
 
-    /// Reads a block, and what its samples may be off by.
-    fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
+    /// Looks up a block in the directory, and selects its parts to read.
+    fn kept(&self, block: usize) -> Result<KeptParts> {
         let leaf = self.leaf_of(block as u32)?;
-        let KeptParts { entry, errors, .. } = self.keep(&leaf[block - leaf[0].id.block as usize]);
-        Ok((self.file.block(&self.plan.codec, &entry, &self.plan.wanted)?, errors))
+        Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
+    }
+
+    /// Reads a block, and returns it with the errors of its samples.
+    fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
+        let KeptParts { entry, errors, .. } = self.kept(block)?;
+        let fetched = self.fetched.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        let block = match fetched {
+            Some(fetched) => fetched.block(codec, &entry, wanted)?,
+            None => self.file.block(codec, &entry, wanted)?,
+        };
+        Ok((block, errors))
     }
 }
 
@@ -251,6 +277,16 @@ impl FrameBatch for CoefficientBatch<'_> {
 
     fn selection(&self) -> &Selection {
         &self.selection
+    }
+
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        if self.file.prefers_batches() {
+            let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
+            let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
+            let batch = Arc::new(self.file.batch(&self.plan.codec, &entries, &self.plan.wanted)?);
+            *self.fetched.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+        }
+        Ok(())
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

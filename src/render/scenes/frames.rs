@@ -1,11 +1,11 @@
-//! The conventional method: every frame of an archive is splatted by itself (eq 4).
+//! The conventional method: splats every frame of an archive separately (eq 4).
 
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
 use crate::render::config::RenderConfig;
-use crate::render::layout::{Layout, Order};
+use crate::render::layout::Layout;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 use crate::render::scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
@@ -14,32 +14,32 @@ use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, CHANNELS, ColourTransform, ColourWindow, FrameSource, FrameWindow};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Frames that are splatted together, so that the weights of voxels, or of pixels, are computed once for all of them.
+/// Frames that are splatted together, so that the weights of voxels or pixels are computed once for all of them.
 const BATCH: usize = 32;
-/// Voxels a side of the boxes in which frames are read.
+/// Voxels per side of the boxes in which frames are read.
 const EDGE: usize = 32;
 
 /// An archive as a scene.
 pub struct FrameScene {
     source: Box<dyn FrameSource>,
-    /// Of the samples that are splatted.
+    /// Grid, frames and sample type of the splatted samples.
     archive: Archive,
     missing_value: Option<f64>,
-    /// What makes them of those that are read, if they are not the same.
+    /// Turns the samples that are read into colours, if colours are splatted.
     colour_transform: Option<ColourTransform>,
-    /// Whether a sample turned out to be missing: from then on frames are looked at before they are splatted.
-    missing_seen: AtomicBool,
+    /// Whether a missing sample was found. From then on frames are scanned before they are splatted.
+    found_missing: AtomicBool,
 }
 
 impl FrameScene {
-    /// Of a source, with a value that means "missing" besides NaN and infinities.
+    /// A scene of a source. `missing_value` means "missing", like NaN and infinities.
     pub fn new(source: Box<dyn FrameSource>, missing_value: Option<f64>) -> Self {
         let archive = source.archive().clone();
         let missing_value = sample::missing_value(archive.sample, missing_value);
-        Self { source, archive, missing_value, colour_transform: None, missing_seen: AtomicBool::new(false) }
+        Self { source, archive, missing_value, colour_transform: None, found_missing: AtomicBool::new(false) }
     }
 
-    /// As [`Self::new`], in colours: three channels, 0 to 1.
+    /// The same as [`Self::new`], with samples turned into colours: three channels, 0 to 1.
     pub fn coloured(source: Box<dyn FrameSource>, missing_value: Option<f64>, colours: TransferFunction) -> Self {
         let plain = Self::new(source, missing_value);
         let (sample, missing_value) = (plain.archive.sample, plain.missing_value);
@@ -75,13 +75,13 @@ impl Scene for FrameScene {
     }
 
     fn block_bytes(&self) -> usize {
-        // A plane of it, in the samples' type and as f64.
+        // One plane of a block, in the type of the samples and as f64.
         let read = self.colour_transform.as_ref().map_or(0, |colour_transform| colour_transform.sample.size());
         self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
-        let BatchRequest { frames, channel, config, views } = *request;
+        let BatchRequest { frames, channel, config, .. } = *request;
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
         let window: Box<dyn FrameWindow + 'a> = match &self.colour_transform {
@@ -90,28 +90,20 @@ impl Scene for FrameScene {
         };
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
-        let look = |frame: &usize| {
+        let scan = |frame: &usize| {
             scan_frame(Scan::NOTHING, window.as_ref(), frame - first, &archive.grid, archive.sample, declared)
         };
-        let look_first = can_miss && self.missing_seen.load(Relaxed);
-        let looked_at = if look_first || config.certify { frames } else { &[] };
-        let seen = looked_at.iter().map(look).collect::<Result<Vec<Scan>>>()?;
-        let absent = seen.iter().any(|s| s.missing > 0);
-        let layout = Layout {
-            coefficients: 0,
-            frames: frames.len(),
-            values: true,
-            absent,
-            error_planes: 0,
-            lengths: false,
-            order: Order::Pixels,
-        };
-        let errors = seen.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
+        let scan_first = can_miss && self.found_missing.load(Relaxed);
+        let scanned = if scan_first || config.certify { frames } else { &[] };
+        let scans = scanned.iter().map(scan).collect::<Result<Vec<Scan>>>()?;
+        let absent = scans.iter().any(|s| s.missing > 0);
+        let layout = Layout { absent, ..Layout::of_values(frames.len()) };
+        let errors = scans.iter().map(|s| FrameBounds { error: 0.0, range: s.range, absolute_sum: magnitude(s.range) });
         let errors = SampleErrors { factors: Vec::new(), frames: errors.collect() };
         let frames = frames.iter().map(|f| f - first).collect();
-        let (blocks, seen) = (self.blocks(), &self.missing_seen);
-        let selection = select(blocks, config, views.len());
-        let unexpected = (can_miss && looked_at.is_empty()).then_some(seen);
+        let (blocks, found_missing) = (self.blocks(), &self.found_missing);
+        let selection = Selection::of_all(blocks, request);
+        let unexpected = (can_miss && scanned.is_empty()).then_some(found_missing);
         Ok(Box::new(SampleBatch {
             archive,
             blocks,
@@ -126,30 +118,15 @@ impl Scene for FrameScene {
     }
 }
 
-/// All blocks that touch the region; of their values nothing is known before they are read.
-fn select(blocks: BlockGrid, config: &RenderConfig, views: usize) -> Selection {
-    let region = config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
-    let touching: Vec<usize> = blocks.touching(&region).collect();
-    let any = (f64::NEG_INFINITY, f64::INFINITY);
-    let ranged = if config.mode.is_projection() { &[][..] } else { &touching };
-    Selection {
-        ranges: ranged.iter().map(|block| (*block, any)).collect(),
-        empty: (blocks.len() - touching.len()) as u64,
-        blocks: touching,
-        expected: vec![0.0; views],
-        ..Selection::default()
-    }
-}
-
-/// Some frames of an archive.
+/// A batch of frames of an archive.
 struct SampleBatch<'a> {
     archive: &'a Archive,
     blocks: BlockGrid,
     missing_value: Option<f64>,
-    /// Where to note that a sample is missing, if nobody looked for that before.
+    /// The flag to set if a sample is missing; `None` if the frames were scanned before.
     unexpected: Option<&'a AtomicBool>,
     window: Box<dyn FrameWindow + 'a>,
-    /// Counted from the first frame of the window.
+    /// Frame numbers, counted from the first frame of the window.
     frames: Vec<usize>,
     layout: Layout,
     selection: Selection,
@@ -179,20 +156,20 @@ impl FrameBatch for SampleBatch<'_> {
 
     fn finish(&self) -> Result<BatchOutcome> {
         self.window.check_unchanged()?;
-        let unexpected = self.unexpected.is_some_and(|seen| seen.load(Relaxed));
+        let unexpected = self.unexpected.is_some_and(|found| found.load(Relaxed));
         Ok(if unexpected { BatchOutcome::NeedsRelayout } else { BatchOutcome::Complete })
     }
 }
 
 impl SampleBatch<'_> {
     fn note_missing<T: Copy + Into<f64>>(&self, values: &[T]) {
-        if let Some(seen) = self.unexpected.filter(|_| sample::is_any_missing(values, self.missing_value)) {
-            seen.store(true, Relaxed);
+        if let Some(found) = self.unexpected.filter(|_| sample::is_any_missing(values, self.missing_value)) {
+            found.store(true, Relaxed);
         }
     }
 }
 
-/// A block of frames that are read when they are needed.
+/// A block whose frames are read on demand.
 struct FrameBlock<'a> {
     batch: &'a SampleBatch<'a>,
     region: Region,
@@ -203,15 +180,15 @@ impl BlockPlanes for FrameBlock<'_> {
         self.region.voxels()
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         let SampleBatch { archive, layout, window, frames, missing_value, .. } = self.batch;
         let Some((frame, absent)) = layout.samples(plane) else { return Ok(PlaneValues::Nothing) };
-        room.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
-        window.read_box(frames[frame], &self.region, &mut room.bytes)?;
+        scratch.bytes.resize(self.region.voxels() * archive.sample.size(), 0);
+        window.read_box(frames[frame], &self.region, &mut scratch.bytes)?;
         if layout.absent {
-            return Ok(room.masked(archive.sample, absent, |_, v| is_missing(v, *missing_value)));
+            return Ok(scratch.masked(archive.sample, absent, |_, v| is_missing(v, *missing_value)));
         }
-        let samples = room.samples(archive.sample);
+        let samples = scratch.samples(archive.sample);
         match samples {
             PlaneValues::Single(values) => self.batch.note_missing(values),
             PlaneValues::Double(values) => self.batch.note_missing(values),

@@ -1,7 +1,7 @@
 //! The scenes that come with the library: a coefficient file, and the frames of an archive.
 //!
-//! A scene knows files, codes and samples, and decides which blocks a batch of frames reads ([`select`]). It knows
-//! nothing of pixels.
+//! A scene handles files, codes and samples, and selects the blocks of a frame batch ([`select`]). It knows nothing
+//! about pixels.
 
 mod select;
 mod batch_plan;

@@ -1,8 +1,8 @@
-//! Which level parts of a block are read under a looser tolerance, and how far its samples may then be off.
+//! Selects the level parts of a block to read under a looser tolerance, and bounds the resulting errors of its samples.
 //!
-//! A certified limit leaves out the finest parts of a block for as long as none of its samples is further off. A limit
-//! on the expected error (eq 27) leaves out parts by their expected error per byte, up to the same price for all
-//! blocks: no other choice of these steps reads fewer bytes for the same expected error
+//! A certified limit leaves out the finest parts of a block as long as the errors of its samples stay within the limit.
+//! A limit on the expected error (eq 27) leaves out parts by their expected error per byte, up to the same price for
+//! all blocks. No other choice of these steps reads fewer bytes for the same expected error
 //! ([Shoham](crate::bibliography)).
 
 use crate::base::grid::Grid;
@@ -14,66 +14,67 @@ use crate::render::scene::LeftOut;
 use std::collections::BTreeMap;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
-/// What is read of a block.
+/// The parts of a block to read, and the errors of its samples.
 #[derive(Debug)]
 pub(super) struct KeptParts {
-    /// Its entry, without the parts that are left out.
+    /// The block's entry without the parts that are left out.
     pub(super) entry: BlockEntry,
-    /// The error of its samples: first what holds in every frame, then for each level part what counts
-    /// [`BlockSelector::gains`] times in a frame.
+    /// The errors of its samples: first the error that holds in every frame, then one for each level part, to be
+    /// multiplied by [`BlockSelector::gains`] in each frame.
     pub(super) errors: Vec<f64>,
-    /// No sample is further off.
+    /// Error bound of every sample.
     pub(super) certified: f64,
-    /// What its errors are expected to come to in the mean square over pixels.
+    /// The mean square over pixels of the error that the block is expected to cause.
     pub(super) expected: f64,
     pub(super) left_out: LeftOut,
 }
 
-/// Decides what of a window's blocks is read.
+/// Selects the parts to read of a window's blocks.
 #[derive(Debug)]
 pub(super) struct BlockSelector {
     /// `gains[part][frame]`: [`WindowCodec::part_gains`].
     pub(super) gains: Vec<Vec<f64>>,
     /// The largest of each part's gains.
     largest_gain: Vec<f64>,
-    /// Of each part: what the energy of samples is as a multiple of that of their coefficients.
+    /// For each part, the energy of samples as a multiple of the energy of their coefficients.
     energy_gain: Vec<f64>,
-    /// How many voxels err as one: in what a part and finer ones change, and last in the file's own errors.
+    /// Numbers of voxels that count as one (F of eq 27): for the error of leaving out each part and all finer parts,
+    /// and last for the file's own errors.
     alike: Vec<f64>,
-    /// Whether what the directory says of a part counts all finer ones, too.
+    /// Whether the directory's statistics of a part include all finer parts.
     cumulative: bool,
     frames: usize,
     pub(super) rule: Rule,
 }
 
-/// What may be left out.
+/// The rule for leaving out parts.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Rule {
-    /// Nothing.
+    /// Leaves out nothing.
     Nothing,
-    /// All parts, from the finest on, with which no sample of their block is further off.
+    /// Leaves out parts, from the finest on, while the error of every sample of the block stays within this limit.
     Within(f64),
-    /// Steps of at most this price.
+    /// Leaves out all steps up to this price.
     Cheap(Cost),
 }
 
-/// What a step costs in expected error for each byte that need not be read, in sixteenths of powers of two. With the
-/// same for all blocks, no other choice of steps reads fewer bytes for the same expected error.
+/// The price of a step: expected error per byte saved, as a logarithm to base 2 in sixteenths. If all blocks use the
+/// same price, no other choice of steps reads fewer bytes for the same expected error.
 type Cost = i32;
 
-/// Some level parts, from the finest on, of which none is left out without all before it.
+/// A number of level parts, from the finest on, that are left out together.
 #[derive(Debug, Clone, Copy, Default)]
 struct Step {
-    /// How many of a block's level parts are left out with it.
+    /// How many of a block's level parts are left out, counting all earlier steps.
     parts: usize,
-    /// What is then not read.
+    /// Stored bytes of these parts.
     bytes: u64,
-    /// The mean square of what they change.
+    /// The mean square over pixels of the change that they cause.
     change: f64,
     price: Cost,
 }
 
-/// A block as its entry and the view have it.
+/// A block's entry with its influence on a view.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockView<'a> {
     pub(super) entry: &'a BlockEntry,
@@ -81,22 +82,22 @@ pub(super) struct BlockView<'a> {
     pub(super) influence: BlockInfluence,
 }
 
-/// What some level parts of a block come to where they are left out.
+/// The change that left-out level parts of a block cause.
 #[derive(Debug, Clone, Copy, Default)]
 struct Alternative {
     largest: f64,
     energy: f64,
-    /// Of the samples, in the mean square over pixels.
+    /// The mean square over pixels of the change of samples.
     change: f64,
 }
 
-/// Finds what is cheapest to leave out of a window.
+/// Finds the parts of a window that are cheapest to leave out.
 #[derive(Debug)]
 pub(super) struct RateAllocator<'a> {
     selector: &'a BlockSelector,
     /// The mean square of the file's own errors.
     own: f64,
-    /// What the steps of each price come to.
+    /// The summed change of all steps of each price.
     changes: BTreeMap<Cost, f64>,
 }
 
@@ -105,7 +106,7 @@ impl<'a> RateAllocator<'a> {
         Self { selector, own: 0.0, changes: BTreeMap::new() }
     }
 
-    /// Goes on to a further block.
+    /// Adds the steps of a block.
     pub(super) fn add(&mut self, block: &BlockView<'_>) {
         self.own += self.selector.own(block);
         let mut before = 0.0;
@@ -115,8 +116,8 @@ impl<'a> RateAllocator<'a> {
         }
     }
 
-    /// The steps, those first that cost least for each byte, that together with the file's own errors are expected to
-    /// come to at most `allowed` in the mean square over pixels.
+    /// The rule that takes the cheapest steps, as long as they and the file's own errors have an expected mean square
+    /// over pixels of at most `allowed`.
     pub(super) fn within(&self, allowed: f64) -> Rule {
         let mut sum = self.own;
         let affordable = self.changes.iter().take_while(|(_, change)| {
@@ -128,7 +129,7 @@ impl<'a> RateAllocator<'a> {
 }
 
 impl BlockSelector {
-    /// Leaves nothing out yet.
+    /// A selector that leaves out nothing yet.
     pub(super) fn new(codec: &WindowCodec, config: &RenderConfig, grid: &Grid) -> Self {
         let gains = codec.part_gains();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
@@ -138,8 +139,8 @@ impl BlockSelector {
         Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
     }
 
-    /// What is read of a block: of one that is as good as zero nothing but what is missing, else all but the parts that
-    /// the rule leaves out.
+    /// The parts of a block to read: all but those that the rule leaves out. If zeros are within the limit, only the
+    /// mask of missing samples is read.
     pub(super) fn keep(&self, block: &BlockView<'_>) -> KeptParts {
         let (entry, stats) = (block.entry, block.entry.stats);
         let mut kept = KeptParts {
@@ -194,7 +195,7 @@ impl BlockSelector {
         }
     }
 
-    /// Leaves out a part, with which all that is left out comes to `without`.
+    /// Leaves out a part. `without` is the change caused by all left-out parts, this one included.
     fn leave_out(&self, part: &LevelPart, without: Alternative, block: &BlockView<'_>, kept: &mut KeptParts) {
         kept.certified = (block.entry.stats.reached + without.largest).next_up();
         kept.expected = self.own(block) + without.change;
@@ -205,7 +206,7 @@ impl BlockSelector {
         kept.entry.parts.retain(|p| p.kind != part.entry.kind);
     }
 
-    /// What parts come to with one more.
+    /// The change caused by the parts of `without` and one more part.
     fn with(&self, without: Alternative, part: &LevelPart, block: &BlockView<'_>) -> Alternative {
         let (level, stats) = (part.level, part.entry.stats);
         let energy = stats.energy * self.energy_gain[level];
@@ -219,7 +220,7 @@ impl BlockSelector {
         Alternative { largest: largest.next_up(), energy, change }
     }
 
-    /// What the file's own errors come to in the mean square over pixels.
+    /// The mean square over pixels of the file's own errors.
     fn own(&self, block: &BlockView<'_>) -> f64 {
         self.in_pixels(block.entry.stats.squared_error, self.alike[self.alike.len() - 1], block)
     }
@@ -228,8 +229,8 @@ impl BlockSelector {
         finite(energy / (self.frames * block.voxels) as f64 * block.influence.of(alike))
     }
 
-    /// The ways to leave out parts of a block, of which each costs more for a byte than the one before; none of a block
-    /// that is not seen.
+    /// The steps of leaving out a block's parts, by ascending price per byte; none for a block that influences no
+    /// pixel.
     fn steps(&self, block: &BlockView<'_>) -> Vec<Step> {
         let (mut steps, mut at, mut without) = (vec![Step::default()], Step::default(), Alternative::default());
         for part in levels(block.entry) {
@@ -261,19 +262,19 @@ impl BlockSelector {
     }
 }
 
-/// What it costs to go from one step to the next.
+/// The price of going from one step to the next.
 fn price(from: &Step, to: &Step) -> Cost {
     let bytes = to.bytes.saturating_sub(from.bytes).max(1) as f64;
     let each = ((to.change - from.change).max(0.0) / bytes).clamp(f64::MIN_POSITIVE, f64::MAX);
     (16.0 * libm::log2(each)).floor() as Cost
 }
 
-/// No sample of a block is further from zero.
+/// The largest absolute value of a block's samples, errors included.
 fn as_zero(entry: &BlockEntry) -> f64 {
     (magnitude((entry.stats.min, entry.stats.max)) + entry.stats.reached).next_up()
 }
 
-/// Energies may be infinite, and nothing of them may be seen.
+/// Maps infinite energies to the largest number, and infinite energies without influence (NaN) to 0.
 fn finite(change: f64) -> f64 {
     if change.is_nan() { 0.0 } else { change.min(f64::MAX) }
 }
@@ -294,7 +295,7 @@ fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
     entry.parts.iter().rev().filter_map(of).collect()
 }
 
-/// The difference between a whole entry and what is kept of it.
+/// The parts of a whole entry that `kept` lacks.
 pub(super) fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
     let parts = || entry.parts.iter().filter(|p| kept.part(p.kind).is_none());
     LeftOut {

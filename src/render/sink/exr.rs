@@ -1,9 +1,9 @@
-//! OpenEXR files of numbers as they are, if the program is built with them.
+//! OpenEXR files of unconverted numbers, if the feature `exr` is enabled.
 
-/// Whether it is.
+/// Whether the feature is enabled.
 pub(super) const IS_BUILT: bool = cfg!(feature = "exr");
 
-/// What is wrong where it is not.
+/// The message if it is not.
 pub(super) const NOT_BUILT: &str = "OpenEXR is not part of this build; .npy is";
 
 #[cfg(not(feature = "exr"))]
@@ -25,8 +25,8 @@ mod with_crate {
     use ::exr::prelude::*;
     use std::io::{self, Cursor, Write};
 
-    /// Writes one picture: float32 channels, compressed without loss. What made it is in the standard attributes
-    /// `software` and `comments`, a line for each name: attributes of other names have no order of their own.
+    /// Writes one picture: float32 channels with lossless compression. The provenance goes into the standard attributes
+    /// `software` and `comments`, one line for each name, because custom attributes have no fixed order.
     pub(in super::super) fn write(
         config: &SinkConfig,
         texts: &[(String, String)],
@@ -42,7 +42,7 @@ mod with_crate {
         let [width, height] = config.size;
         let channels = channels(config.pixel, picture);
         let layer = Layer::new((width, height), attributes, Encoding::SMALL_LOSSLESS, channels);
-        let mut bytes = Cursor::new(Vec::new()); // it is not written from its beginning to its end
+        let mut bytes = Cursor::new(Vec::new()); // the encoder seeks
         Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(cause)?;
         out.write_all(bytes.get_ref())
     }
@@ -58,7 +58,7 @@ mod with_crate {
         AnyChannels::sort(names.iter().enumerate().map(channel).collect())
     }
 
-    /// What the system said, if it was that.
+    /// The system's error, if there was one.
     fn cause(error: Error) -> io::Error {
         match error {
             Error::Io(e) => e,

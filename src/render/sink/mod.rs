@@ -1,5 +1,5 @@
-//! Finished pictures out: numbered files, one file for all, or a stream for another program. What made a picture goes
-//! with it where the format has a place for words.
+//! Output of finished pictures: numbered files, one file for all, or a stream to another program. Formats with text
+//! fields also store the provenance.
 
 mod exr;
 mod provenance;
@@ -10,6 +10,8 @@ mod stream;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::Annotation;
+use super::config::RenderConfig;
+use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
@@ -22,28 +24,28 @@ use std::sync::Arc;
 /// How pictures are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureFormat {
-    /// One PNG for each; in a stream one after the other.
+    /// One PNG for each picture; in a stream, one after the other.
     Png,
-    /// One OpenEXR file for each, of float32 numbers as in an array: Y, or R, G and B, and of light A. Only where the
-    /// program was built with it.
+    /// One OpenEXR file for each picture, of unconverted float32 numbers: Y for values, R, G and B for colours, and A
+    /// too for light. Needs the feature `exr`.
     Exr,
-    /// One NumPy array for all: float32 (frames, H, W) or, of colours and of light, (frames, H, W, 3) and (frames, H,
-    /// W, 4); uint8 (frames, H, W, 3) if colours were asked for.
+    /// One NumPy array for all pictures: float32 (frames, H, W) for values, (frames, H, W, 3) for colours and (frames,
+    /// H, W, 4) for light; uint8 (frames, H, W, 3) if a coloured array is requested.
     Npy,
     /// YUV4MPEG2, 4:4:4, full range: for video encoders and players.
     Y4m,
-    /// Three bytes a pixel, nothing else.
+    /// Raw frames: three bytes per pixel, no header.
     Rgb24,
-    /// Two little-endian bytes a pixel over the range, nothing else.
+    /// Raw frames: two little-endian bytes per pixel, spread over the range, no header.
     Gray16,
-    /// One PNG that shows all one after another, again and again.
+    /// One animated PNG of all pictures, in an endless loop.
     Apng,
-    /// One PNG with all in rows.
+    /// One PNG with all pictures in rows.
     Sheet,
 }
 
 impl PictureFormat {
-    /// The formats by their names, which are also the endings of files, but for that of a sheet.
+    /// The formats by name. The names are also the file extensions, except for the sheet.
     pub const NAMES: [(&'static str, Self); 8] = [
         ("png", Self::Png),
         ("npy", Self::Npy),
@@ -55,22 +57,22 @@ impl PictureFormat {
         ("exr", Self::Exr),
     ];
 
-    /// Whether all pictures go to one `path`.
+    /// Whether all pictures go to one file or stream at `path`.
     pub fn takes_all(self, path: &Path) -> bool {
         !matches!(self, Self::Png | Self::Exr) || path == Path::new(STANDARD)
     }
 
-    /// Whether its pixels may have 16 bits a channel instead of 8.
+    /// Whether the format is a kind of PNG, whose pixels may have 16 bits per channel instead of 8.
     pub fn is_png(self) -> bool {
         matches!(self, Self::Png | Self::Apng | Self::Sheet)
     }
 
-    /// Whether it holds numbers as they are, and not colours, unless these are asked for.
+    /// Whether the format holds unconverted numbers unless colours are requested.
     pub fn is_of_numbers(self) -> bool {
         matches!(self, Self::Npy | Self::Exr)
     }
 
-    /// An error if the program was built without what writes `path`.
+    /// An error if this build cannot write the format.
     pub fn check(self, path: &Path) -> Result<()> {
         if self == Self::Exr && !exr::IS_BUILT {
             return Err(Error::path(path, Note::with(exr::NOT_BUILT, Remedy::BuildWith("exr"))));
@@ -78,10 +80,10 @@ impl PictureFormat {
         Ok(())
     }
 
-    /// Bytes that a file of `pictures` takes while it is written.
+    /// Memory in bytes to write a file of `pictures` pictures of `size` pixels.
     ///
     /// # Errors
-    /// More pictures than a sheet has room for.
+    /// More pictures than fit on a sheet.
     pub fn memory(self, depth: Depth, size: [usize; 2], pictures: usize) -> Result<usize> {
         let pixels = |[width, height]: [usize; 2]| width.saturating_mul(height);
         let more = match (self, depth) {
@@ -91,49 +93,69 @@ impl PictureFormat {
             (Self::Exr, _) => pixels(size) * Pixel::Light.numbers() * size_of::<f32>(),
             _ => 0,
         };
-        Ok(Output::BUFFER + 2 * more) // and once more as it is compressed
+        Ok(Output::BUFFER + 2 * more) // pixels, and their compressed form
     }
 }
 
-/// Bits a channel of colours.
+/// Bits per colour channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Depth {
-    /// 8.
+    /// 8 bits.
     #[default]
     Eight,
-    /// 16; where all colours are greys, of one channel.
+    /// 16 bits; one channel only if all colours are greys.
     Sixteen,
 }
 
-/// What all pictures have in common.
+/// The settings of an output, shared by all pictures. [`SinkConfig::new`] gives the defaults; change them by struct
+/// update.
 #[derive(Debug, Clone)]
 pub struct SinkConfig {
-    /// How they are written.
+    /// The file format. Default: PNG.
     pub format: PictureFormat,
-    /// Width and height.
+    /// Width and height in pixels.
     pub size: [usize; 2],
-    /// Which view and which frame each picture is of.
+    /// View and frame of each picture. Default: all frames of the first view.
     pub shown: Vec<(usize, usize)>,
-    /// What made the pictures.
+    /// How the pictures were made. Default: by this library.
     pub provenance: Arc<Provenance>,
-    /// Frames a second, where the format says it.
+    /// Frames per second, for formats that store it. Default: 25.
     pub fps: u32,
-    /// What the numbers of a pixel are.
+    /// The kind of numbers in each pixel. Default: the kind of the scene and mode.
     pub pixel: Pixel,
-    /// Values to colours.
+    /// The map from values to colours.
     pub colours: Scale,
-    /// Bits of these in a PNG.
+    /// Bits per colour channel in a PNG. Default: 8.
     pub depth: Depth,
-    /// Whether an array holds colours instead of values.
+    /// Whether an array holds colours instead of values. Default: no.
     pub coloured_array: bool,
-    /// What is drawn into pictures that are in colours.
+    /// Annotations drawn into coloured pictures. Default: none.
     pub annotation: Option<Annotation>,
-    /// Replace existing files.
+    /// Whether to replace existing files. Default: no.
     pub force: bool,
 }
 
 impl SinkConfig {
-    /// What of a rendering is to be written.
+    /// The default settings for the pictures that [`render`](crate::render::render) makes of a scene.
+    pub fn new(scene: &dyn Scene, config: &RenderConfig, colours: Scale) -> Self {
+        let software = format!("wavesplat {}", env!("CARGO_PKG_VERSION"));
+        let size = config.size();
+        Self {
+            format: PictureFormat::Png,
+            size,
+            shown: config.frames.iter().map(|frame| (0, *frame)).collect(),
+            provenance: Arc::new(Provenance { software, size, ..Provenance::default() }),
+            fps: 25,
+            pixel: if scene.channels() > 1 { Pixel::Channels } else { config.mode.pixel() },
+            colours,
+            depth: Depth::Eight,
+            coloured_array: false,
+            annotation: None,
+            force: false,
+        }
+    }
+
+    /// The picture or the error bounds of a rendering, whichever this sink shows.
     fn shown_of<'a>(&self, rendered: &Rendered<'a>) -> Option<Picture<'a>> {
         match self.provenance.shows {
             Shows::Picture => Some(rendered.picture),
@@ -141,7 +163,7 @@ impl SinkConfig {
         }
     }
 
-    /// A picture in colours, and what is drawn into it.
+    /// A coloured picture with its annotations.
     fn image(&self, frame: usize, picture: Picture<'_>) -> Vec<Rgb> {
         let mut image = self.plain(picture);
         if let Some(annotation) = &self.annotation {
@@ -151,12 +173,12 @@ impl SinkConfig {
         image
     }
 
-    /// The same without what is drawn.
+    /// A coloured picture without annotations.
     fn plain(&self, picture: Picture<'_>) -> Vec<Rgb> {
         picture.chunks_exact(self.pixel.numbers()).map(|pixel| self.colours.colour_of_pixel(pixel)).collect()
     }
 
-    /// As [`Self::image`], with 16 bits a channel; what is drawn has 8.
+    /// The same as [`Self::image`], with 16 bits per channel; annotations have 8.
     fn deep_image(&self, frame: usize, picture: Picture<'_>) -> Vec<[u16; 3]> {
         let deep = |pixel| self.colours.exact_colour_of_pixel(pixel).map(|c| (c * 65535.0).round() as u16);
         let mut image: Vec<[u16; 3]> = picture.chunks_exact(self.pixel.numbers()).map(deep).collect();
@@ -170,26 +192,25 @@ impl SinkConfig {
     }
 }
 
-/// Where pictures go.
+/// The output of pictures.
 pub struct Sink {
     target: Target,
     config: SinkConfig,
 }
 
 enum Target {
-    /// One file or stream; what comes before the first picture is written with it, so that a request that cannot be
-    /// met leaves a pipe empty.
+    /// One file or stream. The header is written with the first picture, so that a failed request leaves a pipe empty.
     One { out: Box<Output>, begun: bool },
-    /// One file that moves.
+    /// One animated file.
     Animation(Animation),
-    /// One file that has room for all.
+    /// One file with all pictures in rows.
     Sheet(Box<Sheet>),
-    /// A file for each.
+    /// A file for each picture.
     Many(Numbered),
 }
 
 impl Sink {
-    /// Opens `path`: `-`, a file, or a pattern as `frame_%04d.png` that numbers files.
+    /// Opens `path`: `-` for standard output, a file, or a pattern such as `frame_%04d.png` for numbered files.
     pub fn open(path: &Path, config: SinkConfig) -> Result<Self> {
         if !config.format.takes_all(path) {
             let frames: Vec<usize> = config.shown.iter().map(|(_, frame)| *frame).collect();
@@ -209,7 +230,7 @@ impl Sink {
         Ok(Self { target, config })
     }
 
-    /// The files that pictures of some frames go to.
+    /// The files that the pictures of `frames` are written to.
     pub fn paths(path: &Path, format: PictureFormat, frames: &[usize]) -> Result<Vec<PathBuf>> {
         if format.takes_all(path) {
             return Ok(vec![path.into()]);
@@ -218,7 +239,7 @@ impl Sink {
         Ok(frames.iter().map(|frame| names.of(*frame)).collect())
     }
 
-    /// Writes what it shows of a frame, if there is such a thing.
+    /// Writes the picture that the sink shows of a frame, if there is one.
     pub fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
         let (config, frame) = (&self.config, rendered.frame);
         let Some(picture) = config.shown_of(rendered) else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! PNG files, still and moving.
+//! PNG files, still and animated.
 
 use super::{Depth, Picture, Pixel, Rendered, SinkConfig};
 use crate::base::error::{Error, Result};
@@ -17,7 +17,7 @@ pub(super) enum Samples {
 }
 
 impl Samples {
-    /// Those of all pictures of a sink.
+    /// The samples of a sink's pictures.
     pub(super) fn of(config: &SinkConfig) -> Self {
         match config.depth {
             Depth::Eight => Self::Rgb8,
@@ -26,7 +26,7 @@ impl Samples {
         }
     }
 
-    /// Bytes of a pixel.
+    /// Bytes per pixel.
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::Rgb8 => 3,
@@ -35,7 +35,7 @@ impl Samples {
         }
     }
 
-    /// The bytes of a pixel of such a colour.
+    /// The bytes of a pixel of this colour.
     pub(super) fn pixel(self, [r, g, b]: Rgb) -> Vec<u8> {
         match self {
             Self::Rgb8 => vec![r, g, b],
@@ -63,7 +63,7 @@ pub(super) fn samples(config: &SinkConfig, frame: usize, picture: Picture<'_>) -
     }
 }
 
-/// Writes one picture of such a size, from the bytes of its pixels.
+/// Writes one picture of `size` pixels, from the bytes of its pixels.
 pub(super) fn write(
     config: &SinkConfig,
     size: [usize; 2],
@@ -90,7 +90,7 @@ fn encoder<W: Write>(
     Ok(encoder)
 }
 
-/// A PNG that moves, again and again.
+/// An animated PNG that loops forever.
 pub(super) struct Animation {
     out: Shared,
     /// None before the first picture.
@@ -137,7 +137,7 @@ fn begin(
     encoder.write_header()
 }
 
-/// The encoder keeps what it writes to; here it is still at hand when that is done.
+/// A shared handle to the output. The encoder keeps its writer, but the output is still needed afterwards.
 #[derive(Clone)]
 struct Shared(Rc<RefCell<Output>>);
 
@@ -151,7 +151,7 @@ impl Write for Shared {
     }
 }
 
-/// What the system said, whose kind tells a broken pipe from other failures.
+/// The system's error, whose kind tells a broken pipe from other failures.
 fn cause(error: png::EncodingError) -> io::Error {
     match error {
         png::EncodingError::IoError(e) => e,

@@ -1,4 +1,4 @@
-//! What made a picture, in words that travel with it.
+//! The provenance of a picture: texts stored with it that tell how it was made.
 
 use super::SinkConfig;
 use crate::render::{Rendered, ViewReport};
@@ -6,19 +6,19 @@ use serde::Serialize;
 use serde_json::Value;
 use std::fmt::Display;
 
-/// What the pictures of a run were made with: no path, no date, nothing that threads or memory change. Keys are named
-/// as the options are where there is one, and text is as these take it.
+/// How the pictures of a run were made. It has no paths and no dates, and does not depend on threads or memory. Keys
+/// have the names of the options, and values have the form that the options accept.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Provenance {
     /// Name and version of the program.
     pub software: String,
     /// Whether coefficients or frames were splatted.
     pub method: &'static str,
-    /// What became of what lies along a ray.
+    /// How the values along a ray are combined.
     pub mode: &'static str,
-    /// What a pixel means, of projections.
+    /// The quantity that a pixel shows; projections only.
     pub quantity: Option<&'static str>,
-    /// What of it is shown: the picture, or the certified error of its pixels.
+    /// Whether the file shows the picture or the certified error of its pixels.
     pub shows: Shows,
     /// Width and height in pixels.
     pub size: [usize; 2],
@@ -26,31 +26,31 @@ pub struct Provenance {
     pub tau: f64,
     /// Standard deviation of the kernel in world units.
     pub sigma: f64,
-    /// The splat error that was asked for; what each view states is that view's.
+    /// The requested splat error. The stated error of each view is stored with the view.
     pub splat_error: f64,
-    /// The share of the range that pictures may be off.
+    /// The tolerance of pictures, as a share of the range.
     pub tolerance: Option<f64>,
-    /// Which error that limits.
+    /// The error that the tolerance limits.
     pub error: Option<&'static str>,
-    /// No sample that was splatted is further from the source's, as far as that is known before one is.
+    /// Error bound of every splatted sample, if it is known before splatting.
     pub sample_error: Option<f64>,
-    /// Only these voxels.
+    /// The rendered region of voxels.
     pub region: Option<String>,
     /// The value that means "missing" in frames.
     pub missing_value: Option<f64>,
     /// The coefficient file's id.
     pub file_id: Option<String>,
-    /// What it promises.
+    /// The error bound that the file promises.
     pub file_promise: Option<String>,
-    /// The largest error of any of its samples.
+    /// The largest error of any sample of the file.
     pub file_reached: Option<f64>,
-    /// Name of the map that values have the colours of.
+    /// Name of the colour map of values.
     pub colormap: Option<String>,
-    /// Name of what turned samples into colours.
+    /// Name of the transfer function that turned samples into colours.
     pub transfer_function: Option<String>,
     /// Opacities of values along the ray.
     pub opacity: Option<String>,
-    /// World units of a path that has such an opacity.
+    /// Length of the path that has these opacities, in world units.
     pub opacity_unit: Option<f64>,
     /// The values of the first and the last colour.
     pub range: Option<(f64, f64)>,
@@ -60,22 +60,22 @@ pub struct Provenance {
     pub background: Option<String>,
     /// Numbers of the frames.
     pub frames: Vec<usize>,
-    /// The times of these, or empty.
+    /// Times of the frames, or empty.
     pub times: Vec<f64>,
 }
 
-/// What of a rendering a sink shows.
+/// The result of a rendering that a sink shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shows {
-    /// The quantity asked for.
+    /// The picture in the requested quantity.
     #[default]
     Picture,
-    /// The bound on the error of every pixel.
+    /// The error bound of every pixel.
     CertifiedError,
 }
 
-/// What is before the names of all but standard ones.
+/// The prefix of all nonstandard names.
 const PREFIX: &str = "wavesplat:";
 
 impl SinkConfig {
@@ -89,7 +89,7 @@ impl SinkConfig {
         texts
     }
 
-    /// Names and values for a file with all pictures: ASCII, in an order that never changes.
+    /// Names and values for a file with all pictures: ASCII, in a fixed order.
     pub(super) fn texts_of_all(&self, rendered: &Rendered<'_>) -> Vec<(String, String)> {
         self.texts(&self.shown, rendered.views)
     }
@@ -105,7 +105,7 @@ impl SinkConfig {
         std::iter::once(("Software".into(), self.provenance.software.clone())).chain(named).collect()
     }
 
-    /// Which frames, and of a single one its time.
+    /// The frame numbers, and the time of a single frame.
     fn of_frames(&self, shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
         let mut frames: Vec<usize> = shown.iter().map(|(_, frame)| *frame).collect();
         frames.dedup();
@@ -115,7 +115,7 @@ impl SinkConfig {
     }
 }
 
-/// What is to be said of the views that are shown; where they differ, one after another.
+/// The settings of the views that are shown. If views differ in a setting, their values follow one another.
 fn of_views(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
     let mut numbers: Vec<usize> = shown.iter().map(|(view, _)| *view).collect();
     numbers.dedup();
@@ -136,7 +136,7 @@ fn of_views(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str
     ]
 }
 
-/// A value as options take it; of none nothing.
+/// A value in the form that options accept; empty for null.
 fn text(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
@@ -150,7 +150,7 @@ fn joined(values: &[impl Display]) -> String {
     values.iter().map(ToString::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// Ascending numbers as a:b:step where they are evenly spaced, or one by one.
+/// Ascending numbers, as a:b:step if they are evenly spaced, else one by one.
 fn spans(frames: &[usize]) -> String {
     match *frames {
         [first, second, .., last] if frames.windows(2).all(|pair| pair[1] - pair[0] == second - first) => {
@@ -166,15 +166,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_said_as_they_are_asked_for() {
-        let said = [&[7][..], &[2, 3], &[0, 1, 2, 3], &[1, 9, 17], &[1, 2, 4]].map(spans);
-        assert_eq!(said, ["7", "2,3", "0:4", "1:18:8", "1,2,4"]);
+    fn frames_have_the_form_of_the_option() {
+        let texts = [&[7][..], &[2, 3], &[0, 1, 2, 3], &[1, 9, 17], &[1, 2, 4]].map(spans);
+        assert_eq!(texts, ["7", "2,3", "0:4", "1:18:8", "1,2,4"]);
     }
 
     #[test]
-    fn values_are_said_as_options_take_them() {
+    fn values_have_the_form_of_options() {
         let value = serde_json::json!({"a": [48, 40], "b": [0.1, -2.0], "c": null, "d": "x", "e": 1e-9});
-        let said = ["a", "b", "c", "d", "e"].map(|key| text(&value[key]));
-        assert_eq!(said, ["48,40", "0.1,-2.0", "", "x", "1e-9"]);
+        let texts = ["a", "b", "c", "d", "e"].map(|key| text(&value[key]));
+        assert_eq!(texts, ["48,40", "0.1,-2.0", "", "x", "1e-9"]);
     }
 }

@@ -1,11 +1,11 @@
-//! All pictures of a run in one: a contact sheet.
+//! A contact sheet: all pictures of a run in one file.
 
 use super::png::{self, Samples};
 use super::{Picture, Rendered, SinkConfig};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::Output;
 
-/// More pixels a side than most programs show.
+/// Largest side in pixels; most programs show no larger pictures.
 const MOST_SIDE: usize = 1 << 15;
 
 /// Pictures in rows, in their order.
@@ -14,9 +14,9 @@ pub(super) struct Sheet {
     out: Output,
     /// Width and height in pixels.
     size: [usize; 2],
-    /// The bytes of its pixels; empty before the first picture.
+    /// The bytes of the sheet's pixels; empty before the first picture.
     samples: Vec<u8>,
-    /// What made it.
+    /// The provenance of the pictures.
     texts: Vec<(String, String)>,
     placed: usize,
 }
@@ -49,7 +49,7 @@ impl Sheet {
     }
 }
 
-/// Width and height in pixels of so many pictures in rows that are about as long together as each is.
+/// Width and height in pixels of a nearly square sheet of `pictures` pictures.
 ///
 /// # Errors
 /// A side that is too long.
@@ -62,8 +62,9 @@ pub(super) fn size([width, height]: [usize; 2], pictures: usize) -> Result<[usiz
         return Ok(size);
     }
     let [across, down] = size;
-    let what =
-        format!("a sheet of {pictures} pictures would have {across}x{down} pixels, of at most {MOST_SIDE} a side");
+    let what = format!(
+        "a sheet of {pictures} pictures would have {across}x{down} pixels; each side may have at most {MOST_SIDE}"
+    );
     Err(Error::setting("format", Note::with(what, Remedy::Adjust(&["size", "frames"]))))
 }
 

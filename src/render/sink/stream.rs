@@ -7,7 +7,7 @@ use crate::colour::Rgb;
 use crate::render::{Picture, Pixel, Rendered};
 use std::io::{self, Write};
 
-/// Writes what comes before the first picture of a stream.
+/// Writes the header of a stream.
 pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
     let [width, height] = config.size;
     match config.format {
@@ -57,7 +57,7 @@ fn write_yuv(mut pixels: Vec<Rgb>, out: &mut impl Write) -> io::Result<()> {
     (0..3).try_for_each(|plane| out.write_all(&pixels.iter().map(|p| p[plane]).collect::<Vec<u8>>()))
 }
 
-/// Full-range BT.601, what players assume of a stream that does not say more.
+/// Full-range BT.601, the default of players for streams without colour information.
 fn yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
     let [r, g, b] = [r, g, b].map(f64::from);
     let y = 0.299 * r + 0.587 * g + 0.114 * b;

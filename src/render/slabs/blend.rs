@@ -1,44 +1,45 @@
-//! How the slabs along a ray are combined, front to back: composited (eq 31; the operator "over" of
-//! [PorterDuff](crate::bibliography)), or the largest of them.
+//! Combines the slabs along a ray, front to back: by compositing (eq 31; the operator "over" of
+//! [PorterDuff](crate::bibliography)) or by their maximum.
 
 use super::medium::Medium;
 
-/// A way to make one pixel of slabs.
+/// A way to combine the slabs of one pixel.
 pub(in crate::render) trait Blend: Sync {
-    /// A pixel so far.
+    /// The state of a pixel while slabs are added.
     type Pixel: Copy + Send + Sync;
 
-    /// A slab counts where it is this share of its thickness long.
+    /// A slab counts at pixels where its ray length is more than this share of its thickness.
     const LEAST: f64;
 
-    /// Before the first slab.
+    /// The state before the first slab.
     const EMPTY: Self::Pixel;
 
-    /// Adds a slab behind those before: the mean of its values at a pixel, and the world units that it is thick there.
+    /// Adds a slab behind the earlier ones: the mean of its values at a pixel, and the length of the ray in it, in
+    /// world units.
     fn add(&self, pixel: &mut Self::Pixel, value: f64, length: f64);
 
-    /// Whether no slab behind can be seen.
+    /// Whether the pixel hides all slabs behind.
     fn is_closed(pixel: &Self::Pixel) -> bool;
 
-    /// Whether values of such a range can be seen.
+    /// Whether any value in this range is visible.
     fn shows(&self, range: (f64, f64)) -> bool;
 
-    /// The numbers of finished pixels.
+    /// Turns finished pixels into numbers.
     fn finish(pixels: Vec<Self::Pixel>) -> Vec<f32>;
 }
 
-/// Emission and absorption: light of each slab through those before it (eq 30 and 31).
+/// Emission and absorption: the light of each slab passes through the slabs before it (eq 30 and 31).
 pub(in crate::render) struct Composite {
     pub(in crate::render) medium: Medium,
-    /// World units of a path that has such opacities.
+    /// Length of the path that has the transfer function's opacities, in world units.
     pub(in crate::render) unit: f64,
 }
 
-/// What comes through of less is not seen: an eighth of a level of an 8-bit picture.
+/// Pixels with less transmittance are opaque: the rest is an eighth of a level of an 8-bit picture.
 const CLOSED: f32 = 1.0 / 2048.0;
 
 impl Blend for Composite {
-    /// Red, green and blue of the light, and what comes through.
+    /// Red, green and blue of the light, and the transmittance.
     type Pixel = [f32; 4];
 
     const LEAST: f64 = 0.01;
@@ -48,8 +49,8 @@ impl Blend for Composite {
         let (extinction, [r, g, b]) = (self.medium.extinction(value), self.medium.colour(value));
         if extinction > 0.0 && !Self::is_closed(pixel) {
             let through = pixel[3] * libm::expf(-extinction * (length / self.unit) as f32);
-            let seen = pixel[3] - through;
-            *pixel = [pixel[0] + seen * r, pixel[1] + seen * g, pixel[2] + seen * b, through];
+            let share = pixel[3] - through;
+            *pixel = [pixel[0] + share * r, pixel[1] + share * g, pixel[2] + share * b, through];
         }
     }
 
@@ -67,11 +68,11 @@ impl Blend for Composite {
     }
 }
 
-/// The largest value.
+/// The maximum along the ray.
 pub(in crate::render) struct Largest;
 
 impl Blend for Largest {
-    /// NaN before any.
+    /// The maximum so far; NaN before the first slab.
     type Pixel = f32;
 
     const LEAST: f64 = 0.01;

@@ -1,4 +1,4 @@
-//! How a view is cut into slabs (eq 29), and how much memory they take.
+//! Cuts a view into slabs (eq 29), and computes their memory.
 
 use super::visible::Visible;
 use crate::base::error::{Error, Result};
@@ -7,35 +7,35 @@ use crate::render::config::RenderConfig;
 use crate::render::splat::Slab;
 use crate::render::splat::ViewSetup;
 
-/// Planes of slabs that are gathered together, about: they share the weights of a pixel.
+/// Approximate number of planes of slabs that are gathered together, so that they share the weights of a pixel.
 pub(in crate::render) const TOGETHER: usize = 64;
-/// More slabs than this are refused.
+/// The largest number of slabs.
 const MOST_SLABS: usize = 1 << 16;
-/// Standard deviations of the kernel in front of the first voxels and behind the last ones that slabs are cut in, too.
+/// The slabs extend this many standard deviations of the kernel in front of the first voxels and behind the last.
 const TAIL: f64 = 3.0;
 
 /// The slabs of a view.
 #[derive(Debug)]
 pub(in crate::render) struct Slabs {
-    /// An eye for each, from front to back.
+    /// A view setup for each slab, from front to back.
     pub(in crate::render) setups: Vec<ViewSetup>,
-    /// World units of each.
+    /// Thickness of each slab in world units.
     pub(in crate::render) thickness: f64,
 }
 
-/// The depths between which a view is cut.
+/// The depths of the first and the last cut.
 fn ends(setup: &ViewSetup, config: &RenderConfig) -> [f64; 2] {
     let [nearest, farthest] = setup.camera.depths_of(&setup.grid.crop(&setup.clip));
     [nearest - TAIL * config.kernel.sigma, farthest + TAIL * config.kernel.sigma]
 }
 
-/// How many slabs a view is to be cut into.
+/// The number of slabs of a view.
 pub(in crate::render) fn count(setup: &ViewSetup, config: &RenderConfig) -> usize {
     let [from, to] = ends(setup, config);
     config.mode.slabs().unwrap_or(((to - from) / setup.grid.largest_spacing()).ceil().max(1.0) as usize)
 }
 
-/// Cuts the volume into slabs across the view direction. The first and the last one have no end.
+/// Cuts the volume into slabs perpendicular to the view direction. The first and the last slab are unbounded.
 pub(in crate::render) fn cut(setup: &ViewSetup, config: &RenderConfig) -> Result<Slabs> {
     let ([from, to], count) = (ends(setup, config), count(setup, config));
     if !(1..=MOST_SLABS).contains(&count) {
@@ -53,13 +53,13 @@ pub(in crate::render) fn cut(setup: &ViewSetup, config: &RenderConfig) -> Result
     Ok(Slabs { setups, thickness })
 }
 
-/// Bytes that the slabs of a view take, and to tell which of their tiles can be seen.
+/// Bytes of the slabs of a view, and of the table of their visible tiles.
 pub(in crate::render) fn bytes(setup: &ViewSetup, config: &RenderConfig) -> usize {
     let tiles: usize = setup.camera.size.iter().map(|pixels| pixels.div_ceil(setup.backend.tile())).product();
     count(setup, config) * (tiles * Visible::BYTES + size_of::<ViewSetup>()) + setup.blocks.len() * Visible::BLOCK_BYTES
 }
 
-/// Slabs that a block can reach into, and bytes that each of its voxels takes in each of so many.
+/// The largest number of slabs that a block reaches, and the bytes of each of its voxels' shares in the slabs.
 pub(in crate::render) fn of_block(setups: &[ViewSetup], block: &Region) -> (usize, usize) {
     let Some(ViewSetup { slab: Some(slab), camera, grid, .. }) = setups.first() else { return (1, 0) };
     let [nearest, farthest] = camera.depths_of(&Grid { dims: block.dims(), ..*grid });

@@ -1,4 +1,4 @@
-//! What a batch of frames adds to slabs: its own planes, and the lengths l of rays (eq 30).
+//! The planes of a frame batch in slabs: the batch's own planes, and one of the ray lengths l (eq 30).
 
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
@@ -9,12 +9,12 @@ use crate::render::splat::ViewSetup;
 use crate::wavelet::Lane;
 use std::collections::HashSet;
 
-/// The blocks of a batch, with the weights of all their voxels in a plane of its own.
+/// The blocks of a batch with one more plane, which holds the weights of all their voxels.
 pub(in crate::render) struct WithLengths<'a> {
     batch: &'a dyn FrameBatch,
     pub(in crate::render) layout: Layout,
     blocks: BlockGrid,
-    /// Those that have terms.
+    /// The selected blocks, which have values.
     with_terms: HashSet<usize>,
 }
 
@@ -25,7 +25,7 @@ impl<'a> WithLengths<'a> {
         Self { batch, layout, blocks: setup.blocks, with_terms }
     }
 
-    /// Some layers of a tile, of which these planes may have sums.
+    /// The layers of a tile. `used` lists the planes that may have sums, counted through all layers.
     pub(in crate::render) fn layers(&self, used: &[usize], layers: usize) -> Vec<Layer<'_>> {
         let count = self.layout.planes();
         let layer = |n: usize| {
@@ -41,13 +41,13 @@ impl<'a> WithLengths<'a> {
 /// A slab of a tile.
 pub(in crate::render) struct Layer<'a> {
     layout: Layout,
-    /// None if it holds nothing.
+    /// `None` if all sums are zero.
     inverse: Option<Box<Inverse<'a>>>,
     frames: Vec<Lane>,
 }
 
 impl Layer<'_> {
-    /// Calls `each(frame, sums, lengths)` for all frames at some pixels; overwrites their planes.
+    /// Calls `each(frame, sums, lengths)` for all frames at some pixels. Overwrites their planes.
     pub(in crate::render) fn means(&mut self, planes: &mut [Lane], mut each: impl FnMut(usize, &Lane, &Lane)) {
         let Self { layout, inverse: Some(inverse), frames } = self else { return };
         let lengths = lengths(layout, planes);
@@ -59,7 +59,7 @@ impl Layer<'_> {
     }
 }
 
-/// Of each frame the lengths of some pixels, less what is missing.
+/// For each frame, the ray lengths at some pixels without missing samples.
 fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
     let all = planes[layout.planes() - 1];
     if !layout.absent {
@@ -74,6 +74,11 @@ fn lengths(layout: &Layout, planes: &[Lane]) -> Vec<Lane> {
 }
 
 impl BlockSource for WithLengths<'_> {
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        let with_terms: Vec<usize> = blocks.iter().copied().filter(|block| self.with_terms.contains(block)).collect();
+        self.batch.fetch(&with_terms)
+    }
+
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
         let planes = self.with_terms.contains(&block).then(|| self.batch.planes(block)).transpose()?;
         let ones = UnitValues(self.blocks.region(block).voxels());
@@ -81,7 +86,7 @@ impl BlockSource for WithLengths<'_> {
     }
 }
 
-/// A block, and a 1 for each of its voxels in the last plane.
+/// A block with a 1 for each of its voxels in the last plane.
 struct BlockWithLengths<'a> {
     planes: Option<Box<dyn BlockPlanes + 'a>>,
     ones: UnitValues,
@@ -93,10 +98,10 @@ impl BlockPlanes for BlockWithLengths<'_> {
         self.ones.voxels()
     }
 
-    fn plane<'a>(&'a self, plane: usize, room: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+    fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         match &self.planes {
-            _ if plane == self.last => self.ones.plane(plane, room),
-            Some(planes) => planes.plane(plane, room),
+            _ if plane == self.last => self.ones.plane(plane, scratch),
+            Some(planes) => planes.plane(plane, scratch),
             None => Ok(PlaneValues::Nothing),
         }
     }

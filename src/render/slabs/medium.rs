@@ -2,15 +2,15 @@
 
 use crate::colour::TransferFunction;
 
-/// What is along the rays: colour and extinction for every value.
+/// The medium along the rays: colour and extinction of every value.
 #[derive(Debug, Clone)]
 pub(in crate::render) struct Medium {
     colours: Table<3>,
-    /// Of a path of a unit.
+    /// Extinctions of a path of unit length.
     extinctions: Table<1>,
 }
 
-/// No opacity is larger: what then comes through is less than half a level of an 8-bit picture.
+/// The largest opacity: the rest is less than half a level of an 8-bit picture.
 const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
 
 impl Medium {
@@ -32,14 +32,14 @@ impl Medium {
         self.extinctions.at(value)[0]
     }
 
-    /// Whether no value from `lo` to `hi` can be seen.
+    /// Whether all values from `lo` to `hi` are transparent.
     pub(in crate::render) fn is_clear(&self, (lo, hi): (f64, f64)) -> bool {
-        let place = |value: f64| self.extinctions.place(value);
-        self.extinctions.entries[place(lo).floor() as usize..=place(hi).ceil() as usize].iter().all(|e| e[0] == 0.0)
+        let index = |value: f64| self.extinctions.index(value);
+        self.extinctions.entries[index(lo).floor() as usize..=index(hi).ceil() as usize].iter().all(|e| e[0] == 0.0)
     }
 }
 
-/// A function at even steps; between them it is taken to be straight, beyond its ends constant.
+/// A function tabulated at even steps, with linear interpolation; constant beyond its ends.
 #[derive(Debug, Clone)]
 struct Table<const N: usize> {
     first: f64,
@@ -57,14 +57,14 @@ impl<const N: usize> Table<N> {
         Self { first: lo, per_value: 1.0 / step, entries }
     }
 
-    fn place(&self, value: f64) -> f64 {
+    fn index(&self, value: f64) -> f64 {
         ((value - self.first) * self.per_value).clamp(0.0, (ENTRIES - 1) as f64)
     }
 
     fn at(&self, value: f64) -> [f32; N] {
-        let place = self.place(value);
-        let n = (place as usize).min(ENTRIES - 2);
-        let (share, from, to) = ((place - n as f64) as f32, &self.entries[n], &self.entries[n + 1]);
+        let index = self.index(value);
+        let n = (index as usize).min(ENTRIES - 2);
+        let (share, from, to) = ((index - n as f64) as f32, &self.entries[n], &self.entries[n + 1]);
         std::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
     }
 }
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_of_a_unit_has_the_opacity_that_was_asked_for() {
+    fn a_path_of_unit_length_has_the_requested_opacity() {
         let grey = TransferFunction::open("grey").expect("a map").over((10.0, 20.0)).expect("a range");
         let medium = Medium::new(&grey);
         for (value, opacity) in [(10.0, 0.0), (12.5, 0.25), (15.0, 0.5), (19.0, 0.9), (25.0, MOST_OPAQUE), (0.0, 0.0)] {
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_value_shows_is_clear() {
+    fn ranges_without_opacity_are_clear() {
         let grey = TransferFunction::open("grey").expect("a map");
         let band = grey.with_opacity(&[(0.4, 0.0), (0.5, 1.0), (0.6, 0.0)]).expect("points");
         let medium = Medium::new(&band);

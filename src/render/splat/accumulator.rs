@@ -1,4 +1,4 @@
-//! A band of a picture while blocks are splatted into it, and its tiles once it has them all.
+//! A band of a picture that accumulates blocks, and its tiles after the last block.
 
 use super::backend::SplatBackend;
 use super::band::{Band, SplatStats, splat_in_batches};
@@ -27,7 +27,7 @@ enum BandSums<'a> {
 }
 
 impl<'a> BandAccumulator<'a> {
-    /// Some rows of a picture with all planes at zero.
+    /// A band of `rows` of a picture with all planes at zero.
     pub(in crate::render) fn new(setup: &'a ViewSetup, rows: Range<usize>, layout: &Layout) -> Self {
         let (width, planes) = (setup.camera.size[0], layout.planes());
         let tile = |rect| Tile::new(rect, planes, layout.order);
@@ -40,7 +40,7 @@ impl<'a> BandAccumulator<'a> {
         Self { band: Band { setup, rows }, planes, sums }
     }
 
-    /// Calls `finish` for every tile with its pixels in some pictures as large as the whole.
+    /// Calls `finish` for every tile, with its pixels in `pictures`, which have the size of the whole picture.
     pub(in crate::render) fn finish<T: Send>(
         &self,
         pictures: &mut [T],
@@ -49,8 +49,8 @@ impl<'a> BandAccumulator<'a> {
         Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
     }
 
-    /// The same for the same rows of several pictures that look alike, layers one behind the other: of every tile first
-    /// those that are `wanted` of the first few layers together, then of the next.
+    /// The same for layers, one behind another, with the same rows and backend. For every tile, calls `finish` with the
+    /// `wanted` layers among the first `together` layers, then among the next, and so on.
     pub(in crate::render) fn finish_layers<T: Send>(
         layers: &[Self],
         together: usize,
@@ -77,7 +77,7 @@ impl<'a> BandAccumulator<'a> {
         });
     }
 
-    /// For every row of tiles its rows of every picture.
+    /// For every row of tiles, its rows of every picture.
     fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
         let [width, height] = self.band.setup.camera.size;
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
@@ -90,11 +90,11 @@ impl<'a> BandAccumulator<'a> {
     }
 }
 
-/// A tile that has all its blocks, in one layer or more.
+/// A tile after its last block, with one or more layers.
 pub(in crate::render) struct ResolvedTile<'a> {
     pub(in crate::render) rect: &'a TileRect,
     pub(in crate::render) layers: usize,
-    /// Of a layer.
+    /// Planes of each layer.
     planes: usize,
     sums: TileSums<'a>,
 }
@@ -105,7 +105,7 @@ enum TileSums<'a> {
 }
 
 impl<'a> ResolvedTile<'a> {
-    /// The tile with such a number in some layers that look alike.
+    /// Tile `number` of layers with the same rows and backend.
     fn new(layers: &[&'a BandAccumulator<'a>], rect: &'a TileRect, number: usize) -> Self {
         let (mut tiles, mut cells) = (Vec::new(), Vec::new());
         for layer in layers {
@@ -133,18 +133,18 @@ impl<'a> ResolvedTile<'a> {
         }
     }
 
-    /// The planes of all layers at `count` pixels from `first` on, into the first lanes of `planes`.
+    /// Loads the planes of all layers at `count` pixels from `first` on into the first lanes of `planes`.
     pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
             TileSums::Tiles(tiles) => {
-                let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // of none there is nothing to load
+                let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // without planes there is nothing to load
                 tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
             }
             TileSums::Gather(gather) => gather.load(first, count, planes),
         }
     }
 
-    /// The same where there is one plane only.
+    /// The same for a tile with one plane.
     pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut planes = [Lane::default()];
         match &mut self.sums {
@@ -155,7 +155,7 @@ impl<'a> ResolvedTile<'a> {
     }
 }
 
-/// The rows of some pictures that a row of tiles is in.
+/// The rows of pictures that belong to a row of tiles.
 pub(in crate::render) struct Pixels<'a, T> {
     planes: Vec<&'a mut [T]>,
     width: usize,
@@ -163,21 +163,21 @@ pub(in crate::render) struct Pixels<'a, T> {
 }
 
 impl<T> Pixels<'_, T> {
-    /// Neighbouring pixels of a row of a picture.
+    /// `count` neighbouring pixels in a row of a picture.
     pub(in crate::render) fn at(&mut self, picture: usize, [x, y]: [usize; 2], count: usize) -> &mut [T] {
         &mut self.planes[picture][(y - self.top) * self.width + x..][..count]
     }
 }
 
 impl<T: Copy> Pixels<'_, T> {
-    /// Puts neighbouring pixels of a row into a picture.
+    /// Stores neighbouring pixels in a row of a picture.
     pub(in crate::render) fn put(&mut self, picture: usize, [x, y]: [usize; 2], pixels: &[T]) {
         self.at(picture, [x, y], pixels.len()).copy_from_slice(pixels);
     }
 }
 
-/// Splats blocks in order, `batch` at a time, each into all bands that see it. A block is decoded once for all bands
-/// that take footprints, and once for all that have a lattice.
+/// Splats blocks in order, `batch` at a time, each into all bands that it reaches. A block is decoded once for all
+/// bands that take footprints, and once for all bands that have a lattice.
 pub(in crate::render) fn splat(
     accumulators: &mut [BandAccumulator<'_>],
     blocks: (&[usize], usize),

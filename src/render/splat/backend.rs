@@ -1,4 +1,4 @@
-//! The seam behind which a view is splatted: which backend a view takes, and what that backend needs.
+//! The interface to the splat backends: chooses the backend of a view, and answers questions about it.
 //!
 //! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
 //! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
@@ -12,25 +12,25 @@ use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// How the voxels of a view become pixels.
+/// The way in which voxels become pixels.
 #[derive(Debug, Clone)]
 pub(in crate::render) enum SplatBackend {
     /// Every voxel adds its footprint to the pixels that it covers.
     Footprints,
-    /// Voxels are spread to the cells of the view's sheared lattice, and pixels gather from these.
+    /// Voxels are spread to the cells of the view's sheared lattice, and pixels gather from the cells.
     Lattice(Arc<Lattice>),
 }
 
 /// The footprints of a view at the configured splat error.
 ///
-/// Where pictures are certified, weights may be as small as the background's, so cuts are tighter.
+/// For certified pictures, the cut is tighter, because weights may be as small as the background threshold.
 pub(super) fn footprint_method(config: &RenderConfig) -> Method {
     let share = if config.certify && config.quantity == Quantity::Mean { BACKGROUND } else { 1.0 };
     splat_method(config.quantity, share * config.splat_error)
 }
 
 impl SplatBackend {
-    /// The backend of a view, and the method that reports name. Certified pictures take footprints.
+    /// Chooses the backend of a view, and the method named in reports. Certified pictures take footprints.
     pub(super) fn choose(
         config: &RenderConfig,
         volume: (&Grid, &Region),
@@ -72,7 +72,7 @@ impl SplatBackend {
         }
     }
 
-    /// Sums of a plane in a band of so many pixels, at most.
+    /// An upper bound of the sums of a plane in a band of `width` x `rows` pixels.
     pub(in crate::render) fn band_sums(&self, width: usize, rows: usize) -> usize {
         match self {
             Self::Footprints => width * rows.next_multiple_of(TILE),
@@ -80,7 +80,7 @@ impl SplatBackend {
         }
     }
 
-    /// Numbers that a thread holds while it splats a block, or reads a tile with so many planes.
+    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         match self {
             Self::Footprints => 0,

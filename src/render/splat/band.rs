@@ -1,5 +1,5 @@
-//! Bands of pictures take in blocks: read in batches, in file order, so that sums depend neither on threads nor on
-//! memory.
+//! Splats blocks into bands of pictures. Blocks are read in batches, in file order, so that sums depend neither on
+//! threads nor on memory.
 
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// Some rows of the picture of a view.
+/// A band of rows of a view's picture.
 #[derive(Clone)]
 pub(super) struct Band<'a> {
     pub(super) setup: &'a ViewSetup,
@@ -16,20 +16,20 @@ pub(super) struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Whether a block is to be splatted here.
+    /// Whether a block must be splatted into this band.
     pub(super) fn sees(&self, block: usize) -> bool {
         self.setup.sees(block, &self.rows)
     }
 }
 
-/// What splatting some blocks took.
+/// Counts and times of splatting blocks.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::render) struct SplatStats {
     /// Blocks that were read.
     pub(in crate::render) blocks: u64,
-    /// Nonzero coefficients in them.
+    /// Nonzero coefficients in these blocks.
     pub(in crate::render) coefficients: u64,
-    /// Stored bytes that were read of them.
+    /// Stored bytes that were read of these blocks.
     pub(in crate::render) bytes: u64,
     /// Time spent reading and decoding.
     pub(in crate::render) decode: Duration,
@@ -49,30 +49,31 @@ impl std::ops::AddAssign for SplatStats {
 
 /// Bands of several views that one backend splats together, so that a block is decoded once for all.
 pub(super) trait BandGroup: Sync {
-    /// A block, ready to be added to the bands that see it.
+    /// A block that is prepared for the bands that it reaches.
     type Block<'b>: Send + Sync;
 
     /// The bands.
     fn bands(&self) -> &[Band<'_>];
 
-    /// Makes a block ready. Called by several threads.
+    /// Prepares a block. Called by several threads.
     fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<Self::Block<'b>>;
 
     /// Adds blocks in order.
     fn add(&mut self, blocks: &[Self::Block<'_>]) -> Result<()>;
 }
 
-/// Splats those of `blocks` that a band sees, in order, `batch` at a time.
+/// Splats the blocks that reach any band, in order, `batch` at a time.
 pub(super) fn splat_in_batches(
     group: &mut impl BandGroup,
     (blocks, batch): (&[usize], usize),
     source: &dyn BlockSource,
 ) -> Result<SplatStats> {
-    let is_seen = |block: &usize| group.bands().iter().any(|band| band.sees(*block));
-    let seen: Vec<usize> = blocks.iter().copied().filter(is_seen).collect();
-    let mut stats = SplatStats { blocks: seen.len() as u64, ..SplatStats::default() };
-    for blocks in seen.chunks(batch) {
+    let is_visible = |block: &usize| group.bands().iter().any(|band| band.sees(*block));
+    let visible: Vec<usize> = blocks.iter().copied().filter(is_visible).collect();
+    let mut stats = SplatStats { blocks: visible.len() as u64, ..SplatStats::default() };
+    for blocks in visible.chunks(batch) {
         let clock = Instant::now();
+        source.fetch(blocks)?;
         let read = |block: &usize| {
             let planes = source.planes(*block)?;
             Ok((planes.held(), group.prepare(*block, planes)?))

@@ -1,8 +1,8 @@
-//! The splat: the terms of voxels times footprints, added to the planes of one tile of the picture (eq 9; eq 4 where
-//! the terms are samples). This is the splatting of [Westover](crate::bibliography).
+//! The footprint backend: adds values of voxels times footprints to the planes of one tile of the picture (eq 9; eq 4
+//! if the values are samples). This is the splatting of [Westover](crate::bibliography).
 //!
-//! A tile has one owner and meets blocks and voxels in file order, so a pixel's sum does not depend on how the picture
-//! is tiled or on the number of threads. Sums are in f64.
+//! A tile has one owner and adds blocks and voxels in file order, so a pixel's sum depends neither on the tiles nor on
+//! the number of threads. Sums are in f64.
 
 use super::band::{Band, BandGroup};
 use super::sparse_terms::SparseTerms;
@@ -23,14 +23,14 @@ pub(in crate::render) struct FootprintBands<'a, 'c> {
     planes: usize,
 }
 
-/// The terms of a block, and its voxels in every band that sees it.
+/// The values of a block, and its projected voxels in every band that it reaches.
 pub(in crate::render) struct ProjectedBlock {
     terms: SparseTerms,
     splats: Vec<Option<Splats>>,
 }
 
 impl<'a, 'c> FootprintBands<'a, 'c> {
-    /// Bands with so many planes.
+    /// Bands with `planes` planes.
     pub(super) fn new(bands: Vec<(Band<'a>, &'c mut Vec<Tile>)>, planes: usize) -> Self {
         let (bands, tiles) = bands.into_iter().unzip();
         Self { bands, tiles, planes }
@@ -67,7 +67,7 @@ impl BandGroup for FootprintBands<'_, '_> {
 /// A rectangle of pixels with its planes.
 #[derive(Debug)]
 pub(in crate::render) struct Tile {
-    pub(in crate::render) place: TileRect,
+    pub(in crate::render) rect: TileRect,
     /// Number of planes.
     count: usize,
     order: Order,
@@ -75,14 +75,14 @@ pub(in crate::render) struct Tile {
 }
 
 impl Tile {
-    /// With all planes at zero.
-    pub(in crate::render) fn new(place: TileRect, count: usize, order: Order) -> Self {
-        Self { sums: vec![0.0; count * place.pixels()], place, count, order }
+    /// A tile with all planes at zero.
+    pub(in crate::render) fn new(rect: TileRect, count: usize, order: Order) -> Self {
+        Self { sums: vec![0.0; count * rect.pixels()], rect, count, order }
     }
 
-    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    /// Loads the planes at `count` pixels from `first` on into the first lanes of `planes`.
     pub(in crate::render) fn load(&self, first: usize, count: usize, planes: &mut [Lane]) {
-        let pixels = self.place.pixels();
+        let pixels = self.rect.pixels();
         for (p, lane) in planes.iter_mut().enumerate() {
             for (l, sum) in lane.iter_mut().enumerate().take(count) {
                 *sum = match self.order {
@@ -93,86 +93,86 @@ impl Tile {
         }
     }
 
-    /// Adds the terms of a block's voxels times their footprints (eq 9).
+    /// Adds the values of a block's voxels times their footprints (eq 9).
     pub(in crate::render) fn splat(&mut self, voxels: &Splats, terms: &SparseTerms, footprint: &Footprint) {
-        if !(overlap(&voxels.x, &self.place.x) && overlap(&voxels.y, &self.place.y)) {
+        if !(overlap(&voxels.x, &self.rect.x) && overlap(&voxels.y, &self.rect.y)) {
             return;
         }
         let (mut column, mut row, mut all) = (Vec::new(), Vec::new(), vec![0.0; self.count]);
         for voxel in &voxels.voxels {
             let (full_x, full_y) = (footprint.span(voxel.x, voxels.size[0]), footprint.span(voxel.y, voxels.size[1]));
-            let (x, y) = (intersect(&full_x, &self.place.x), intersect(&full_y, &self.place.y));
+            let (x, y) = (intersect(&full_x, &self.rect.x), intersect(&full_y, &self.rect.y));
             if x.is_empty() || y.is_empty() {
                 continue;
             }
-            // Weights begin at the footprint's own edge, so that a tile's edge cannot change their last bits.
+            // Weights start at the footprint's own edge, so that a tile's edge cannot change their last bits.
             footprint.weights(voxel.x, &full_x, &mut row);
             footprint.weights(voxel.y, &full_y, &mut column);
             let row = (x.start, &row[x.start - full_x.start..x.end - full_x.start]);
             let column = (y.start, &column[y.start - full_y.start..y.end - full_y.start]);
-            let (planes, amounts) = terms.of_voxel(voxel.index);
+            let (planes, values) = terms.of_voxel(voxel.index);
             match self.order {
                 Order::Planes => {
-                    for (plane, amount) in planes.iter().zip(amounts) {
-                        self.add(usize::from(*plane), amount * voxel.weight, row, column);
+                    for (plane, value) in planes.iter().zip(values) {
+                        self.add(usize::from(*plane), value * voxel.weight, row, column);
                     }
                 }
                 Order::Pixels => {
                     all.fill(0.0);
-                    planes.iter().zip(amounts).for_each(|(p, a)| all[usize::from(*p)] = a * voxel.weight);
+                    planes.iter().zip(values).for_each(|(p, a)| all[usize::from(*p)] = a * voxel.weight);
                     self.add_all(&all, row, column);
                 }
             }
         }
     }
 
-    /// Adds `amount` times the outer product of a row and a column of weights to a plane.
-    fn add(&mut self, plane: usize, amount: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let TileRect { x: xs, y: ys } = &self.place;
-        let (width, pixels) = (xs.len(), self.place.pixels());
+    /// Adds `value` times the outer product of a row and a column of weights to a plane.
+    fn add(&mut self, plane: usize, value: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+        let TileRect { x: xs, y: ys } = &self.rect;
+        let (width, pixels) = (xs.len(), self.rect.pixels());
         let start = plane * pixels + (y - ys.start) * width + (x - xs.start);
-        add_to_plane(&mut self.sums[start..], width, amount, row, column);
+        add_to_plane(&mut self.sums[start..], width, value, row, column);
     }
 
-    /// Adds an amount for every plane, as [`Self::add`] does for one.
-    fn add_all(&mut self, amounts: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
-        let TileRect { x: xs, y: ys } = &self.place;
+    /// Adds a value for every plane, as [`Self::add`] does for one.
+    fn add_all(&mut self, values: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+        let TileRect { x: xs, y: ys } = &self.rect;
         let width = xs.len();
         let start = ((y - ys.start) * width + (x - xs.start)) * self.count;
-        add_to_pixels(&mut self.sums[start..], width, amounts, row, column);
+        add_to_pixels(&mut self.sums[start..], width, values, row, column);
     }
 }
 
-/// Adds `amount` times the outer product of a row and a column to a plane whose rows are `width` pixels apart.
+/// Adds `value` times the outer product of a row and a column to a plane whose rows are `width` pixels apart.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_to_plane(sums: &mut [f64], width: usize, amount: f64, row: &[f64], column: &[f64]) {
+fn add_to_plane(sums: &mut [f64], width: usize, value: f64, row: &[f64], column: &[f64]) {
     for (weight, line) in column.iter().zip(sums.chunks_mut(width)) {
-        let factor = amount * weight;
+        let factor = value * weight;
         for (sum, w) in line.iter_mut().zip(row) {
             *sum += factor * w;
         }
     }
 }
 
-/// The same with an amount for each of a pixel's planes, which lie side by side.
+/// The same with a value for each of a pixel's planes, which are interleaved.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_to_pixels(sums: &mut [f64], width: usize, amounts: &[f64], row: &[f64], column: &[f64]) {
-    let count = amounts.len();
+fn add_to_pixels(sums: &mut [f64], width: usize, values: &[f64], row: &[f64], column: &[f64]) {
+    let count = values.len();
     let mut factors = vec![0.0; count];
     for (weight, line) in column.iter().zip(sums.chunks_mut(width * count)) {
-        factors.iter_mut().zip(amounts).for_each(|(f, amount)| *f = amount * weight);
+        factors.iter_mut().zip(values).for_each(|(f, value)| *f = value * weight);
         for (pixel, w) in line.chunks_exact_mut(count).zip(row) {
             pixel.iter_mut().zip(&factors).for_each(|(sum, f)| *sum += f * w);
         }
     }
 }
 
-/// A block's voxels as the camera sees them.
+/// The projected voxels of a block.
 #[derive(Debug)]
 pub(in crate::render) struct Splats {
     voxels: Vec<Splat>,
     size: [usize; 2],
-    /// Columns and rows of the picture that they reach.
+    /// Columns and rows of the picture that the voxels reach.
     x: Range<usize>,
     y: Range<usize>,
 }
@@ -183,15 +183,15 @@ struct Splat {
     index: usize,
     x: f64,
     y: f64,
-    /// exp(-tau z) f(0, 0), or what of it is in a slab.
+    /// exp(-tau z) f(0, 0), times the share in the slab if there is one.
     weight: f64,
 }
 
 impl Splats {
-    /// What a voxel takes.
+    /// Bytes of a voxel.
     pub(in crate::render) const BYTES: usize = size_of::<Splat>();
 
-    /// Projects the voxels of a block that are splatted and have terms.
+    /// Projects the voxels of a block that are splatted and have values.
     pub(in crate::render) fn new(terms: &SparseTerms, block: usize, setup: &ViewSetup) -> Self {
         let ViewSetup { camera, footprint, grid, clip, .. } = setup;
         let region = setup.blocks.region(block);
@@ -213,7 +213,7 @@ impl Splats {
     }
 }
 
-/// The smallest range that holds all that are not empty.
+/// The smallest range that holds all nonempty spans.
 fn reach(spans: impl Iterator<Item = Range<usize>>) -> Range<usize> {
     let all = spans.filter(|s| !s.is_empty()).reduce(|a, b| a.start.min(b.start)..a.end.max(b.end));
     all.unwrap_or(0..0)

@@ -1,4 +1,4 @@
-//! The lattice backend: values of all voxels, plane by plane, to the cells of each view's lattice.
+//! The lattice backend: spreads the values of all voxels, plane by plane, to the cells of each view's lattice.
 
 use super::band::{Band, BandGroup};
 use super::lattice::{CellPlane, Cells, Lattice, Placed, Rectangle, Work};
@@ -12,13 +12,13 @@ pub(super) struct LatticeBands<'a, 'c> {
     bands: Vec<Band<'a>>,
     lattices: Vec<&'a Lattice>,
     cells: Vec<&'c mut Cells>,
-    /// The cells that each band holds.
+    /// The cells of each band.
     rectangles: Vec<Rectangle>,
-    /// Used again: memory fresh from the system costs as much as the work that it is for.
+    /// Buffers for reuse: fresh memory from the system costs as much as the work done in it.
     spare: Mutex<Vec<(Scratch, Work)>>,
 }
 
-/// A block and its place in every band that sees it.
+/// A block and its location in every band that it reaches.
 pub(super) struct PlacedBlock<'b> {
     planes: Box<dyn BlockPlanes + 'b>,
     placed: Vec<Option<Placed>>,
@@ -42,8 +42,8 @@ impl<'a, 'c> LatticeBands<'a, 'c> {
         group
     }
 
-    /// Where a block lies in a band.
-    fn place(&self, band: usize, block: usize) -> Option<Placed> {
+    /// The location of a block in a band; `None` if it does not reach the band.
+    fn locate(&self, band: usize, block: usize) -> Option<Placed> {
         let setup = self.bands[band].setup;
         let (region, clip) = (setup.blocks.region(block), (&setup.clip, setup.slab.as_ref()));
         self.bands[band].sees(block).then(|| self.lattices[band].placed(&region, clip, &self.rectangles[band]))
@@ -58,7 +58,7 @@ impl BandGroup for LatticeBands<'_, '_> {
     }
 
     fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<PlacedBlock<'b>> {
-        let placed = (0..self.bands.len()).map(|band| self.place(band, block)).collect();
+        let placed = (0..self.bands.len()).map(|band| self.locate(band, block)).collect();
         Ok(PlacedBlock { planes, placed })
     }
 
@@ -83,7 +83,7 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// For every plane its cells in all bands.
+/// For every plane, its cells in all bands.
 fn by_planes<'a>(cells: &'a mut [&mut Cells]) -> Vec<Vec<CellPlane<'a>>> {
     let mut planes: Vec<Vec<CellPlane<'_>>> = Vec::new();
     for of_band in cells {

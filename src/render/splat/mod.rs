@@ -1,14 +1,15 @@
-//! How voxels become sums of pixels: the geometry of a view's picture, the two backends, and the bands that they fill.
+//! Turns values of voxels into sums of pixels: the geometry of a view's picture, the two backends, and the bands that
+//! they fill.
 //!
 //! ```text
-//! a view            view_setup: camera, kernel, which voxels; backend: footprints or lattice, decided once
+//! a view            view_setup: camera, kernel, voxels to splat; backend: footprints or lattice, chosen once
 //! a block           plane values, from a scene                                      (read by workers)
 //!   footprints      sparse_terms -> footprints: each voxel's footprint into the tiles of the band
 //!   lattice         lattice_bands -> lattice: spread to cells, plane by plane
 //! a tile            accumulator: its planes, pixel by pixel, for [`super::reconstruct`] to invert
 //! ```
 //!
-//! Nothing here knows what the planes mean or where blocks come from.
+//! These modules know neither the meaning of planes nor the source of blocks.
 
 pub(super) mod tile_rect;
 pub(super) mod slab;

@@ -1,7 +1,7 @@
-//! The sum of all weights at one place of the picture, by uncut footprints: the background is judged by it (eq 16).
+//! Sums of uncut weights at single pixels. They decide which pixels are background (eq 16).
 //!
-//! It also bounds what voxels beyond a depth add, since weights fall as exp(-tau z) (eq 3): the deepest can be left
-//! out.
+//! They also bound the contribution of voxels beyond a depth, since weights fall as exp(-tau z) (eq 3), so that the
+//! deepest voxels can be left out.
 
 use super::lattice::Shear;
 use super::view_setup::ViewSetup;
@@ -10,8 +10,8 @@ use crate::render::config::{RenderConfig, most_splat_error};
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
-/// Leaves out voxels so deep that what they add is within what the method leaves of the splat error.
-pub(in crate::render) fn without_what_is_dim(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
+/// Leaves out voxels so deep that their contribution fits in the part of the splat error that the method leaves.
+pub(in crate::render) fn without_dim_voxels(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
     let share = most_splat_error(config.quantity, config.splat_error) - setup.stated_error;
     if config.certify || setup.tau == 0.0 || share <= 0.0 {
         return Ok(setup);
@@ -24,7 +24,7 @@ pub(in crate::render) fn without_what_is_dim(mut setup: ViewSetup, config: &Rend
     Ok(setup)
 }
 
-/// The sums of weights of a view at single pixels.
+/// Sums of uncut weights of a view at single pixels.
 pub(in crate::render) struct ReferenceWeights<'a> {
     setup: &'a ViewSetup,
     footprint: &'a Footprint,
@@ -32,17 +32,17 @@ pub(in crate::render) struct ReferenceWeights<'a> {
 }
 
 impl<'a> ReferenceWeights<'a> {
-    /// By a footprint that stands in for an uncut one.
+    /// Sums of weights by `footprint`, which stands for an uncut one.
     pub(in crate::render) fn new(setup: &'a ViewSetup, footprint: &'a Footprint) -> Self {
         Self { setup, footprint, shear: Shear::new(&setup.camera, &setup.grid, 1) }
     }
 
-    /// The sum at a pixel's centre: slice by slice, row by row, over the voxels that are near enough.
+    /// The sum at a pixel's centre, over the voxels within reach, slice by slice and row by row.
     pub(in crate::render) fn at(&self, [x, y]: [usize; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
         let clip = &self.setup.clip;
-        let place = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
-        let [_, v] = self.shear.cells(place);
+        let point = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
+        let [_, v] = self.shear.cells(point);
         let half = self.half(1);
         let mut sum = 0.0;
         for k in clip.start[a]..clip.end[a] {
@@ -50,17 +50,18 @@ impl<'a> ReferenceWeights<'a> {
             for i in around(centre, half, clip.start[c]..clip.end[c]) {
                 let mut voxel = [0; 3];
                 (voxel[a], voxel[c]) = (k, i);
-                sum += self.row(voxel, clip.start[b]..clip.end[b], place);
+                sum += self.row(voxel, clip.start[b]..clip.end[b], point);
             }
         }
         sum
     }
 
-    /// No place of the plane has a larger sum.
+    /// An upper bound of the sum at any point of the picture plane.
     ///
-    /// The sum of a slice without end is largest at a voxel's place. A ray meets so many slices as lie beside one
-    /// another, footprints included, each a step deeper than the last; it may meet the first one before the volume
-    /// begins, and voxels of a slice may be nearer than the place where it meets that.
+    /// The sum of an infinite slice is largest at the position of a voxel. The number of slices that a ray meets is
+    /// limited by their extent, footprints included, and each slice is a step deeper than the last. The ray may meet
+    /// the first slice in front of the volume, and voxels of a slice may be nearer than the point where the ray meets
+    /// the slice.
     pub(in crate::render) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.setup.tau, self.setup.clip.dims());
@@ -71,9 +72,10 @@ impl<'a> ReferenceWeights<'a> {
         along * self.slice() * self.footprint.at_depth(self.nearest())
     }
 
-    /// A depth behind which voxels add at most such a share of the nearest voxel's own weight, and so of the largest
-    /// sum anywhere. With S the sum of a slice without end, r_n = r_0 + n d where a ray meets slice n, and voxels that
-    /// a place sees at most e nearer or further away than that, all voxels deeper than z add up to
+    /// A depth beyond which all voxels together add at most `share` of the nearest voxel's own weight, and so of the
+    /// largest sum anywhere. Let S be the sum of an infinite slice and r_n = r_0 + n d the depth at which a ray meets
+    /// slice n, and let the voxels that reach the ray be at most e nearer or farther than that. Then all voxels deeper
+    /// than z add up to
     ///
     /// ```text
     /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))
@@ -84,13 +86,13 @@ impl<'a> ReferenceWeights<'a> {
         self.nearest() + libm::log(self.slice() * slices / share) / tau
     }
 
-    /// What a ray goes deeper by from slice to slice.
+    /// The depth that a ray gains from slice to slice.
     fn deeper(&self) -> f64 {
         let Shear { slopes, depths, .. } = &self.shear;
         (depths[2] - slopes[0] * depths[0] - slopes[1] * depths[1]).abs()
     }
 
-    /// What a voxel that a place sees can be nearer than the place where its slice meets the ray.
+    /// How much nearer a voxel can be than the point where the ray meets its slice, if its footprint reaches the ray.
     fn nearer(&self) -> f64 {
         [0, 1].map(|i| self.half(i) * self.shear.depths[i].abs()).iter().sum()
     }
@@ -99,7 +101,7 @@ impl<'a> ReferenceWeights<'a> {
         self.setup.camera.nearest_of(&self.setup.grid.crop(&self.setup.clip))
     }
 
-    /// The sum of weights of a slice without end at the place of one of its voxels, in units of that one's.
+    /// The sum of weights of an infinite slice at the position of one of its voxels, in units of that voxel's weight.
     fn slice(&self) -> f64 {
         let rows = self.half(1).ceil() as isize;
         let [b, c] = self.shear.pixels;
@@ -111,34 +113,34 @@ impl<'a> ReferenceWeights<'a> {
         (-rows..=rows).flat_map(|j| (-most..=most).map(move |i| weight(i, j))).sum()
     }
 
-    /// Voxels along b (0) or c (1) that a footprint reaches to one side.
+    /// Voxels that a footprint reaches to one side along b (0) or c (1).
     fn half(&self, i: usize) -> f64 {
         let reach = self.footprint.reach;
         let corners = [[reach, reach], [reach, -reach]].map(|off| self.shear.cells(off)[i].abs());
         corners[0].max(corners[1])
     }
 
-    /// The sum over the voxels of a row along b, of which `voxel` would be the first one.
-    fn row(&self, mut voxel: [usize; 3], all: Range<usize>, place: [f64; 2]) -> f64 {
+    /// The sum over the voxels `all` of a row along b that starts at `voxel`.
+    fn row(&self, mut voxel: [usize; 3], all: Range<usize>, point: [f64; 2]) -> f64 {
         let ([bx, by], reach) = (self.shear.pixels[0], self.footprint.reach);
         let squared = bx * bx + by * by;
-        let off = self.off(voxel, place);
+        let off = self.off(voxel, point);
         let centre = -(off[0] * bx + off[1] * by) / squared;
         let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
         voxel[self.shear.axes[0]] = near.start;
-        let (off, z) = (self.off(voxel, place), self.shear.depth(voxel));
+        let (off, z) = (self.off(voxel, point), self.shear.depth(voxel));
         self.footprint.sum_of_row(off, z, ([bx, by], self.shear.depths[0]), near.len())
     }
 
-    /// Pixels from a place to a voxel.
-    fn off(&self, voxel: [usize; 3], place: [f64; 2]) -> [f64; 2] {
-        let [u, v] = self.shear.place(voxel);
+    /// The offset from a point of the picture to a voxel, in pixels.
+    fn off(&self, voxel: [usize; 3], point: [f64; 2]) -> [f64; 2] {
+        let [u, v] = self.shear.position(voxel);
         let [b, c] = self.shear.pixels;
-        [0, 1].map(|i| u * b[i] + v * c[i] - place[i])
+        [0, 1].map(|i| u * b[i] + v * c[i] - point[i])
     }
 }
 
-/// The whole numbers of a range that are not further from a place than `half`.
+/// The whole numbers of a range within `half` of `centre`.
 fn around(centre: f64, half: f64, all: Range<usize>) -> Range<usize> {
     let end = (centre + half + 1.0).floor().clamp(0.0, all.end as f64) as usize;
     let start = (centre - half).ceil().clamp(all.start as f64, all.end as f64) as usize;

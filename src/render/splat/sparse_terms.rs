@@ -1,54 +1,56 @@
-//! The values of a block, voxel by voxel: what footprints take in.
+//! The nonzero values of a block, voxel by voxel, as the footprint backend needs them.
 
 use crate::base::error::Result;
 use crate::render::plane_values::{BlockPlanes, Scratch};
 
-/// What a block adds to the planes: for each voxel in array order, some (plane, amount).
+/// The values of a block: for each voxel in array order, a list of (plane, value).
 #[derive(Debug)]
 pub(in crate::render) struct SparseTerms {
-    /// Where those of each voxel end.
+    /// The end of each voxel's list.
     ends: Vec<u32>,
     planes: Vec<u16>,
-    amounts: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl SparseTerms {
-    /// What those of a voxel take in so many planes, at most: as they are found, in a vector that grows, and in place.
+    /// An upper bound of the bytes of a voxel with `planes` planes: in the growing vector of found values, and in the
+    /// final lists.
     pub(in crate::render) const fn most_bytes(planes: usize) -> usize {
         planes * (2 * size_of::<(u32, u16, f64)>() + 2 + 8) + 2 * size_of::<u32>()
     }
 
-    /// What a block has in so many planes.
+    /// Collects the values of a block in `planes` planes.
     pub(in crate::render) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
-        let (mut found, mut room) = (Vec::new(), Scratch::default());
+        let (mut found, mut scratch) = (Vec::new(), Scratch::default());
         let mut ends = vec![0_u32; block.voxels() + 1];
         for plane in 0..planes {
-            block.plane(plane, &mut room)?.for_each(|voxel, amount| {
-                found.push((voxel as u32, plane as u16, amount));
+            block.plane(plane, &mut scratch)?.for_each(|voxel, value| {
+                found.push((voxel as u32, plane as u16, value));
                 ends[voxel + 1] += 1;
             });
         }
         for voxel in 1..ends.len() {
             ends[voxel] += ends[voxel - 1];
         }
-        let mut terms = Self { planes: vec![0; found.len()], amounts: vec![0.0; found.len()], ends };
-        found.into_iter().for_each(|(voxel, plane, amount)| terms.put(voxel as usize, plane, amount));
+        let mut terms = Self { planes: vec![0; found.len()], values: vec![0.0; found.len()], ends };
+        found.into_iter().for_each(|(voxel, plane, value)| terms.put(voxel as usize, plane, value));
         terms.ends.pop();
         Ok(terms)
     }
 
-    /// Puts a term behind those of its voxel; until all are there, a voxel ends where its next term comes.
-    fn put(&mut self, voxel: usize, plane: u16, amount: f64) {
+    /// Appends a value to the list of its voxel. Until all values are stored, `ends` holds the position of each voxel's
+    /// next value.
+    fn put(&mut self, voxel: usize, plane: u16, value: f64) {
         let at = &mut self.ends[voxel];
-        (self.planes[*at as usize], self.amounts[*at as usize]) = (plane, amount);
+        (self.planes[*at as usize], self.values[*at as usize]) = (plane, value);
         *at += 1;
     }
 
-    /// The planes and amounts of a voxel.
+    /// The planes and values of a voxel.
     pub(in crate::render) fn of_voxel(&self, voxel: usize) -> (&[u16], &[f64]) {
         let start = if voxel == 0 { 0 } else { self.ends[voxel - 1] as usize };
         let range = start..self.ends[voxel] as usize;
-        (&self.planes[range.clone()], &self.amounts[range])
+        (&self.planes[range.clone()], &self.values[range])
     }
 }
 

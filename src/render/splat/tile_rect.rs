@@ -1,11 +1,11 @@
-//! Rectangles of pixels, and the rows of them that something reaches.
+//! Rectangles of pixels, and the columns and rows that voxels reach.
 
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
 use crate::view::footprint::Footprint;
 use std::ops::Range;
 
-/// Pixels a side of a tile: its planes stay within a core's cache, and neighbours share few footprints.
+/// Pixels per side of a tile: its planes fit in a core's cache, and neighbours share few footprints.
 pub(in crate::render) const TILE: usize = 64;
 
 /// A rectangle of pixels.
@@ -18,8 +18,8 @@ pub(in crate::render) struct TileRect {
 }
 
 impl TileRect {
-    /// Those of `side` pixels a side, or what is left of that, that cover the rows `y` of a picture `width` pixels
-    /// wide.
+    /// Tiles of `side` pixels per side that cover the rows `y` of a picture `width` pixels wide. Tiles at the right and
+    /// lower edges may be smaller.
     pub(in crate::render) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
         let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
         pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
@@ -30,14 +30,13 @@ impl TileRect {
         self.x.len() * self.y.len()
     }
 
-    /// The column and the row of a pixel, counted row by row.
+    /// The column and the row of the `n`-th pixel, counted row by row.
     pub(in crate::render) fn pixel(&self, n: usize) -> [usize; 2] {
         [self.x.start + n % self.x.len(), self.y.start + n / self.x.len()]
     }
 }
 
-/// The columns and rows of the picture that any voxel of a block can reach; where it reaches none of these, none of
-/// those.
+/// The columns and rows of the picture that any voxel of a block can reach. Both are empty if either is.
 pub(in crate::render) fn pixels_reached(
     region: &Region,
     grid: &Grid,
@@ -49,18 +48,18 @@ pub(in crate::render) fn pixels_reached(
     pixels_around((0..8).map(corner).map(|[x, y, _]| [x, y]), footprint.reach, camera.size)
 }
 
-/// The columns and rows of a picture of such a size that are within `reach` pixels of the box around some places; none
-/// of either if there are none of one.
+/// The columns and rows of a picture of `size` pixels within `reach` pixels of the bounding box of `points`. Both are
+/// empty if either is.
 pub(in crate::render) fn pixels_around(
-    places: impl Iterator<Item = [f64; 2]>,
+    points: impl Iterator<Item = [f64; 2]>,
     reach: f64,
     size: [usize; 2],
 ) -> [Range<usize>; 2] {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for place in places {
-        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
+    for point in points {
+        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(point[i]), high[i].max(point[i])));
     }
-    // A pixel more on each side than rounding could move an edge.
+    // One more pixel on each side covers rounding.
     let span = |i: usize| {
         let (from, to) = (low[i] - reach - 1.0, high[i] + reach + 1.0);
         let end = to.clamp(0.0, size[i] as f64).ceil() as usize;
@@ -69,12 +68,12 @@ pub(in crate::render) fn pixels_around(
     if span(0).is_empty() || span(1).is_empty() { [0..0, 0..0] } else { [span(0), span(1)] }
 }
 
-/// Whether two ranges share anything.
+/// Whether two ranges overlap.
 pub(in crate::render) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
     !intersect(a, b).is_empty()
 }
 
-/// What two ranges share.
+/// The intersection of two ranges.
 pub(in crate::render) fn intersect(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     a.start.max(b.start)..a.end.min(b.end)
 }
@@ -85,12 +84,12 @@ mod tests {
 
     #[test]
     fn tiles_cover_each_pixel_once() {
-        let mut seen = vec![0; 150 * 100];
-        for place in TileRect::cover(150, 30..100, TILE) {
-            for y in place.y.clone() {
-                place.x.clone().for_each(|x| seen[y * 150 + x] += 1);
+        let mut counts = vec![0; 150 * 100];
+        for rect in TileRect::cover(150, 30..100, TILE) {
+            for y in rect.y.clone() {
+                rect.x.clone().for_each(|x| counts[y * 150 + x] += 1);
             }
         }
-        assert!(seen[..30 * 150].iter().all(|n| *n == 0) && seen[30 * 150..].iter().all(|n| *n == 1));
+        assert!(counts[..30 * 150].iter().all(|n| *n == 0) && counts[30 * 150..].iter().all(|n| *n == 1));
     }
 }

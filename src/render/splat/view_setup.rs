@@ -1,4 +1,4 @@
-//! Everything that is the same for all frames of a view: camera, kernel, backend, and which voxels count.
+//! The setup of a view, shared by all frames: camera, kernel, backend and the voxels to splat.
 
 use super::backend::{SplatBackend, footprint_method};
 use super::slab::Slab;
@@ -10,10 +10,11 @@ use crate::view::camera::{Camera, View};
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
-/// A mean needs some voxel that is not deeper than this over tau: exponentials lose digits at 708, and vanish.
+/// The largest tau times depth of the nearest voxel for which means are computed: exponentials lose digits at 708, and
+/// then vanish.
 const DEEPEST: f64 = 640.0;
 
-/// Everything that is the same for all frames of a view.
+/// The setup of a view, shared by all frames.
 #[derive(Debug, Clone)]
 pub(in crate::render) struct ViewSetup {
     pub(in crate::render) camera: Camera,
@@ -24,13 +25,13 @@ pub(in crate::render) struct ViewSetup {
     /// The voxels that are splatted.
     pub(in crate::render) clip: Region,
     pub(in crate::render) backend: SplatBackend,
-    /// The method's name and its stated error.
+    /// The splat method: its name, radius and stated error.
     pub(in crate::render) method: Method,
-    /// The error of the method, and of voxels left out for their depth.
+    /// The stated error of the method and of voxels left out for their depth.
     pub(in crate::render) stated_error: f64,
-    /// Voxels further away may be left out.
+    /// Voxels deeper than this may be left out.
     pub(in crate::render) deepest: f64,
-    /// The slab that is seen; none: the whole volume.
+    /// The slab to splat; `None` for the whole volume.
     pub(in crate::render) slab: Option<Slab>,
 }
 
@@ -73,12 +74,12 @@ impl ViewSetup {
         self.camera.nearest_of(&self.grid.crop(&self.blocks.region(block))) > self.deepest
     }
 
-    /// Whether a block is to be splatted into these rows of the picture.
+    /// Whether a block must be splatted into these rows of the picture.
     pub(in crate::render) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
         self.is_in_slab(block) && self.reaches(block, rows) && !self.is_too_deep(block)
     }
 
-    /// Whether any kernel of a block reaches into the slab that is seen.
+    /// Whether any kernel of a block reaches the slab; always true without a slab.
     pub(in crate::render) fn is_in_slab(&self, block: usize) -> bool {
         let region = || self.blocks.region(block).intersect(&self.clip);
         let reached = |slab: Slab| !region().is_empty() && slab.is_reached(&region(), &self.grid, &self.camera);

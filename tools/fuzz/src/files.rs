@@ -60,7 +60,7 @@ pub fn decode(data: &[u8]) {
     let (_, seed) = seed(input.byte());
     let file = seed.forge(&edits(&mut input));
     with_file(&file, |path| {
-        let Ok(file) = CoefficientFile::open(path, Access::Read) else { return };
+        let Ok(file) = CoefficientFile::open_with(path, Access::Read) else { return };
         let long = |window: &Window| window.frames.max(window.coefficients) > 64;
         let voxels = file.grid.dims.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).unwrap_or(usize::MAX);
         if file.largest_block() > 1 << 16 || voxels > 1 << 16 || file.metadata().windows.iter().any(long) {

@@ -80,7 +80,10 @@ fn config(input: &mut Input<'_>) -> ConvertConfig {
         missing: input.pick(&[MissingPolicy::Mask, MissingPolicy::Error]),
         missing_value: input.pick(&[None, Some(0.0), Some(1e35), Some(-1.0)]),
         block: Some(1 + input.below(6)),
-        ..ConvertConfig::new(coding, window, tolerance, MEMORY)
+        coding,
+        window,
+        memory: MEMORY,
+        ..ConvertConfig::new(tolerance)
     }
 }
 
@@ -107,7 +110,7 @@ pub fn roundtrip(data: &[u8]) {
     let Some(file) = case.convert() else { return };
     read_all(&file).expect("what was just written is sound");
     with_file(&file, |path| {
-        let file = CoefficientFile::open(path, Access::Read).expect("what was just written is sound");
+        let file = CoefficientFile::open_with(path, Access::Read).expect("what was just written is sound");
         check(&case, &file, path);
         let verified = verify(&file, Some(&mut *case.source()), MEMORY, &Silent).expect("the same frames");
         let against = verified.against.expect("a source was given");

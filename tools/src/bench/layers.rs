@@ -11,13 +11,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
-use wavesplat::convert::{ConvertConfig, SchemeConstraint, convert};
+use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{
-    CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render,
-};
+use wavesplat::render::{CoefficientScene, FrameScene, Limit, RenderConfig, RenderReport, Scene, SplatSource, render};
 use wavesplat::source::{self, OpenOptions};
 use wavesplat::view::footprint::Kernel;
 
@@ -131,8 +128,7 @@ impl ProcessTask for Task {
 fn measure(task: &Task) -> Result<Vec<Row>> {
     let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
     let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
-    let settings =
-        ConvertConfig { range: Some(task.range), ..ConvertConfig::new(SchemeConstraint::AUTO, 32, FINE, MEMORY) };
+    let settings = ConvertConfig { range: Some(task.range), memory: MEMORY, ..ConvertConfig::new(FINE) };
     let mut bytes = Vec::new();
     convert(open()?.as_mut(), &settings, &task.file, &mut bytes, &Silent)?;
     fs::write(&task.file, bytes).map_err(|e| Error::io(&task.file, "writing", e))?;
@@ -140,7 +136,7 @@ fn measure(task: &Task) -> Result<Vec<Row>> {
     let limits = measures.into_iter().flat_map(|m| task.tolerances.iter().map(move |t| Some((*t, m))));
     let (mut rows, mut whole) = (Vec::new(), RenderReport::default());
     for limit in std::iter::once(None).chain(limits) {
-        let file = CoefficientFile::open(&task.file, Access::Map)?;
+        let file = CoefficientFile::open(&task.file)?;
         let mut scene = CoefficientScene::new(file, SplatSource::Coefficients);
         let allowed = limit.map(|(tolerance, (_, limit))| (tolerance * (task.range.1 - task.range.0), limit));
         let (found, report) = pictures(&mut scene, task, SPLAT, allowed)?;
@@ -162,18 +158,13 @@ fn pictures(
     allowed: Option<(f64, Limit)>,
 ) -> Result<(Vec<f32>, RenderReport)> {
     let config = RenderConfig {
-        views: vec![CameraSettings::first(task.dims, SIZE).view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
-        quantity: Quantity::Mean,
         frames: (0..task.frames).collect(),
-        region: None,
         splat_error,
         allowed: allowed.map(|(allowed, _)| allowed),
         limited: allowed.map(|(_, limit)| limit).unwrap_or_default(),
-        certify: false,
         memory: MEMORY,
-        reserved: 0,
-        mode: Default::default(),
+        ..RenderConfig::new(scene, CameraSettings::first(task.dims, SIZE).view())
     };
     let (mut found, mut best) = (Vec::new(), RenderReport { seconds: f64::INFINITY, ..RenderReport::default() });
     for _ in 0..if splat_error > 0.0 { REPEATS } else { 1 } {

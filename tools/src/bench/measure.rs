@@ -13,7 +13,6 @@ use crate::synth::{Kind, Synth};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::{self, SampleType};
 use wavesplat::file::CoefficientFile;
@@ -234,7 +233,7 @@ fn most<T>(runs: &[Outcome<T>]) -> Option<u64> {
 
 /// Compares every sample of a file with its source.
 fn compare(step: &Convert) -> Result<Comparison> {
-    let file = CoefficientFile::open(&step.output, Access::Map)?;
+    let file = CoefficientFile::open(&step.output)?;
     let mut frames = open_frames(&step.frames, step.count)?;
     Ok(verify(&file, Some(frames.as_mut()), MEMORY, &Silent)?.against.unwrap_or_default())
 }

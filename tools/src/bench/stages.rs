@@ -12,12 +12,11 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, FrameScene, Quantity, RenderConfig, Scene, SplatSource};
+use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
 
@@ -130,8 +129,13 @@ fn convert(step: &Convert) -> Result<Converted> {
     let unknown = || Error::usage(format!("bench-step: there is no {} or no {}", step.basis, step.bound));
     let basis = BASES.iter().find(|b| b.name == step.basis).ok_or_else(unknown)?;
     let bound = BOUNDS.iter().find(|b| b.name == step.bound).ok_or_else(unknown)?;
-    let plain = ConvertConfig::new(basis.basis, basis.window, step.tolerance, MEMORY);
-    let config = ConvertConfig { bound: bound.bound, ..plain };
+    let config = ConvertConfig {
+        coding: basis.basis.into(),
+        window: basis.window,
+        bound: bound.bound,
+        memory: MEMORY,
+        ..ConvertConfig::new(step.tolerance)
+    };
     let clock = Instant::now();
     let mut frames = open_frames(&step.frames, step.count)?;
     let mut out = Output::create(&step.output, true)?;
@@ -195,7 +199,7 @@ impl Renderer {
         let frames = || open_frames(&step.input, step.frames);
         Ok(match step.way {
             RenderMethod::Coefficients => {
-                let file = CoefficientFile::open(&step.input, Access::Map)?;
+                let file = CoefficientFile::open(&step.input)?;
                 Self::Library(Box::new(CoefficientScene::new(file, SplatSource::Coefficients)))
             }
             RenderMethod::Shared => Self::Library(Box::new(FrameScene::new(frames()?, None))),
@@ -239,18 +243,12 @@ fn by_library(
     sink: &mut dyn FnMut(wavesplat::render::Rendered<'_>),
 ) -> Result<ViewTiming> {
     let config = RenderConfig {
-        views: vec![camera.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
-        quantity: Quantity::Mean,
         frames: (0..step.frames).collect(),
-        region: None,
         splat_error: step.splat_error,
-        allowed: None,
-        limited: Default::default(),
         certify,
         memory: MEMORY,
-        reserved: 0,
-        mode: Default::default(),
+        ..RenderConfig::new(scene, camera.view())
     };
     let report = wavesplat::render::render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered);

@@ -14,7 +14,6 @@ use crate::scenes::{MEMORY, converted, pictures, projection};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::colour::TransferFunction;
@@ -190,10 +189,15 @@ impl Demo {
     ) -> Result<Run> {
         let ending = colours.map_or("-one-channel.wspl", |_| ".wspl");
         let path = self.folder.join(name.to_lowercase() + ending);
-        let config =
-            ConvertConfig { colours: colours.cloned(), ..ConvertConfig::new(basis, window, TOLERANCE, MEMORY) };
+        let config = ConvertConfig {
+            coding: basis.into(),
+            window,
+            colours: colours.cloned(),
+            memory: MEMORY,
+            ..ConvertConfig::new(TOLERANCE)
+        };
         let report = converted(self.source()?.as_mut(), &config, &path)?;
-        let open = || CoefficientFile::open(&path, Access::Map);
+        let open = || CoefficientFile::open(&path);
         let compared = verify(&open()?, Some(self.source()?.as_mut()), MEMORY, &Silent)?.against.unwrap_or_default();
         let (pictures, render) = self.pictures(&mut CoefficientScene::new(open()?, SplatSource::Coefficients))?;
         Ok(Run { name, pictures, render, converted: Some((report, compared)) })

@@ -15,12 +15,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tiles::{SampleStyle, Tile, short};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::output::Output;
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint};
+use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, SplatSource};
 use wavesplat::source::FrameSource;
@@ -141,10 +140,10 @@ impl Gallery {
         let mut source: Box<dyn FrameSource> = input.open_quietly(std::slice::from_ref(path), MEMORY / 4)?;
         let (missing, colours) = (MissingPolicy::Mask, colours.cloned());
         let config =
-            ConvertConfig { missing, colours, ..ConvertConfig::new(SchemeConstraint::AUTO, WINDOW, TOLERANCE, MEMORY) };
+            ConvertConfig { missing, colours, window: WINDOW, memory: MEMORY, ..ConvertConfig::new(TOLERANCE) };
         let path = self.folder.join(format!("{name}.wspl"));
         converted(source.as_mut(), &config, &path)?;
-        CoefficientFile::open(&path, Access::Map).map(Arc::new)
+        CoefficientFile::open(&path).map(Arc::new)
     }
 
     /// The middle frame, as all modes see it.

@@ -1,4 +1,4 @@
-//! What an archive of frames holds.
+//! Describes an archive of frames.
 
 use super::InfoArgs;
 use serde::Serialize;
@@ -8,17 +8,14 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{note_text, print};
 use wavesplat::convert::estimate::{Estimate, estimate};
-use wavesplat::convert::{ConvertConfig, MissingPolicy, SchemeConstraint};
+use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::source::Archive;
-
-/// The window of a conversion that says nothing of it.
-const WINDOW: usize = 32;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]
 struct Info<'a> {
     format: &'static str,
-    /// Whether frames are decoded a window at a time; else they are read where they are.
+    /// Whether frames are decoded a window at a time; else they are read in place.
     decoded: bool,
     dims: [usize; 3],
     spacing: [f64; 3],
@@ -30,7 +27,7 @@ struct Info<'a> {
     units: Option<&'a str>,
     time_units: Option<&'a str>,
     space_units: Option<&'a str>,
-    /// What stands for missing samples: a number, or "NaN".
+    /// The value of missing samples: a number, or "NaN".
     missing_value: Option<String>,
     raw_bytes: Option<u64>,
     notes: Vec<String>,
@@ -39,7 +36,7 @@ struct Info<'a> {
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
     if args.estimate.is_some() && args.inputs == [Path::new(STANDARD)] {
-        return Err(Error::usage("--estimate: reads frames more than once, so not from standard input"));
+        return Err(Error::usage("--estimate: reads frames more than once, so they cannot come from standard input"));
     }
     let source = args.input.open_quietly(&args.inputs, args.common.stream_memory())?;
     let mut source = args.select.narrow(source)?;
@@ -56,10 +53,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     print(&info.text())
 }
 
-/// How `convert` goes about it by default.
+/// The default configuration of `convert`.
 fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
-    let plain = ConvertConfig::new(SchemeConstraint::AUTO, WINDOW, tolerance, memory);
-    ConvertConfig { missing: MissingPolicy::Mask, missing_value: archive.missing_value(None), ..plain }
+    let (missing, missing_value) = (MissingPolicy::Mask, archive.missing_value(None));
+    ConvertConfig { missing, missing_value, memory, ..ConvertConfig::new(tolerance) }
 }
 
 impl<'a> Info<'a> {

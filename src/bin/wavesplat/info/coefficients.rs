@@ -1,4 +1,4 @@
-//! What a coefficient file holds.
+//! Describes a coefficient file.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ struct Info {
     lost_blocks: u64,
     windows: Vec<WindowReport>,
     settings: Vec<(String, String)>,
-    /// What made it: options of `wavesplat convert` by their names.
+    /// The options of `wavesplat convert` that reproduce the file, by name.
     options: BTreeMap<&'static str, String>,
     program: String,
 }
@@ -98,7 +98,7 @@ impl Info {
             "volume     {x} x {y} x {z} voxels, spacing {:?}, origin {:?}\n\
              samples    {} ({name}), {} frames, decoded values {:.4e} to {:.4e}\n\
              size       {} bytes, {ratio:.1}x smaller than raw; {} blocks of {} voxels a side\n\
-             promise    {}: {}\n\
+             bound      {}: {}\n\
              reached    at most {share:.4} of the bound; largest sample error {reached:.4e}\n\
              content    {per_sample:.4} coefficients per sample, {} outliers, {} missing samples\n\
              id         {} ({})\n",
@@ -154,5 +154,5 @@ impl Info {
     }
 }
 
-/// Windows that are listed unless `--verbose` asks for all.
+/// The number of windows listed without `--verbose`.
 const MOST_WINDOWS: usize = 8;

@@ -10,7 +10,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, share};
 use wavesplat::file::CoefficientFile;
 
-/// Say what a coefficient file holds, promises and reached; or what an archive holds, and how it is read
+/// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
 #[derive(Debug, Args)]
 #[command(before_help = "\
 Examples:
@@ -19,10 +19,10 @@ Examples:
   wavesplat info run.nc
   wavesplat info frames/ --estimate 0.001")]
 pub(crate) struct InfoArgs {
-    /// A coefficient file; or frames, as convert takes them
+    /// A coefficient file, or frames as for convert
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// Of frames: convert a few blocks, and say about how large a coefficient file of this tolerance would be [0.01 if none is
+    /// For frames: convert a few blocks, and estimate the size of a coefficient file of this tolerance [0.01 if none is
     /// given]
     #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
     estimate: Option<f64>,
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<()> {
 }
 
 impl InfoArgs {
-    /// The coefficient file that is meant; none if frames are.
+    /// The coefficient file, or none if the inputs are frames.
     fn coefficients(&self) -> Result<Option<CoefficientFile>> {
         let [only] = self.inputs.as_slice() else { return Ok(None) };
         let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");
@@ -55,7 +55,7 @@ impl InfoArgs {
         }
         let foreign =
             |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-        match CoefficientFile::open(only, self.input.access()) {
+        match CoefficientFile::open_with(only, self.input.access()) {
             Err(e) if !named_so && foreign(&e) => Ok(None),
             file => {
                 let file = file?;

@@ -1,46 +1,46 @@
-//! Planes of sums over the cells (eq 35) of a band of a picture.
+//! The cells (eq 35) of a band of a picture, with planes of sums.
 
 use std::ops::Range;
 
-/// A rectangle of cells with some planes, one after another.
+/// A rectangle of cells with planes of sums.
 ///
-/// A row of cells is stored as one run for each of the q phases, cells u = q j + phase of one phase side by side: what
-/// a row of voxels adds to them then is side by side, too.
+/// A row of cells is stored as one run for each of the q phases. The run of a phase holds the cells u = q j + phase
+/// side by side, so the values that a row of voxels adds to them are side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
     rectangle: Rectangle,
-    /// Those that nothing was added to take no room.
+    /// Planes without any value are not allocated.
     planes: Vec<Option<Aligned>>,
 }
 
-/// Where the cells of a rectangle are.
+/// The extent of a rectangle of cells and its layout in memory.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct Rectangle {
-    /// The first cell along u and v; that along u begins a cache line, wherever rectangles begin.
+    /// The first cell along u and v. The first cell along u starts a cache line, at positions common to all rectangles.
     pub(super) first: [isize; 2],
     /// Cells along u and v.
     pub(super) size: [usize; 2],
     /// q
     pub(super) phases: usize,
-    /// Cells of one phase in a row, whole cache lines.
+    /// Cells per phase in a row: a whole number of cache lines.
     pub(super) run: usize,
 }
 
-/// Cells of one phase in a row, whole cache lines of them.
+/// A run of whole cache lines of cells of one phase in a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Run {
-    /// The place in the row of the first that is here.
+    /// The index in the row of the first cell that lies in the rectangle.
     pub(super) start: usize,
-    /// Which of the lines are here.
+    /// The lines that lie in the rectangle.
     pub(super) here: Range<usize>,
-    /// The place in the first line of the cell that was asked for.
+    /// The index of the requested cell in the first line.
     pub(super) inside: usize,
 }
 
 /// Numbers in a cache line.
 pub(super) const LINE: usize = 8;
 
-/// Zeros that begin with a cache line.
+/// Numbers aligned to cache lines, initially zero.
 #[derive(Debug, Default)]
 pub(super) struct Aligned {
     numbers: Vec<f64>,
@@ -50,7 +50,7 @@ pub(super) struct Aligned {
 
 impl Aligned {
     pub(super) fn of(len: usize) -> Self {
-        // Written now: memory that is read before it is written costs twice.
+        // Written here: memory that is read before it is written costs twice.
         let mut numbers = Vec::with_capacity(len + LINE - 1);
         numbers.resize(len + LINE - 1, 0.0);
         let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE - 1);
@@ -73,23 +73,23 @@ impl std::ops::DerefMut for Aligned {
 }
 
 impl Rectangle {
-    /// The smallest one that holds so many cells from some first ones on.
+    /// The smallest rectangle that holds `size` cells from `first` on.
     pub(super) fn holding(first: [isize; 2], size: [usize; 2], phases: usize) -> Self {
         let before = first[0].rem_euclid((phases * LINE) as isize);
         let lines = (size[0] + before as usize).div_ceil(phases * LINE);
-        // Not a power of two: lines below one another would share a few places of the first cache.
+        // Not a power of two: lines below one another would share a few sets of the first-level cache.
         let run = LINE * if (phases * lines).is_multiple_of(8) { lines + 1 } else { lines };
         Self { first: [first[0] - before, first[1]], size: [phases * run, size[1]], phases, run }
     }
 
-    /// Cells of a plane.
+    /// Number of cells in a plane.
     pub(super) fn area(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
-    /// Of so many voxels a whole number of cells apart along an axis, each of which reaches the cell where it is, the
-    /// first at `cell`, and `degree` more: those that reach any that is here.
-    pub(super) fn seen_from(&self, axis: usize, cell: isize, degree: usize, count: usize) -> Range<usize> {
+    /// The voxels of a row that reach the rectangle along an axis. The row has `count` voxels, q cells apart; the first
+    /// reaches `cell` and the `degree` cells after it.
+    pub(super) fn voxels_reaching(&self, axis: usize, cell: isize, degree: usize, count: usize) -> Range<usize> {
         let (before, phases) = (self.first[axis] - cell, self.phases as isize);
         let within = |n: isize| n.clamp(0, count as isize) as usize;
         let start = within((before - degree as isize + phases - 1).div_euclid(phases));
@@ -97,7 +97,7 @@ impl Rectangle {
         start..end.max(start)
     }
 
-    /// Where so many cache lines of a row are, of which cell u lies in the first.
+    /// The run of `lines` cache lines of a row whose first line contains cell u.
     pub(super) fn run_of(&self, u: isize, lines: usize) -> Run {
         let (u, size, line) = (u - self.first[0], self.run as isize, LINE as isize);
         let (phase, j) = (u.rem_euclid(self.phases as isize), u.div_euclid(self.phases as isize));
@@ -108,15 +108,15 @@ impl Rectangle {
         Run { start: start as usize, here, inside: j.rem_euclid(line) as usize }
     }
 
-    /// Where a cell is in its row; none if it is not here.
+    /// The index of cell u in its row; `None` outside the rectangle.
     pub(super) fn in_row(&self, u: isize) -> Option<usize> {
         let u = u - self.first[0];
         let j = u.div_euclid(self.phases as isize);
         (0..self.run as isize).contains(&j).then(|| u.rem_euclid(self.phases as isize) as usize * self.run + j as usize)
     }
 
-    /// Of cells u, u + q, ... of a row, less than `count` cells from u on, those that are here: how far from u they
-    /// begin, and where they are in the row.
+    /// The cells u, u + q, ... of a row, less than `count` cells from u, that lie in the rectangle: the offset of the
+    /// first of them from u, and their range in the row.
     pub(super) fn first_in_row(&self, u: isize, count: usize) -> (usize, Range<usize>) {
         let phases = self.phases;
         let skipped = ((self.first[0] - u).max(0) as usize).div_ceil(phases);
@@ -126,7 +126,7 @@ impl Rectangle {
         (skipped * phases, run)
     }
 
-    /// The cells of row v in a plane; none if it is not here.
+    /// The range of row v in a plane; `None` outside the rectangle.
     pub(super) fn row(&self, v: isize) -> Option<Range<usize>> {
         let v = usize::try_from(v - self.first[1]).ok().filter(|v| *v < self.size[1])?;
         Some(v * self.size[0]..(v + 1) * self.size[0])
@@ -134,23 +134,23 @@ impl Rectangle {
 }
 
 impl Cells {
-    /// Where they are.
+    /// The extent of the cells.
     pub(in crate::render) fn rectangle(&self) -> Rectangle {
         self.rectangle
     }
 
-    /// With all planes at zero.
+    /// Cells with all planes at zero.
     pub(super) fn new(rectangle: Rectangle, planes: usize) -> Self {
         Self { rectangle, planes: (0..planes).map(|_| None).collect() }
     }
 
-    /// The planes that something was added to, and their numbers.
+    /// The allocated planes: their indices and sums.
     pub(super) fn touched(&self) -> impl Iterator<Item = (usize, &[f64])> {
         let planes = self.planes.iter().enumerate();
         planes.filter_map(|(number, sums)| sums.as_deref().map(|sums| (number, sums)))
     }
 
-    /// All planes, where to add.
+    /// All planes, for adding values.
     pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
         let rectangle = self.rectangle;
         self.planes.iter_mut().map(|sums| CellPlane { rectangle, sums }).collect()
@@ -158,7 +158,7 @@ impl Cells {
 }
 
 impl CellPlane<'_> {
-    /// Its sums, at zero if nothing was added yet.
+    /// The sums; allocates them as zeros if necessary.
     pub(super) fn sums(&mut self) -> &mut [f64] {
         let area = self.rectangle.area();
         self.sums.get_or_insert_with(|| Aligned::of(area))
@@ -184,19 +184,20 @@ fn add_to(sums: &mut [f64], more: &[f64]) {
     sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
 }
 
-/// One plane.
+/// One plane of cells.
 #[derive(Debug)]
 pub(in crate::render) struct CellPlane<'a> {
     pub(super) rectangle: Rectangle,
     sums: &'a mut Option<Aligned>,
 }
 
-/// How many of so many planes a bundle has.
+/// The number of planes in a bundle, for `planes` planes in total.
 pub(super) fn side_by_side(planes: usize) -> usize {
     planes.next_power_of_two().min(TOGETHER)
 }
 
-/// Planes that are summed together: their sums stay in registers, and their cells in the first cache for some pixels.
+/// The largest number of planes in a bundle: their sums stay in registers, and their cells in the first-level cache for
+/// some pixels.
 pub(super) const TOGETHER: usize = 16;
 
 #[cfg(test)]
@@ -204,7 +205,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_the_cells_that_are_there() {
+    fn runs_are_the_cells_within_the_rectangle() {
         let rectangle = Rectangle::holding([-3, 2], [14, 2], 2);
         assert_eq!((rectangle.first, rectangle.size, rectangle.run), ([-16, 2], [32, 2], 16));
         let run = |start, here, inside| Run { start, here, inside };

@@ -1,4 +1,4 @@
-//! The pixels of a tile from its cells: sums of cells times the kernel of eq 36.
+//! Gathers the pixels of a tile from its cells: sums of cells times the kernel of eq 36.
 
 use super::cells::{Cells, TOGETHER, side_by_side};
 use super::kernel::Weights;
@@ -7,48 +7,50 @@ use crate::render::splat::tile_rect::TileRect;
 use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 
-/// The cells that a tile sees, with the planes that have any sum there.
+/// The cells that the pixels of a tile need, with the planes that are not zero there.
 #[derive(Debug)]
 pub(in crate::render) struct Gather<'a> {
     lattice: &'a Lattice,
-    place: &'a TileRect,
+    rect: &'a TileRect,
     first: [isize; 2],
     /// Cells along u and v.
     size: [usize; 2],
     used: Vec<usize>,
-    /// For every so many planes their sums side by side, cell by cell.
+    /// Number of planes in a bundle.
     together: usize,
+    /// The sums of the planes of each bundle side by side, cell by cell.
     bundles: Vec<Vec<f64>>,
-    /// Of [`LANES`] pixels.
+    /// The weights of [`LANES`] pixels.
     weights: Vec<Weights>,
 }
 
 impl<'a> Gather<'a> {
-    /// Of layers with the same rectangle of cells and so many planes each; these are counted through all layers.
+    /// Collects the cells of layers with the same rectangle of cells and `count` planes each. Planes are counted
+    /// through all layers.
     pub(in crate::render) fn new(
         lattice: &'a Lattice,
         (layers, count): (&[&Cells], usize),
-        place: &'a TileRect,
+        rect: &'a TileRect,
     ) -> Self {
-        let (first, size) = lattice.seen_by(&place.x, &place.y);
-        let seen = Seen::of(layers[0], first, size);
+        let (first, size) = lattice.cells_reached(&rect.x, &rect.y);
+        let window = CellWindow::of(layers[0], first, size);
         let numbered = |n: usize| move |(plane, sums)| (n * count + plane, sums);
         let planes = layers.iter().enumerate().flat_map(|(n, cells)| cells.touched().map(numbered(n)));
-        let planes: Vec<(usize, &[f64])> = planes.filter(|(_, plane)| seen.any(plane)).collect();
+        let planes: Vec<(usize, &[f64])> = planes.filter(|(_, plane)| window.any(plane)).collect();
         let together = side_by_side(planes.len());
-        let bundles = planes.chunks(together).map(|planes| seen.bundle(planes, together)).collect();
-        let lanes = if planes.is_empty() { 0 } else { LANES }; // nothing is weighed where there is nothing
+        let bundles = planes.chunks(together).map(|planes| window.bundle(planes, together)).collect();
+        let lanes = if planes.is_empty() { 0 } else { LANES }; // without planes there are no weights to compute
         let weights = (0..lanes).map(|_| Weights::of(&lattice.kernel)).collect();
         let used = planes.into_iter().map(|(number, _)| number).collect();
-        Self { lattice, place, first, size, used, together, bundles, weights }
+        Self { lattice, rect, first, size, used, together, bundles, weights }
     }
 
-    /// The planes that have any sum here.
+    /// The planes that are not zero in this tile.
     pub(in crate::render) fn used(&self) -> &[usize] {
         &self.used
     }
 
-    /// The planes at `count` pixels from `first` on, into the first lanes of `planes`.
+    /// Loads the planes at `count` pixels from `first` on into the first lanes of `planes`.
     pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         planes.fill(Lane::default());
         if self.used.is_empty() {
@@ -64,7 +66,8 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// The only plane that there is, at such pixels: rounded in its own way, which no other plane must see.
+    /// The same for a tile with a single plane. It rounds differently from [`Self::load`], so it must not be mixed with
+    /// that.
     pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut sums = Lane::default();
         let from = if self.used.is_empty() { return sums } else { self.weigh(first, count) };
@@ -76,12 +79,12 @@ impl<'a> Gather<'a> {
         sums
     }
 
-    /// The weights of some pixels, and for each the first of its cells.
+    /// Computes the weights of `count` pixels. Returns the index of the first cell of each.
     fn weigh(&mut self, first: usize, count: usize) -> [usize; LANES] {
         let mut from = [0; LANES];
         for (l, weights) in self.weights.iter_mut().enumerate().take(count) {
-            let [x, y] = self.place.pixel(first + l).map(|n| n as f64 + 0.5);
-            let cell = self.lattice.kernel.weights(self.lattice.place([x, y]), weights);
+            let [x, y] = self.rect.pixel(first + l).map(|n| n as f64 + 0.5);
+            let cell = self.lattice.kernel.weights(self.lattice.position([x, y]), weights);
             let [u, v] = [0, 1].map(|i| (cell[i] - self.first[i]) as usize);
             from[l] = v * self.size[0] + u;
         }
@@ -89,17 +92,18 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// Where the cells that a tile sees are in planes.
-struct Seen {
+/// The cells of a tile within the planes of a band.
+struct CellWindow {
     size: [usize; 2],
     phases: usize,
-    /// The rows that are there.
+    /// The range of each row; `None` outside the band.
     rows: Vec<Option<Range<usize>>>,
-    /// Of each phase the cells of a row that are there, and the first of these in the row of the tile.
+    /// For each phase, the index in the tile's row of the first cell that lies in the band, and the range of these
+    /// cells in the band's row.
     runs: Vec<(usize, Range<usize>)>,
 }
 
-impl Seen {
+impl CellWindow {
     fn of(cells: &Cells, first: [isize; 2], size: [usize; 2]) -> Self {
         let (rectangle, phases) = (cells.rectangle(), cells.rectangle().phases);
         let run = |phase: usize| {
@@ -110,13 +114,13 @@ impl Seen {
         Self { size, phases, rows, runs: (0..phases).map(run).collect() }
     }
 
-    /// Whether a plane has any sum here.
+    /// Whether a plane has a nonzero sum in these cells.
     fn any(&self, plane: &[f64]) -> bool {
         let rows = self.rows.iter().flatten().map(|row| &plane[row.clone()]);
         rows.flat_map(|row| self.runs.iter().map(|(_, run)| &row[run.clone()])).any(any)
     }
 
-    /// Some planes side by side, cell by cell, with zeros up to so many.
+    /// Copies planes side by side, cell by cell, padded with zero planes up to `together`.
     fn bundle(&self, planes: &[(usize, &[f64])], together: usize) -> Vec<f64> {
         let mut bundle = vec![0.0; self.size[0] * self.size[1] * together];
         for (to, row) in bundle.chunks_exact_mut(self.size[0] * together).zip(&self.rows) {
@@ -132,13 +136,13 @@ impl Seen {
     }
 }
 
-/// Whether any number is not zero.
+/// Whether any number is nonzero.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn any(numbers: &[f64]) -> bool {
-    numbers.iter().fold(0, |bits, n| bits | (n.to_bits() << 1)) != 0 // of either zero none is left
+    numbers.iter().fold(0, |bits, n| bits | (n.to_bits() << 1)) != 0 // the shift drops the sign of zero
 }
 
-/// The weighted sums of the cells that a pixel sees, the first one being cell `first` of rows of `width`.
+/// The weighted sums of the cells of a pixel. Its first cell has the index `first`, in rows of `width` cells.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sum_cells(weights: &Weights, cells: &[f64], (first, width): (usize, usize), sums: &mut [f64]) {
     match sums.len() {
@@ -150,7 +154,7 @@ fn sum_cells(weights: &Weights, cells: &[f64], (first, width): (usize, usize), s
     }
 }
 
-/// Of `N` planes side by side.
+/// The sums of `N` planes side by side.
 #[inline(always)]
 fn sum_planes<const N: usize>(weights: &Weights, cells: &[f64], (first, width): (usize, usize)) -> [f64; N] {
     let mut sums = [0.0; N];
@@ -166,7 +170,7 @@ fn sum_planes<const N: usize>(weights: &Weights, cells: &[f64], (first, width): 
     sums
 }
 
-/// Of one plane: neighbouring cells are taken together.
+/// The sum of one plane, over several neighbouring cells at a time.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn sum_plane(weights: &Weights, cells: &[f64], (first, width): (usize, usize)) -> f64 {
     let mut sums = [0.0; LANES];

@@ -1,8 +1,8 @@
-//! From cells to pixels: the kernel G that gives the Gaussian footprint once amounts are spread by B-splines.
+//! From cells to pixels: the kernel G that, applied to values spread by B-splines, gives the Gaussian footprint.
 //!
 //! On the lattice the footprint is a Gaussian F of covariance S, in cells. A B-spline of degree n has the spectrum B(w)
-//! = exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)) along each axis. So the kernel of spectrum F / B is, to
-//! first order in the terms of fourth and sixth degree,
+//! = exp(-(n + 1) (w^2 / 24 + w^4 / 2880 + w^6 / 181440 + ...)) along each axis. So the kernel with the spectrum F / B
+//! is, to first order in the terms of fourth and sixth degree,
 //!
 //! ```text
 //! G = (1 + (n+1) (D^4/2880 - D^6/181440)) Gaussian of covariance S - (n+1)/12                             (eq 36)
@@ -16,9 +16,9 @@
 //! sum of |w~_i - w_i| <= stated error * largest sum of w_i                                                (eq 37)
 //! ```
 //!
-//! with w~ the weights reached. If |w~ - w| at a distance d is at most the sum over j of c_j w(d - t_j), for some
-//! shifts t_j, then all voxels together are off by the c_j times what they weigh at places moved by t_j: at most the
-//! sum of the c_j times the largest sum.
+//! where w~ are the weights of the lattice. Let |w~ - w| at a distance d be at most the sum over j of c_j w(d - t_j),
+//! for some shifts t_j. Then the error of all voxels together is at most the sum over j of c_j times their weights at
+//! positions moved by t_j, and so at most the sum of the c_j times the largest sum of weights.
 //!
 //! The weights of a pixel's cells take three exponentials, since the Gaussian factors over whole cells: the fast
 //! Gaussian gridding of [Greengard](crate::bibliography).
@@ -34,30 +34,30 @@ pub(super) struct Kernel {
     degree: usize,
     /// The inverse of its Gaussian's covariance: uu, uv, vv.
     inverse: [f64; 3],
-    /// Of its Gaussian.
+    /// The peak of its Gaussian.
     peak: f64,
-    /// What corrects it along u and along v: polynomials of squares, constants first.
+    /// The corrections along u and along v: polynomials of squares, constants first.
     bends: [[f64; 4]; 2],
     /// From the cell nearest to a pixel, the first cell along u and v that counts.
     first: [isize; 2],
-    /// What its Gaussian is at whole cells, in units of its peak: rows of as many runs, of cells that count or not.
+    /// The Gaussian at whole cells, in units of its peak. All rows have the same number of runs, which include cells
+    /// that do not count.
     table: Vec<Run>,
-    /// For each row the cells that count.
+    /// For each row, the cells that count.
     spans: Vec<Range<usize>>,
 }
 
-/// Numbers of neighbouring cells. Singles are near enough, and as near for values as for weights, of which means are
-/// quotients.
+/// Numbers of neighbouring cells. f32 is precise enough: a mean divides two sums with the same rounded weights.
 type Run = [f32; RUN];
 const RUN: usize = 16;
 
 impl Kernel {
-    /// For a Gaussian of standard deviation `sigma` pixels, cut `radius` deviations from its centre. None if the spline
-    /// is too wide for it, or cells too small.
+    /// The kernel for a Gaussian with a standard deviation of `sigma` pixels, cut at `radius` deviations. `None` if the
+    /// spline is too wide for it, or the cells are too small.
     pub(super) fn new(shear: &Shear, sigma: f64, degree: usize, radius: f64) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
-        // The inverse of S, S, and what the spline leaves of it.
+        // The inverse of S, then S minus the covariance of the spline.
         let [uu, uv, vv] = [b[0] * b[0] + b[1] * b[1], b[0] * c[0] + b[1] * c[1], c[0] * c[0] + c[1] * c[1]];
         let det = uu * vv - uv * uv;
         let spline = (degree + 1) as f64 / 12.0;
@@ -66,7 +66,7 @@ impl Kernel {
         let half = [suu, svv].map(|s| (radius * s.sqrt() + NEARER).floor());
         let usable = suu > 0.0 && svv > 0.0 && left > LEAST_LEFT / det && half.iter().all(|n| *n <= MOST_HALF);
         let (peak, inverse) = ((1.0 / (det * left)).sqrt(), [svv / left, -suv / left, suu / left]);
-        // The exponents that `weights` takes: as singles.
+        // The exponents in `weights` must fit in f32.
         let exponent = |i: usize| 0.5 * half[i] * (inverse[2 * i].abs() + inverse[1].abs());
         let usable = usable && exponent(0) < MOST_EXPONENT && exponent(1) < MOST_EXPONENT;
         let bends = [inverse[0], inverse[2]].map(|i| bend((degree + 1) as f64, i));
@@ -86,9 +86,9 @@ impl Kernel {
                 let near = [[-NEARER, -NEARER], [-NEARER, NEARER], [NEARER, -NEARER], [NEARER, NEARER]];
                 near.iter().any(|n| self.square([u + n[0], v + n[1]]) <= radius * radius)
             };
-            let seen: Vec<usize> = (0..2 * half[0] as usize + 1).filter(counts).collect();
+            let counted: Vec<usize> = (0..2 * half[0] as usize + 1).filter(counts).collect();
             self.table.extend(row);
-            self.spans.push(seen.first().map_or(0..0, |first| *first..first + seen.len()));
+            self.spans.push(counted.first().map_or(0..0, |first| *first..first + counted.len()));
         }
         self
     }
@@ -98,27 +98,27 @@ impl Kernel {
         self.table.len() / self.spans.len()
     }
 
-    /// From a pixel to the furthest cell along u and v that counts, at most.
+    /// An upper bound of the distance from a pixel to any cell that counts, along u and v.
     pub(super) fn half(&self) -> [f64; 2] {
         self.first.map(|n| 0.5 - n as f64)
     }
 
-    /// A squared distance in units of the covariance.
+    /// The squared distance in units of the covariance.
     fn square(&self, [u, v]: [f64; 2]) -> f64 {
         let [uu, uv, vv] = self.inverse;
         (uu * u + 2.0 * uv * v) * u + vv * v * v
     }
 
-    /// The weights of a pixel at `place` (eq 36), row by row, and the first cell of the first row.
+    /// The weights of a pixel at `position` (eq 36), row by row, and the first cell of the first row.
     ///
     /// With du, dv from the nearest cell to the pixel, and i, j from that to another one, the Gaussian is
     ///
     /// ```text
     /// G(du - i, dv - j) = G(du, dv) exp(uu du + uv dv)^i exp(uv du + vv dv)^j G(i, j)        G(0, 0) = 1
     /// ```
-    pub(super) fn weights(&self, place: [f64; 2], out: &mut Weights) -> [isize; 2] {
-        let near = place.map(|p| (p + 0.5).floor());
-        let [du, dv] = [place[0] - near[0], place[1] - near[1]];
+    pub(super) fn weights(&self, position: [f64; 2], out: &mut Weights) -> [isize; 2] {
+        let near = position.map(|p| (p + 0.5).floor());
+        let [du, dv] = [position[0] - near[0], position[1] - near[1]];
         let [uu, uv, vv] = self.inverse;
         let along = out.along.as_flattened_mut().iter_mut().zip(powers(uu * du + uv * dv, self.first[0]));
         along.for_each(|(to, power)| *to = power as f32);
@@ -128,20 +128,20 @@ impl Kernel {
         std::array::from_fn(|i| near[i] as isize + self.first[i])
     }
 
-    /// The kernel at a place.
+    /// The kernel at an offset.
     #[cfg(test)]
     fn at(&self, du: f64, dv: f64) -> f64 {
         self.peak * libm::exp(-0.5 * self.square([du, dv])) * self.correction(du, dv)
     }
 
-    /// What the kernel is in units of its Gaussian.
+    /// The kernel divided by its Gaussian.
     fn correction(&self, du: f64, dv: f64) -> f64 {
         correction(&self.inverse, &self.bends, du, dv)
     }
 
-    /// The weight at `to` of an amount at `from`, both in cells.
+    /// The weight at `to` of a value at `from`, both in cells.
     fn weight(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
-        let [(u, along), (v, across)] = from.map(|place| spread(self.degree, place));
+        let [(u, along), (v, across)] = from.map(|position| spread(self.degree, position));
         let near = to.map(|p| (p + 0.5).floor());
         let [i, j] = [u - near[0] as isize - self.first[0], v - near[1] as isize - self.first[1]];
         let mut sum = 0.0;
@@ -162,19 +162,18 @@ impl Kernel {
         sum
     }
 
-    /// The Gaussian at a place, the quotient of that of the next cell and it, and the quotient of neighbouring
-    /// quotients.
+    /// The Gaussian at an offset, its quotient with the next cell, and the quotient of neighbouring quotients.
     fn gaussian(&self, du: f64, dv: f64) -> [f64; 3] {
         let [uu, uv, _] = self.inverse;
         let weight = self.peak * libm::exp(-0.5 * self.square([du, dv]));
         [weight, libm::exp(uu * (du - 0.5) + uv * dv), libm::exp(-uu)]
     }
 
-    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Infinite as soon as it is known to be
-    /// more than `most`.
+    /// The stated error of eq 37, for footprints w = exp(-d^2 / (2 sigma^2)). Returns infinity as soon as it is known
+    /// to exceed `most`.
     pub(super) fn error(&self, shear: &Shear, sigma: f64, most: f64) -> f64 {
         let mut off = vec![0.0; SIDE * SIDE];
-        // From the middle outwards, and the same on the other side.
+        // From the middle outwards; the other half is symmetric.
         for i in (0..=SIDE * SIDE / 2).rev() {
             let here = self.off(shear, sigma, [i % SIDE, i / SIDE].map(offset));
             if MARGIN * here > most {
@@ -195,40 +194,39 @@ impl Kernel {
         MARGIN * best + BEYOND + SINGLES
     }
 
-    /// The largest difference of both weights at a place, in sigma, whatever the phase of the lattice.
-    fn off(&self, shear: &Shear, sigma: f64, place: [f64; 2]) -> f64 {
-        let exact = libm::exp(-0.5 * (place[0] * place[0] + place[1] * place[1]));
-        let [du, dv] = shear.cells(place.map(|p| p * sigma));
+    /// The largest difference of both weights at an offset in units of sigma, over all phases of the lattice.
+    fn off(&self, shear: &Shear, sigma: f64, position: [f64; 2]) -> f64 {
+        let exact = libm::exp(-0.5 * (position[0] * position[0] + position[1] * position[1]));
+        let [du, dv] = shear.cells(position.map(|p| p * sigma));
         let phases = (0..PHASES * PHASES).map(|i| [i % PHASES, i / PHASES].map(|n| n as f64 / PHASES as f64));
         phases.map(|[u, v]| (self.weight([u, v], [u + du, v + dv]) - exact).abs()).fold(0.0, f64::max)
     }
 
-    /// Cells that a pixel reaches.
+    /// Number of cells of a pixel.
     pub(super) fn cells(&self) -> usize {
         self.spans.iter().map(Range::len).sum()
     }
 }
 
-/// The weights of the cells that a pixel reaches: of a row as many runs as of any other, of which those in its span
-/// count.
+/// The weights of the cells of a pixel. All rows have the same number of runs; the cells in the span of a row count.
 #[derive(Debug)]
 pub(super) struct Weights {
     rows: Vec<[f64; RUN]>,
     spans: Vec<Range<usize>>,
-    /// What the Gaussian changes by along u and along v.
+    /// The factors of the Gaussian along u and along v.
     along: Vec<Run>,
     across: Vec<f64>,
 }
 
 impl Weights {
-    /// Room for those of a kernel.
+    /// Allocates the weights for a kernel.
     pub(super) fn of(kernel: &Kernel) -> Self {
         let (along, across) = (vec![[0.0; RUN]; kernel.runs()], vec![0.0; kernel.spans.len()]);
         Self { rows: vec![[0.0; RUN]; kernel.table.len()], spans: kernel.spans.clone(), along, across }
     }
 
-    /// Row by row the weights that count: the number of the row and of its first cell that does, and those from there
-    /// on.
+    /// The weights that count, row by row: the index of the row, the index of its first cell that counts, and the
+    /// weights from there on.
     #[inline(always)]
     pub(super) fn rows(&self) -> impl Iterator<Item = (usize, usize, &[f64])> {
         let rows = self.rows.chunks_exact(self.along.len()).zip(&self.spans);
@@ -250,7 +248,7 @@ fn bend(splines: f64, i: f64) -> [f64; 4] {
     [constant, (-6.0 * fourth - 45.0 * sixth * i) * i, fourth + 15.0 * sixth * i, -sixth]
 }
 
-/// 1 and both polynomials.
+/// 1 plus both polynomials.
 #[inline(always)]
 fn correction<R: Real>([uu, uv, vv]: &[R; 3], bends: &[[R; 4]; 2], du: R, dv: R) -> R {
     let (su, sv) = (*uu * du + *uv * dv, *uv * du + *vv * dv);
@@ -258,7 +256,7 @@ fn correction<R: Real>([uu, uv, vv]: &[R; 3], bends: &[[R; 4]; 2], du: R, dv: R)
     R::of(1.0) + bend(bends[0], su * su) + bend(bends[1], sv * sv)
 }
 
-/// The weights of all rows; the first cell of the first one is `[du, dv]` before the pixel.
+/// Computes the weights of all rows. `[du, dv]` is the offset of the pixel from the first cell of the first row.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn weigh(kernel: &Kernel, peak: f64, [du, dv]: [f64; 2], out: &mut Weights) {
     let (inverse, bends) = (kernel.inverse.map(|n| n as f32), kernel.bends.map(|bend| bend.map(|n| n as f32)));
@@ -275,35 +273,35 @@ fn weigh(kernel: &Kernel, peak: f64, [du, dv]: [f64; 2], out: &mut Weights) {
     }
 }
 
-/// Cells count that are within the cut, or would be if the pixel were nearer by so much of a cell along both axes.
+/// A cell counts if it would be within the cut for a pixel that is nearer by this share of a cell along both axes.
 const NEARER: f64 = 0.25;
-/// Cells to one side that a kernel may have.
+/// The largest number of cells to one side of a kernel.
 const MOST_HALF: f64 = 100.0;
-/// Its exponential, and what that is multiplied by, must be singles.
+/// The largest exponent: the exponential and its factors must fit in f32.
 const MOST_EXPONENT: f64 = 40.0;
-/// The share of the covariance's determinant that a spline must leave.
+/// The least share of the covariance's determinant that must remain after the spline.
 const LEAST_LEFT: f64 = 0.02;
-/// Places along an axis at which differences are looked at, centred, and the distance of neighbours in sigma.
+/// Number of sampled offsets along an axis, centred, and their spacing in sigma.
 const SIDE: usize = 47;
 const APART: f64 = 0.3;
-/// Phases of the lattice along each axis that are looked at.
+/// Number of sampled phases of the lattice along each axis.
 const PHASES: usize = 6;
-/// Differences below this share of the largest one are taken for that.
+/// Differences below this share of the largest one are raised to it.
 const LEAST: f64 = 3e-3;
-/// Times that the c_j are made to fit better.
+/// Iterations of fitting the c_j.
 const ROUNDS: usize = 12;
-/// For what lies between places and between phases: several times what finer ones have shown.
+/// Margin for differences between sampled offsets and phases: several times the change counted with finer sampling.
 const MARGIN: f64 = 1.25;
-/// For the weights' rounding to singles.
+/// Bound for the rounding of weights to f32.
 pub(super) const SINGLES: f64 = 1e-6;
-/// For what lies beyond all places: 4 exp(-R^2 / 2), as of a cut footprint.
+/// Bound for weights beyond all sampled offsets: 4 exp(-R^2 / 2), as for a cut footprint.
 const BEYOND: f64 = 3e-10;
 
 fn offset(n: usize) -> f64 {
     (n as f64 - (SIDE / 2) as f64) * APART
 }
 
-/// At every place the sum over all places j of c_j w(d - t_j).
+/// The sum over all j of c_j w(d - t_j), at every sampled offset d.
 fn blurred(c: &[f64]) -> Vec<f64> {
     let gaussian: Vec<f64> = (0..SIDE).map(|n| libm::exp(-0.5 * (n as f64 * APART) * (n as f64 * APART))).collect();
     let mut turned = vec![0.0; c.len()];
@@ -313,7 +311,7 @@ fn blurred(c: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Blurs columns, which become rows.
+/// Blurs the columns and transposes.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn blur_and_turn(gaussian: &[f64], c: &[f64], out: &mut [f64]) {
     for to in 0..SIDE {
@@ -340,14 +338,17 @@ mod tests {
             let camera = Camera::new(&view, &grid).expect("a valid view");
             let kernel = Kernel::new(&Shear::new(&camera, &grid, 2), sigma, degree, 5.0).expect("a wide kernel");
             let mut weights = Weights::of(&kernel);
-            for place in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
-                let [u, v] = kernel.weights(place, &mut weights);
+            for position in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
+                let [u, v] = kernel.weights(position, &mut weights);
                 let runs = kernel.runs();
                 for (j, row) in weights.rows.chunks_exact(runs).enumerate() {
                     for (i, weight) in row.as_flattened().iter().enumerate() {
-                        let [du, dv] = [place[0] - (u + i as isize) as f64, place[1] - (v + j as isize) as f64];
+                        let [du, dv] = [position[0] - (u + i as isize) as f64, position[1] - (v + j as isize) as f64];
                         let expected = kernel.at(du, dv);
-                        assert!((weight - expected).abs() < 1e-5 * kernel.peak, "{place:?}: {weight} for {expected}");
+                        assert!(
+                            (weight - expected).abs() < 1e-5 * kernel.peak,
+                            "{position:?}: {weight} for {expected}"
+                        );
                     }
                 }
             }
@@ -391,15 +392,15 @@ mod tests {
 
     /// The largest sums of |w~ - w| and of w of a box of voxels.
     fn sums(shear: &Shear, kernel: &Kernel, sigma: f64, size: [usize; 3]) -> (f64, f64) {
-        let voxels: Vec<[f64; 2]> = Grid::unit(size).whole().iter().map(|v| shear.place(v)).collect();
+        let voxels: Vec<[f64; 2]> = Grid::unit(size).whole().iter().map(|v| shear.position(v)).collect();
         let (mut off, mut most) = (0.0_f64, 0.0_f64);
         for pixel in (0..60 * 60).map(|i| [(i % 60) as f64 + 0.5, (i / 60) as f64 + 0.5]) {
-            let place = shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]));
+            let position = shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]));
             let exact = |v: &[f64; 2]| {
                 let at = shear.pixel(*v);
                 (-((pixel[0] - at[0]).powi(2) + (pixel[1] - at[1]).powi(2)) / (2.0 * sigma * sigma)).exp()
             };
-            off = off.max(voxels.iter().map(|v| (kernel.weight(*v, place) - exact(v)).abs()).sum());
+            off = off.max(voxels.iter().map(|v| (kernel.weight(*v, position) - exact(v)).abs()).sum());
             most = most.max(voxels.iter().map(exact).sum());
         }
         (off, most)

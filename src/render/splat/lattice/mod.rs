@@ -1,18 +1,18 @@
-//! Splatting by way of a lattice: planes of sums on the sheared lattice of the view, instead of a footprint for each
+//! Splatting on a lattice: voxels add to the cells of the view's sheared lattice, instead of a footprint for each
 //! voxel.
 //!
 //! ```text
-//! amounts of a block, plane by plane    spread: to the cells around each voxel, by B-splines
-//! cells of a band of the picture        gather: to pixels, by the kernel that makes Gaussians of B-splines
+//! values of a block, plane by plane     spread: to the cells around each voxel, by B-splines
+//! cells of a band of the picture        gather: to pixels, by the kernel that turns B-splines into Gaussians
 //! ```
 //!
-//! The lattice is that of the shear-warp factorization ([Lacroute](crate::bibliography)): the voxels of a slice across
-//! the principal axis are whole cells apart (eq 35, `shear`). So they all have the same weights, and a block costs a
-//! few products a voxel, however wide footprints are in pixels. A pixel's cost depends on its cells alone. Spreading by
-//! splines and correcting for them afterwards (eq 36, `kernel`) is how nonuniform Fourier transforms place samples on a
-//! grid ([Greengard](crate::bibliography)).
+//! This is the lattice of the shear-warp factorization ([Lacroute](crate::bibliography)): the voxels of a slice
+//! perpendicular to the principal axis are whole cells apart (eq 35, `shear`). So they all have the same weights, and a
+//! block costs a few products per voxel, however wide footprints are in pixels. The cost of a pixel depends only on its
+//! number of cells. Nonuniform Fourier transforms place samples on a grid in the same way: they spread by splines and
+//! correct for the splines afterwards (eq 36, `kernel`; [Greengard](crate::bibliography)).
 //!
-//! Each plane has one owner and meets blocks in file order, so sums depend neither on threads nor on memory.
+//! Each plane has one owner and adds blocks in file order, so sums depend neither on threads nor on memory.
 
 mod cells;
 mod gather;
@@ -31,11 +31,11 @@ pub(super) use picture::Lattice;
 pub(super) use shear::Shear;
 pub(super) use spread::{Placed, Work};
 
-/// How amounts are spread over the cells of a view.
+/// How values are spread over the cells of a view.
 #[derive(Debug, Clone, Copy)]
 struct Spreading {
     shear: Shear,
-    /// Of the B-splines; odd.
+    /// Degree of the B-splines; odd.
     degree: usize,
     tau: f64,
 }

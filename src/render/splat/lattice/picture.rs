@@ -1,5 +1,5 @@
-//! The lattice of one view as a way of splatting: when it is used (its stated error, eq 37, is small enough and it is
-//! less work than footprints), the sums of blocks, and from sums to pixels.
+//! The lattice of one view as a splat backend. A view uses it if its stated error (eq 37) is small enough and it is
+//! less work than footprints.
 
 use super::cells::{Cells, LINE, Rectangle, side_by_side};
 use super::kernel::{Kernel, SINGLES};
@@ -18,23 +18,23 @@ use std::ops::Range;
 pub(in crate::render) struct Lattice {
     spreading: Spreading,
     pub(super) kernel: Kernel,
-    /// Of the footprint, in pixels: no cell further from a pixel is seen.
+    /// Reach of the footprint in pixels: farther cells do not influence a pixel.
     reach: f64,
     /// f at its centre.
     pub(super) peak: f64,
-    /// The cells that voxels reach at all: the first ones, and how many.
+    /// The cells that any voxel reaches: the first along each axis, and their number.
     bounds: ([isize; 2], [usize; 2]),
 }
 
-/// Cells per voxel and degrees of splines, about from the cheapest.
+/// Cells per voxel and degrees of splines, roughly from the cheapest on.
 const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
-/// What amounts grow by from one voxel to the next, at most, as an exponent: rounding grows with its cube.
+/// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
-/// Cells that a tile sees are at most so many.
+/// The largest number of cells of a tile.
 const TILE_CELLS: usize = 4096;
 
 impl Lattice {
-    /// The lattice that splats within `error` (as in [`Method::within`]), and as what it is reported; none if
+    /// The lattice that splats within `error` (as in [`Method::within`]), and its method for reports; `None` if
     /// footprints are better.
     pub(in crate::render) fn within(
         error: f64,
@@ -44,7 +44,7 @@ impl Lattice {
         footprint: &Footprint,
     ) -> Option<(Self, Method)> {
         let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
-        let radius = (2.0 * libm::log(20.0 / error)).sqrt(); // half of the error is left for the lattice
+        let radius = (2.0 * libm::log(20.0 / error)).sqrt(); // leaves half of the error for the lattice
         for (fineness, degree) in CHOICES.into_iter().filter(|_| error > SINGLES) {
             let shear = Shear::new(camera, grid, fineness);
             let kernel = Kernel::new(&shear, sigma, degree, radius);
@@ -69,42 +69,43 @@ impl Lattice {
             return false;
         }
         let depths = self.spreading.shear.depths.map(|z| (self.spreading.tau * z).abs());
-        let pixel = self.seen_by(&(0..1), &(0..1)).1;
+        let pixel = self.cells_reached(&(0..1), &(0..1)).1;
         let steep = depths.into_iter().fold(0.0, f64::max) > STEEPEST;
         !steep && area(pixel) <= TILE_CELLS
     }
 
-    /// Whether whole numbers of cells are small enough for arithmetic.
+    /// Whether cell indices are small enough for exact arithmetic.
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let places = [self.place([0.0; 2]), self.kernel.half()];
+        let positions = [self.position([0.0; 2]), self.kernel.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
-        per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64)) && places.iter().all(|n| within(n, 1e9))
+        per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64))
+            && positions.iter().all(|n| within(n, 1e9))
     }
 
-    /// Products of footprints that a plane takes as long as, about.
+    /// Estimated work for a plane, in products of a footprint.
     fn work(&self, camera: &Camera, clip: &Region) -> f64 {
         let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
         let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
         let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
         let (pixels, side) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
-        let copied = area(self.seen_by(&(0..side), &(0..side)).1) as f64 * pixels / (side * side) as f64;
+        let copied = area(self.cells_reached(&(0..side), &(0..side)).1) as f64 * pixels / (side * side) as f64;
         GATHERING * self.kernel.cells() as f64 * pixels
             + COPYING * copied
             + SPREADING * clip.voxels() as f64 * (degree + 1.0) * (q + 1.0)
     }
 
-    /// Numbers that a thread holds while it splats a block, or gathers a tile of so many planes.
+    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
-        const AMOUNTS: usize = 3; // in their type, as singles, as doubles
+        const VALUES: usize = 3; // in their own type, as f32, as f64
         let side = self.tile();
-        let tile = area(self.seen_by(&(0..side), &(0..side)).1.map(|n| n + 2)); // as rounding and the tile's place have it
+        let tile = area(self.cells_reached(&(0..side), &(0..side)).1.map(|n| n + 2)); // covers rounding and any tile position
         let bundles = planes.next_multiple_of(side_by_side(planes).max(1));
-        self.block_cells(block) + AMOUNTS * block.voxels() + bundles * tile
+        self.block_cells(block) + VALUES * block.voxels() + bundles * tile
     }
 
-    /// The cells that voxels of a region reach: the first ones, and how many.
+    /// The cells that the voxels of a region reach: the first along each axis, and their number.
     fn rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
         let Spreading { shear, degree, .. } = self.spreading;
         let [b, c, a] = shear.axes;
@@ -113,98 +114,98 @@ impl Lattice {
             let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
             let mut voxel = [0; 3];
             [b, c, a].into_iter().for_each(|axis| voxel[axis] = at(axis));
-            let first = shear.place(voxel).map(|place| spread(degree, place).0);
+            let first = shear.position(voxel).map(|position| spread(degree, position).0);
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
         }
-        // A cell more than rounding could move, and for cells beyond the cut that count as well.
+        // One more cell covers rounding, and cells beyond the cut that count as well.
         let pad = 1;
         let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + degree + 1;
         (low.map(|first| first - pad as isize), [size(0), size(1)])
     }
 
-    /// The cells that some pixels see.
-    pub(super) fn seen_by(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
+    /// The cells of a rectangle of pixels: the first along each axis, and their number.
+    pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
         let corners = [x.start, x.end].into_iter().flat_map(|x| [y.start, y.end].map(move |y| [x as f64, y as f64]));
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for place in corners.map(|pixel| self.place(pixel)) {
-            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(place[i]), high[i].max(place[i])));
+        for position in corners.map(|pixel| self.position(pixel)) {
+            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
         }
         let half = self.kernel.half();
         let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
         (first, [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize))
     }
 
-    /// The place in cells of a place in pixels.
-    pub(super) fn place(&self, pixel: [f64; 2]) -> [f64; 2] {
+    /// Converts a position in pixels to cells.
+    pub(super) fn position(&self, pixel: [f64; 2]) -> [f64; 2] {
         let shear = &self.spreading.shear;
         shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]))
     }
 
-    /// The columns and rows of the picture that a block can reach; where it reaches none of these, none of those.
+    /// The columns and rows of the picture that a block can reach. Both are empty if either is.
     pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
         let (first, cells) = self.rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Where the voxels of a block that lie in a region, and with their kernels in a slab if only one is seen, are in
-    /// cells, for planes of `seen`.
+    /// The location in cells of a block's voxels, limited to a region and, if given, a slab. `extent` gives the cells
+    /// of the planes.
     pub(in crate::render) fn placed(
         &self,
         region: &Region,
         clip: (&Region, Option<&Slab>),
-        seen: &Rectangle,
+        extent: &Rectangle,
     ) -> Placed {
-        Placed::new(&self.spreading, region, clip, seen)
+        Placed::new(&self.spreading, region, clip, extent)
     }
 
-    /// The cells that a band of a picture sees, with so many planes at zero.
+    /// The cells of a band of a picture, with all planes at zero.
     pub(in crate::render) fn cells_of(&self, width: usize, rows: &Range<usize>, planes: usize) -> Cells {
-        let ((first, size), (low, most)) = (self.seen_by(&(0..width), rows), self.bounds);
+        let ((first, size), (low, most)) = (self.cells_reached(&(0..width), rows), self.bounds);
         let start = [0, 1].map(|i| first[i].max(low[i]));
         let end = |i: usize| (first[i] + size[i] as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
     }
 
-    /// Pixels a side of a tile: as many as have cells that stay in a core's cache with all planes.
+    /// Pixels per side of a tile: the largest side whose cells with all planes stay in a core's cache.
     pub(in crate::render) fn tile(&self) -> usize {
-        let fits = |side: &usize| area(self.seen_by(&(0..*side), &(0..*side)).1) <= TILE_CELLS;
+        let fits = |side: &usize| area(self.cells_reached(&(0..*side), &(0..*side)).1) <= TILE_CELLS;
         [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1)
     }
 
-    /// Cells of a plane of a band, at most.
+    /// An upper bound of the cells of a plane of a band.
     pub(in crate::render) fn band_cells(&self, width: usize, rows: usize) -> usize {
-        let (size, most) = (self.seen_by(&(0..width), &(0..rows)).1, self.bounds.1);
-        self.held([0, 1].map(|i| (size[i] + 2).min(most[i]))) // as rounding and the band's place have it
+        let (size, most) = (self.cells_reached(&(0..width), &(0..rows)).1, self.bounds.1);
+        self.held([0, 1].map(|i| (size[i] + 2).min(most[i]))) // covers rounding and any band position
     }
 
-    /// Cells of a plane of a block.
+    /// An upper bound of the cells of a plane of a block.
     fn block_cells(&self, region: &Region) -> usize {
         let size = self.rectangle(region).1;
         self.held(size.map(|n| n + MOST_DEGREE + self.spreading.shear.fineness))
     }
 
-    /// Cells that are held where so many are wanted, at most: rows are whole cache lines of each phase.
+    /// An upper bound of the stored cells for a rectangle of `size` cells: rows are whole cache lines for each phase.
     fn held(&self, size: [usize; 2]) -> usize {
         (size[0] + 3 * self.spreading.shear.fineness * LINE) * size[1]
     }
 }
 
-/// What a product takes from cells to pixels, weights included, what copying a cell into a tile takes, and a product
-/// from voxels to cells; in units of a product of a footprint, as measured.
+/// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
+/// product from voxels to cells, in units of a product of a footprint.
 const GATHERING: f64 = 0.5;
 const COPYING: f64 = 5.0;
 const SPREADING: f64 = 0.15;
 
-/// Nothing cheaper has larger errors.
+/// The largest error to aim for: larger errors would not be cheaper.
 const LARGEST: f64 = 0.05;
 
 fn area([width, height]: [usize; 2]) -> usize {
     width * height
 }
 
-/// Products for a plane if all voxels have footprints.
+/// Products for a plane with a footprint for each voxel.
 fn footprint_work(camera: &Camera, clip: &Region, footprint: &Footprint) -> f64 {
     let side = |pixels: usize| (2.0 * footprint.reach + 1.0).min(pixels as f64);
     clip.voxels() as f64 * side(camera.size[0]) * side(camera.size[1])

@@ -1,24 +1,24 @@
-//! The shares of a block's voxels that lie in a slab (eq 29).
+//! The shares of a block's kernels that lie in a slab (eq 29).
 
 use super::Shear;
 use crate::render::splat::slab::Slab;
 use std::ops::Range;
 
-/// The shares of a block's voxels that lie in a slab, row by row.
+/// The shares of a block's kernels that lie in a slab, row by row.
 #[derive(Debug)]
 pub(super) struct Shares {
     slab: Slab,
     /// Rows of a slice.
     rows: usize,
-    /// Of each row of each slice the first voxel along b that has a share, and where its shares are.
+    /// For each row of each slice, the first voxel along b with a share, and the range of the row's shares.
     runs: Vec<(usize, Range<usize>)>,
     shares: Vec<f64>,
-    /// Of each slice the voxels along b and c that have any.
+    /// For each slice, the ranges along b and c that hold all voxels with a share.
     reached: Vec<[Range<usize>; 2]>,
 }
 
 impl Shares {
-    /// Of so many voxels along b, c and a, from `start` on.
+    /// The shares of a box of voxels that begins at `start`. The counts are along b, c and a.
     pub(super) fn new(slab: &Slab, shear: &Shear, start: [usize; 3], [along, rows, slices]: [usize; 3]) -> Self {
         let (runs, shares, reached) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Self { slab: *slab, rows, runs, shares, reached };
@@ -35,7 +35,8 @@ impl Shares {
         all
     }
 
-    /// Adds a row of so many voxels, the first at a depth and each next one so much deeper. Says which have a share.
+    /// Adds a row of `count` voxels: the first at `depth`, each next one deeper by `deeper`. Returns the voxels with a
+    /// share.
     fn push(&mut self, depth: f64, deeper: f64, count: usize) -> Range<usize> {
         let (run, first) = (within(self.slab.reached_from(), depth, deeper, count), self.shares.len());
         self.shares.extend(run.clone().map(|n| self.slab.share(depth + deeper * n as f64)));
@@ -43,18 +44,18 @@ impl Shares {
         run
     }
 
-    /// The shares of a row c of slice k, from its first voxel on that has one.
+    /// The first voxel of row c of slice k that has a share, and the shares from there on.
     pub(super) fn of_row(&self, k: usize, c: usize) -> (usize, &[f64]) {
         let (first, run) = &self.runs[k * self.rows + c];
         (*first, &self.shares[run.clone()])
     }
 
-    /// The voxels along b and c of slice k that have any.
+    /// The ranges along b and c that hold all voxels of slice k with a share.
     pub(super) fn reached(&self, k: usize) -> &[Range<usize>; 2] {
         &self.reached[k]
     }
 
-    /// That of a voxel at a depth.
+    /// The share of a voxel at depth `z`.
     pub(super) fn of_depth(&self, z: f64) -> f64 {
         self.slab.share(z)
     }
@@ -68,7 +69,7 @@ fn depth_of_row(shear: &Shear, start: [usize; 3], [c, k]: [usize; 2]) -> f64 {
     shear.depth(voxel)
 }
 
-/// Of numbers that begin with `first` and grow by `step`, those from `from` to `to`, and maybe one beside them.
+/// The indices of the numbers first + n step between `from` and `to`, possibly with a neighbour on each side.
 fn within([from, to]: [f64; 2], first: f64, step: f64, count: usize) -> Range<usize> {
     let (a, b) = ((from - first) / step, (to - first) / step);
     let (low, high) = if a.is_nan() || b.is_nan() || step == 0.0 {
@@ -89,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_hold_all_that_is_within() {
+    fn ranges_hold_all_numbers_between_the_ends() {
         for (first, step) in [(0.0, 1.0), (5.0, -0.25), (-3.0, 0.0), (2.5, 0.0), (2.0, 1e-12), (1e6, -3.0)] {
             let found = within([2.0, 3.0], first, step, 40);
             for n in 0..40 {

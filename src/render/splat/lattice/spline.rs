@@ -1,20 +1,20 @@
-//! The B-splines that spread an amount over the cells around it ([Unser](crate::bibliography)), by the recurrence of
+//! The B-splines that spread a value over the cells around it ([Unser](crate::bibliography)), by the recurrence of
 //! [DeBoor](crate::bibliography).
 
 /// The highest degree.
 pub(super) const MOST_DEGREE: usize = 7;
 
-/// Weights of the cells around a place.
+/// Weights of the cells around a position.
 pub(super) type Spread = [f64; MOST_DEGREE + 1];
 
-/// The first cell that an amount at `place` reaches, and the weights of that cell and those behind it: `degree` + 1,
-/// odd degrees only. They sum to 1, and the centre of the amount stays where it is.
-pub(super) fn spread(degree: usize, place: f64) -> (isize, Spread) {
-    let below = place.floor();
-    (below as isize - (degree / 2) as isize, weights(degree, place - below))
+/// The first cell that a value at `position` reaches, and the weights of this cell and the `degree` cells after it. The
+/// degree must be odd. The weights sum to 1, and their centre of mass is `position`.
+pub(super) fn spread(degree: usize, position: f64) -> (isize, Spread) {
+    let below = position.floor();
+    (below as isize - (degree / 2) as isize, weights(degree, position - below))
 }
 
-/// The cardinal B-splines that are not zero at `t` in [0, 1), the one furthest to the left first, by the recurrence of
+/// The cardinal B-splines that are nonzero at `t` in [0, 1), from left to right, by the recurrence of
 /// [DeBoor](crate::bibliography).
 fn weights(degree: usize, t: f64) -> Spread {
     let mut n = Spread::default();
@@ -38,12 +38,12 @@ mod tests {
     #[test]
     fn weights_sum_to_one_around_the_place() {
         for degree in [1, 3, 5, 7] {
-            for place in [-3.75, -1.0, 0.0, 0.3, 17.999] {
-                let (first, weights) = spread(degree, place);
+            for position in [-3.75, -1.0, 0.0, 0.3, 17.999] {
+                let (first, weights) = spread(degree, position);
                 let cells = || (first..).zip(&weights[..=degree]);
                 let sum: f64 = weights.iter().sum();
                 let centre: f64 = cells().map(|(cell, w)| cell as f64 * w).sum();
-                assert!((sum - 1.0).abs() < 1e-15 && (centre - place).abs() < 1e-14, "{degree} {place}");
+                assert!((sum - 1.0).abs() < 1e-15 && (centre - position).abs() < 1e-14, "{degree} {position}");
             }
         }
     }

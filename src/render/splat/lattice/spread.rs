@@ -1,7 +1,7 @@
-//! The amounts of a block's voxels to the cells around them, by B-splines at the places of eq 35.
+//! Spreads the values of a block's voxels to the cells around them, by B-splines at the positions of eq 35.
 //!
-//! All voxels of a slice across the principal axis are spread by the same weights. So a row of them is convolved with
-//! the weights along u, once for each phase, and rows of cells are sums of such rows times the weights along v.
+//! All voxels of a slice perpendicular to the principal axis have the same weights. So a row of voxels is convolved
+//! with the weights along u, once for each phase, and a row of cells is a sum of such rows times the weights along v.
 
 use super::Spreading;
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
@@ -14,60 +14,61 @@ use crate::render::splat::slab::Slab;
 use crate::render::splat::tile_rect::intersect;
 use std::ops::Range;
 
-/// Where the voxels of a block are in cells: the same for all planes.
+/// The location of a block's voxels in cells, the same for all planes.
 #[derive(Debug)]
 pub(in crate::render) struct Placed {
     spreading: Spreading,
-    /// The block, and what of it counts.
+    /// The block, and the part of it that counts.
     region: Region,
     clip: Region,
     slices: Vec<Slice>,
-    /// The cells that they reach.
+    /// The cells that the voxels reach.
     rectangle: Rectangle,
-    /// Voxels that count along b, c and a; the first of them, and from one to the next, in an array of all.
+    /// Number of voxels that count along b, c and a. Then, in the array of the block, the index of the first of them
+    /// and the steps to the next one along each axis.
     count: [usize; 3],
     first: usize,
     steps: [usize; 3],
     /// exp(-tau z) from the first voxel along b and c.
     fading: [Vec<f64>; 2],
-    /// What is in the slab, if only one is seen.
+    /// The shares in the slab, if there is one.
     shares: Option<Shares>,
 }
 
-/// A slice of a block across the principal axis.
+/// A slice of a block, perpendicular to the principal axis.
 #[derive(Debug)]
 struct Slice {
-    /// The first cell that its first voxel reaches.
+    /// The first cell that the first voxel reaches.
     cell: [isize; 2],
     along: Spread,
-    /// Times exp(-tau z) of its first voxel.
+    /// Weights along v, times exp(-tau z) of the first voxel.
     across: Spread,
-    /// The voxels along b and along c that reach cells that are there.
-    seen: [Range<usize>; 2],
+    /// The voxels along b and along c that reach cells of the planes.
+    voxels: [Range<usize>; 2],
 }
 
-/// Room for a slice that is being spread.
+/// Scratch for spreading a block.
 #[derive(Debug, Default)]
 pub(in crate::render) struct Work {
-    /// Rows of voxels times their fading, with zeros on both sides.
+    /// Rows of values times their fading, with zeros on both sides.
     faded: Vec<f64>,
     /// The block's own cells.
     sums: Aligned,
-    /// Zeros before a faded row, and all numbers of one.
+    /// Number of zeros before a faded row, and the width of a row with its zeros.
     before: usize,
     width: usize,
-    /// Cache lines that a row reaches, of each phase.
+    /// Cache lines that a row reaches in each phase.
     lines: usize,
 }
 
 impl Placed {
-    /// Of the block at `region`, of which the voxels in `clip` count, and these as far as they are in a slab, for
-    /// planes of some cells.
+    /// Locates the block at `region`, limited to the voxels in `clip` and, if given, to a slab. `extent` gives the
+    /// cells of the planes.
     pub(super) fn new(
         spreading: &Spreading,
         region: &Region,
         (clip, slab): (&Region, Option<&Slab>),
-        seen: &Rectangle,
+        extent: &Rectangle,
     ) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
@@ -77,7 +78,7 @@ impl Placed {
             let depth = spreading.tau * shear.depths[i];
             (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
         });
-        let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], seen);
+        let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], extent);
         let mut slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         let shares = slab.map(|slab| Shares::new(slab, shear, clip.start, count));
         if let Some(shares) = &shares {
@@ -97,45 +98,45 @@ impl Placed {
         }
     }
 
-    /// Adds amounts to a plane.
-    pub(in crate::render) fn add(&self, amounts: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
-        match amounts {
+    /// Adds values to a plane.
+    pub(in crate::render) fn add(&self, values: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
+        match values {
             PlaneValues::Nothing => {}
-            PlaneValues::Single(amounts) => self.add_all(amounts, plane, work),
-            PlaneValues::Double(amounts) => self.add_all(amounts, plane, work),
-            PlaneValues::Few(amounts) => {
-                amounts.iter().for_each(|(voxel, amount)| self.add_one(*voxel, *amount, plane));
+            PlaneValues::Single(values) => self.add_all(values, plane, work),
+            PlaneValues::Double(values) => self.add_all(values, plane, work),
+            PlaneValues::Few(values) => {
+                values.iter().for_each(|(voxel, value)| self.add_one(*voxel, *value, plane));
             }
         }
     }
 
-    /// By way of the block's own cells, which stay in the second cache.
-    fn add_all<R: Real>(&self, amounts: &[R], plane: &mut CellPlane<'_>, work: &mut Work) {
+    /// Adds dense values through the block's own cells, which stay in the second-level cache.
+    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, work: &mut Work) {
         if work.sums.len() < self.rectangle.area() {
             work.sums = Aligned::of(self.rectangle.area());
         }
         let mut sums = std::mem::take(&mut work.sums);
         let own = &mut sums[..self.rectangle.area()];
         own.fill(0.0);
-        add_block(self, amounts, own, work);
+        add_block(self, values, own, work);
         plane.add(&self.rectangle, own);
         work.sums = sums;
     }
 
-    fn add_one(&self, voxel: u32, amount: f64, plane: &mut CellPlane<'_>) {
+    fn add_one(&self, voxel: u32, value: f64, plane: &mut CellPlane<'_>) {
         let Spreading { shear, degree, tau } = &self.spreading;
         let voxel = self.region.voxel(voxel as usize);
         if !(0..3).all(|a| (self.clip.start[a]..self.clip.end[a]).contains(&voxel[a])) {
             return;
         }
         let share = self.shares.as_ref().map_or(1.0, |shares| shares.of_depth(shear.depth(voxel)));
-        let amount = amount * share * libm::exp(-tau * shear.depth(voxel));
-        let [(u, along), (v, across)] = shear.place(voxel).map(|place| spread(*degree, place));
+        let value = value * share * libm::exp(-tau * shear.depth(voxel));
+        let [(u, along), (v, across)] = shear.position(voxel).map(|position| spread(*degree, position));
         for (v, across) in (v..).zip(&across[..=*degree]) {
             let Some(row) = plane.rectangle.row(v) else { continue };
             for (u, along) in (u..).zip(&along[..=*degree]) {
                 if let Some(at) = plane.rectangle.in_row(u) {
-                    plane.sums()[row.start + at] += amount * across * along;
+                    plane.sums()[row.start + at] += value * across * along;
                 }
             }
         }
@@ -143,30 +144,30 @@ impl Placed {
 }
 
 impl Slice {
-    /// Of the `k`-th slice of so many voxels from `start` on.
-    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], seen: &Rectangle) -> Self {
+    /// The `k`-th slice, of `count` voxels along b and c from `start` on.
+    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], extent: &Rectangle) -> Self {
         let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
-        let [u, v] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
+        let [u, v] = spreading.shear.position(voxel).map(|position| spread(spreading.degree, position));
         let fading = libm::exp(-spreading.tau * spreading.shear.depth(voxel));
         let cell = [u.0, v.0];
-        let seen = [0, 1].map(|i| seen.seen_from(i, cell[i], spreading.degree, count[i]));
-        Self { cell, along: u.1, across: v.1.map(|w| w * fading), seen }
+        let voxels = [0, 1].map(|i| extent.voxels_reaching(i, cell[i], spreading.degree, count[i]));
+        Self { cell, along: u.1, across: v.1.map(|w| w * fading), voxels }
     }
 
-    /// Leaves of its voxels those in some ranges along b and c.
+    /// Keeps only the voxels in these ranges along b and c.
     fn keep(&mut self, [b, c]: &[Range<usize>; 2]) {
-        self.seen = [intersect(&self.seen[0], b), intersect(&self.seen[1], c)];
+        self.voxels = [intersect(&self.voxels[0], b), intersect(&self.voxels[1], c)];
     }
 }
 
-/// The cells that slices of so many voxels along b and c reach.
+/// The cells that slices of `count` voxels along b and c reach.
 fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> Rectangle {
     let q = spreading.shear.fineness;
     let range = |i: usize| {
         let cells = || slices.iter().map(|s| s.cell[i]);
         let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
-        // Of rows with fewer taps than others some zeros are added, too.
+        // Includes the zeros that pad rows with fewer taps.
         (low, (high - low) as usize + q * count[i].saturating_sub(1) + spreading.degree.max(MOST_DEGREE) + 1 + q)
     };
     let (u, v) = (range(0), range(1));
@@ -174,24 +175,24 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_block<R: Real>(placed: &Placed, amounts: &[R], sums: &mut [f64], work: &mut Work) {
+fn add_block<R: Real>(placed: &Placed, values: &[R], sums: &mut [f64], work: &mut Work) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
-        (1, ..=4) => add_slices::<R, 1, 4>(placed, amounts, sums, work),
-        (1, _) => add_slices::<R, 1, 8>(placed, amounts, sums, work),
-        (2, ..=2) => add_slices::<R, 2, 2>(placed, amounts, sums, work),
-        (2, 3) => add_slices::<R, 2, 3>(placed, amounts, sums, work),
-        (2, _) => add_slices::<R, 2, 4>(placed, amounts, sums, work),
-        (3, _) => add_slices::<R, 3, 3>(placed, amounts, sums, work),
-        (_, _) => add_slices::<R, 4, 2>(placed, amounts, sums, work),
+        (1, ..=4) => add_slices::<R, 1, 4>(placed, values, sums, work),
+        (1, _) => add_slices::<R, 1, 8>(placed, values, sums, work),
+        (2, ..=2) => add_slices::<R, 2, 2>(placed, values, sums, work),
+        (2, 3) => add_slices::<R, 2, 3>(placed, values, sums, work),
+        (2, _) => add_slices::<R, 2, 4>(placed, values, sums, work),
+        (3, _) => add_slices::<R, 3, 3>(placed, values, sums, work),
+        (_, _) => add_slices::<R, 4, 2>(placed, values, sums, work),
     }
 }
 
-/// `Q` cells per voxel, of which along an axis a cell sees at most `TAPS` voxels.
+/// Adds all slices, with `Q` cells per voxel. At most `TAPS` voxels along an axis reach a cell.
 #[inline(always)]
 fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
     placed: &Placed,
-    amounts: &[R],
+    values: &[R],
     sums: &mut [f64],
     work: &mut Work,
 ) {
@@ -199,13 +200,13 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
     for first in (0..placed.count[1]).step_by(ROWS) {
         let rows = first..placed.count[1].min(first + ROWS);
         for (k, slice) in placed.slices.iter().enumerate() {
-            let rows = rows.start.max(slice.seen[1].start)..rows.end.min(slice.seen[1].end);
+            let rows = rows.start.max(slice.voxels[1].start)..rows.end.min(slice.voxels[1].end);
             if rows.is_empty() {
                 continue;
             }
-            let amounts = &amounts[placed.first + k * placed.steps[2]..];
-            let (live, seen) = (fade_rows(placed, (k, amounts), &rows, work), &slice.seen[0]);
-            let live = live.start.max(seen.start / LINE)..live.end.min(seen.end.div_ceil(LINE));
+            let values = &values[placed.first + k * placed.steps[2]..];
+            let (live, voxels) = (fade_rows(placed, (k, values), &rows, work), &slice.voxels[0]);
+            let live = live.start.max(voxels.start / LINE)..live.end.min(voxels.end.div_ceil(LINE));
             if !live.is_empty() {
                 add_rows::<Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
             }
@@ -213,7 +214,7 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
     }
 }
 
-/// Voxels across rows that are taken through all slices together: what they reach stays in the first cache.
+/// Number of rows that are taken through all slices together: the cells that they reach stay in the first-level cache.
 const ROWS: usize = 32;
 
 impl Work {
@@ -221,18 +222,18 @@ impl Work {
         self.before = LINE - 1 + taps - 1;
         self.lines = (self.before + placed.count[0]).div_ceil(LINE);
         self.width = self.before + self.lines * LINE;
-        // Rows of zeros take the place of those behind the last one.
+        // Rows of zeros follow the last row.
         let rows = ROWS.min(placed.count[1]) + taps - 1;
         self.faded.clear();
         self.faded.resize(rows * self.width, 0.0);
     }
 }
 
-/// Some rows of a slice times their fading; which of their lines of voxels have any that is not zero.
+/// Computes rows of a slice times their fading. Returns the range of cache lines that hold nonzero values.
 #[inline(always)]
 fn fade_rows<R: Real>(
     placed: &Placed,
-    (k, amounts): (usize, &[R]),
+    (k, values): (usize, &[R]),
     rows: &Range<usize>,
     work: &mut Work,
 ) -> Range<usize> {
@@ -242,8 +243,8 @@ fn fade_rows<R: Real>(
     for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
         let row = &mut row[work.before..][..width];
         match &placed.shares {
-            None => fade(&amounts[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row),
-            Some(shares) => share(&amounts[c * across..], along, shares.of_row(k, c), row),
+            None => fade(&values[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row),
+            Some(shares) => share(&values[c * across..], along, shares.of_row(k, c), row),
         }
         live |= live_lines(row);
     }
@@ -252,46 +253,46 @@ fn fade_rows<R: Real>(
     (live.trailing_zeros() as usize).min(end)..end
 }
 
-/// The bit that stands for all lines from there on.
+/// The bit for this line and all lines after it.
 const LAST: usize = 63;
 
-/// Every `step`-th amount times its fading, into a row.
+/// Fills a row with every `step`-th value times its fading.
 #[inline(always)]
-fn fade<R: Real>(amounts: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) {
+fn fade<R: Real>(values: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) {
     if step == 1 {
-        for ((row, amount), fading) in row.iter_mut().zip(amounts).zip(fading) {
-            *row = amount.to_f64() * (scale * fading);
+        for ((row, value), fading) in row.iter_mut().zip(values).zip(fading) {
+            *row = value.to_f64() * (scale * fading);
         }
     } else {
-        for ((row, amount), fading) in row.iter_mut().zip(amounts.iter().step_by(step)).zip(fading) {
-            *row = amount.to_f64() * (scale * fading);
+        for ((row, value), fading) in row.iter_mut().zip(values.iter().step_by(step)).zip(fading) {
+            *row = value.to_f64() * (scale * fading);
         }
     }
 }
 
-/// The same times the share that is in a slab, of a run of voxels; others have none.
+/// Fills a row with every `step`-th value times its share in the slab. Voxels outside the run of shares get zeros.
 #[inline(always)]
-fn share<R: Real>(amounts: &[R], step: usize, (first, shares): (usize, &[f64]), row: &mut [f64]) {
+fn share<R: Real>(values: &[R], step: usize, (first, shares): (usize, &[f64]), row: &mut [f64]) {
     row.fill(0.0);
-    let amounts = amounts.iter().skip(first * step).step_by(step);
-    for ((row, amount), share) in row[first..].iter_mut().zip(amounts).zip(shares) {
-        *row = amount.to_f64() * share;
+    let values = values.iter().skip(first * step).step_by(step);
+    for ((row, value), share) in row[first..].iter_mut().zip(values).zip(shares) {
+        *row = value.to_f64() * share;
     }
 }
 
-/// A bit for each line of a row that is not zero.
+/// A bit for each cache line of a row that is not zero.
 #[inline(always)]
 fn live_lines(row: &[f64]) -> u64 {
     let mut live = 0;
     for (n, line) in row.chunks(LINE).enumerate() {
-        let bits = line.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)); // of either zero none is left
+        let bits = line.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)); // the shift drops the sign of zero
         live |= u64::from(bits != 0) << n.min(LAST);
     }
     live
 }
 
-/// Adds rows of a slice to all cells that they reach, a column of cache lines at a time: down the rows of voxels c,
-/// what is spread along u stays in registers for all rows of cells that it reaches.
+/// Adds rows of a slice to all cells that they reach, one column of cache lines at a time. Down the rows of voxels c,
+/// the values spread along u stay in registers for all rows of cells that they reach.
 #[inline(always)]
 fn add_rows<const Q: usize, const TAPS: usize>(
     (slice, rectangle): (&Slice, &Rectangle),
@@ -323,7 +324,7 @@ fn add_rows<const Q: usize, const TAPS: usize>(
     }
 }
 
-/// The weights that fall on the cells of each phase: of the voxel there, of the one before, ...
+/// The weights of the voxels that reach a cell of each phase: of the voxel at the cell, of the voxel before it, ...
 #[inline(always)]
 fn by_phase<const Q: usize, const TAPS: usize>(weights: &Spread) -> [[f64; TAPS]; Q] {
     let mut of_phases = [[0.0; TAPS]; Q];

@@ -1,4 +1,4 @@
-//! Amounts of blocks, spread slice by slice, against each by itself.
+//! Compares values of blocks that are spread slice by slice with values that are spread one by one.
 
 use super::cells::Rectangle;
 use super::spline::spread;
@@ -39,15 +39,16 @@ fn random_view(random: &mut Random) -> View {
     View { azimuth, elevation, roll, size: [64, 64], scale: None, center: None }
 }
 
-/// The sums of a block's amounts at every cell, of the voxels within `clip`.
-fn each_by_itself(spreading: &Spreading, block: &Region, clip: &Region, amounts: &[f64]) -> BTreeMap<[isize; 2], f64> {
+/// The sums at every cell of the values of a block's voxels within `clip`, spread one by one.
+fn each_by_itself(spreading: &Spreading, block: &Region, clip: &Region, values: &[f64]) -> BTreeMap<[isize; 2], f64> {
     let mut sums = BTreeMap::new();
     for voxel in block.intersect(clip).iter() {
-        let amount = amounts[block.index(voxel)] * (-spreading.tau * spreading.shear.depth(voxel)).exp();
-        let [(u, along), (v, across)] = spreading.shear.place(voxel).map(|place| spread(spreading.degree, place));
+        let value = values[block.index(voxel)] * (-spreading.tau * spreading.shear.depth(voxel)).exp();
+        let [(u, along), (v, across)] =
+            spreading.shear.position(voxel).map(|position| spread(spreading.degree, position));
         for (v, across) in (v..).zip(&across[..=spreading.degree]) {
             for (u, along) in (u..).zip(&along[..=spreading.degree]) {
-                *sums.entry([u, v]).or_insert(0.0) += amount * across * along;
+                *sums.entry([u, v]).or_insert(0.0) += value * across * along;
             }
         }
     }
@@ -58,7 +59,7 @@ fn each_by_itself(spreading: &Spreading, block: &Region, clip: &Region, amounts:
 const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
 
 #[test]
-fn amounts_of_blocks_are_as_each_by_itself() {
+fn slices_spread_like_single_values() {
     let (mut cut, mut clipped) = (0, 0);
     for seed in 0..600 {
         let mut random = Random(seed);
@@ -77,13 +78,13 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let shear = Shear::new(&camera, &grid, fineness);
         let spreading = Spreading { shear, degree, tau: random.pick(&[0.0, 0.2]) };
         let every = random.pick(&[1, 30]);
-        let mut amount = |_| if random.below(every) == 0 { f64::from(random.between(-1.0, 1.0) as f32) } else { 0.0 };
-        let amounts: Vec<f64> = (0..block.voxels()).map(&mut amount).collect();
-        let expected = each_by_itself(&spreading, &block, &clip, &amounts);
+        let mut value = |_| if random.below(every) == 0 { f64::from(random.between(-1.0, 1.0) as f32) } else { 0.0 };
+        let values: Vec<f64> = (0..block.voxels()).map(&mut value).collect();
+        let expected = each_by_itself(&spreading, &block, &clip, &values);
         let cells = || expected.keys().copied();
         let low = [0, 1].map(|i| cells().map(|c| c[i]).min().unwrap_or(0));
         let high = [0, 1].map(|i| cells().map(|c| c[i]).max().unwrap_or(0));
-        // Some cells more on each side, or less, or most of them less on one side.
+        // Grow or shrink the rectangle on each side, or cut most of it on one side.
         let mut more = [0; 4].map(|_| random.below(9) as isize - 3);
         let side = random.below(8);
         if side < 4 {
@@ -93,26 +94,26 @@ fn amounts_of_blocks_are_as_each_by_itself() {
         let size = [0, 1].map(|i| (high[i] - low[i] + 1 + more[i] + more[2 + i]).max(1) as usize);
         let rectangle = Rectangle::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
         let placed = Placed::new(&spreading, &block, (&clip, None), &rectangle);
-        let single: Vec<f32> = amounts.iter().map(|v| *v as f32).collect();
-        let few: Vec<(u32, f64)> = (0..).zip(amounts.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
+        let single: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+        let few: Vec<(u32, f64)> = (0..).zip(values.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways =
-            [PlaneValues::Double(&amounts), PlaneValues::Single(&single), PlaneValues::Few(&few), PlaneValues::Nothing];
+            [PlaneValues::Double(&values), PlaneValues::Single(&single), PlaneValues::Few(&few), PlaneValues::Nothing];
         let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
         let into = planes.planes_mut().into_iter().zip(ways);
-        into.for_each(|(mut plane, amounts)| placed.add(amounts, &mut plane, &mut work));
+        into.for_each(|(mut plane, values)| placed.add(values, &mut plane, &mut work));
         let touched: Vec<usize> = planes.touched().map(|(number, _)| number).collect();
-        assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // few may all be elsewhere
+        assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // sparse values may all lie outside
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
         let placed = Placed::new(&spreading, &block, (&clip, None), &whole);
-        placed.add(PlaneValues::Double(&amounts), &mut all.planes_mut()[0], &mut work);
+        placed.add(PlaneValues::Double(&values), &mut all.planes_mut()[0], &mut work);
         let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.touched().take(2) {
             for (cell, sum) in cells_of(&rectangle, plane) {
                 assert_eq!(
                     sum,
                     all.get(&cell).copied().unwrap_or(0.0),
-                    "{seed}, {number}: where else is looked matters"
+                    "{seed}, {number}: the sum depends on the extent of the planes"
                 );
             }
         }

@@ -11,7 +11,6 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Region;
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample;
 use wavesplat::codec::WindowCodec;
@@ -99,7 +98,7 @@ fn encode(task: &Task) -> Result<(ConvertReport, Vec<u8>)> {
 
 /// Reads and unpacks all codes; returns how many samples have none because their blocks are stored exactly.
 fn codes(path: &Path) -> Result<u64> {
-    let file = CoefficientFile::open(path, Access::Map)?;
+    let file = CoefficientFile::open(path)?;
     let mut exact = 0;
     for_each_block(&file, |place, block| {
         let samples = place.region.voxels() * place.codec.frames();
@@ -111,7 +110,7 @@ fn codes(path: &Path) -> Result<u64> {
 
 /// All samples in their own type, little-endian, as (t, z, y, x).
 fn decode(path: &Path) -> Result<MmapMut> {
-    let file = CoefficientFile::open(path, Access::Map)?;
+    let file = CoefficientFile::open(path)?;
     let whole = file.grid.whole();
     let (size, frame_bytes) = (file.sample().size(), whole.voxels() * file.sample().size());
     let mut out = array(file.frames() * frame_bytes).map_err(|e| Error::io(path, "allocating its samples", e))?;

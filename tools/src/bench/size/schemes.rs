@@ -1,7 +1,7 @@
 //! The measured ways of converting. This benchmark knows only their names and configurations.
 
 use wavesplat::base::error::{Error, Result};
-use wavesplat::convert::{ConvertConfig, SchemeConstraint};
+use wavesplat::convert::ConvertConfig;
 use wavesplat::wavelet::Basis;
 
 /// A way of converting.
@@ -18,12 +18,16 @@ pub const BASELINE: &str = "haar";
 
 /// All schemes. Add a line to add a scheme.
 pub const SCHEMES: [Scheme; 2] = [
-    Scheme { name: BASELINE, config: |tolerance, memory| ConvertConfig::new(Basis::Haar, 32, tolerance, memory) },
-    // The default of `wavesplat convert`.
     Scheme {
-        name: "default",
-        config: |tolerance, memory| ConvertConfig::new(SchemeConstraint::AUTO, 32, tolerance, memory),
+        name: BASELINE,
+        config: |tolerance, memory| ConvertConfig {
+            coding: Basis::Haar.into(),
+            memory,
+            ..ConvertConfig::new(tolerance)
+        },
     },
+    // The default of `wavesplat convert`.
+    Scheme { name: "default", config: |tolerance, memory| ConvertConfig { memory, ..ConvertConfig::new(tolerance) } },
 ];
 
 /// The configuration of a scheme whose tolerance refers to `range`.

@@ -55,8 +55,13 @@ impl Scheme {
 /// Converts to a file, without waiting for the disk.
 pub(super) fn run(conversion: &Conversion) -> Result<Measured> {
     let Conversion { source, scheme, window, tolerance, range, output } = conversion;
-    let plain = ConvertConfig::new(scheme.coding(), *window, *tolerance, MEMORY);
-    let config = ConvertConfig { range: Some(*range), ..plain };
+    let config = ConvertConfig {
+        coding: scheme.coding(),
+        window: *window,
+        range: Some(*range),
+        memory: MEMORY,
+        ..ConvertConfig::new(*tolerance)
+    };
     let out = File::create(output).map_err(|e| Error::io(output, "creating", e))?;
     let (report, time) = Stopwatch::time(|| {
         let mut frames = source::open(std::slice::from_ref(source), &OpenOptions::default())?;

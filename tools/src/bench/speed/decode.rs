@@ -10,7 +10,7 @@ use wavesplat_format::{BlockEntry, Reader};
 
 /// Decodes the codes of all blocks of a file, from opening it, without keeping them. Returns the bytes read of blocks.
 pub(super) fn codes(path: &Path) -> Result<u64> {
-    let file = CoefficientFile::open(path, Access::Map)?;
+    let file = CoefficientFile::open(path)?;
     let whole = file.grid.whole();
     let mut bytes = 0;
     for window in 0..file.metadata().windows.len() as u32 {

@@ -11,10 +11,9 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::{Grid, Region};
-use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, Scene, SplatSource, render};
+use wavesplat::render::{CoefficientScene, FrameScene, Limit, RenderConfig, Scene, SplatSource, render};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::Camera;
 use wavesplat::view::footprint::Kernel;
@@ -129,7 +128,7 @@ impl Opened {
     fn new(view: &View) -> Result<Self> {
         let frames = || source::open(std::slice::from_ref(&view.input), &OpenOptions::default());
         let file = |what| {
-            let file = CoefficientFile::open(&view.input, Access::Map)?;
+            let file = CoefficientFile::open(&view.input)?;
             Ok(Self::Library(Box::new(CoefficientScene::new(file, what))))
         };
         match view.method {
@@ -174,18 +173,14 @@ fn region(view: &View, grid: &Grid) -> Region {
 
 fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[f32])) -> Result<Shown> {
     let config = RenderConfig {
-        views: vec![view.camera.view()],
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
-        quantity: Quantity::Mean,
         frames: view.frames.clone(),
         region: view.region.map(|_| region(view, scene.grid())),
         splat_error: view.splat_error,
         allowed: view.allowed,
         limited: Limit::Expected,
-        certify: false,
         memory: MEMORY,
-        reserved: 0,
-        mode: Default::default(),
+        ..RenderConfig::new(scene, view.camera.view())
     };
     let report = render(scene, &config, &Silent, &mut |rendered| {
         sink(rendered.frame, rendered.picture);

@@ -1,0 +1,52 @@
+//! A storage that counts the bytes that were read of it.
+
+use std::fmt;
+use std::io;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use wavesplat_format::Storage;
+
+/// Any storage that threads may share.
+pub(super) struct Counted {
+    storage: Box<dyn Storage + Send + Sync>,
+    read: AtomicU64,
+}
+
+impl Counted {
+    pub(super) fn new(storage: Box<dyn Storage + Send + Sync>) -> Self {
+        Self { storage, read: AtomicU64::new(0) }
+    }
+
+    /// Bytes that were copied out so far.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.read.load(Relaxed)
+    }
+}
+
+impl fmt::Debug for Counted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Counted").field("len", &self.len()).field("read", &self.read).finish_non_exhaustive()
+    }
+}
+
+impl Storage for Counted {
+    fn len(&self) -> u64 {
+        self.storage.len()
+    }
+
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        self.storage.read_at(offset, out)?;
+        self.read.fetch_add(out.len() as u64, Relaxed);
+        Ok(())
+    }
+
+    fn read_many(&self, ranges: &[Range<u64>]) -> io::Result<Vec<Vec<u8>>> {
+        let read = self.storage.read_many(ranges)?;
+        self.read.fetch_add(read.iter().map(|bytes| bytes.len() as u64).sum(), Relaxed);
+        Ok(read)
+    }
+
+    fn prefers_batches(&self) -> bool {
+        self.storage.prefers_batches()
+    }
+}

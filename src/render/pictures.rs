@@ -1,0 +1,35 @@
+//! A rendering with picture files as its output.
+
+use super::config::RenderConfig;
+use super::report::RenderReport;
+use super::scene::Scene;
+use super::sink::{Sink, SinkConfig};
+use crate::base::error::Result;
+use crate::base::output::names_of_views;
+use crate::base::progress::Silent;
+use crate::colour::Scale;
+use std::path::Path;
+
+/// Renders all frames from all views into PNG files, which replace existing ones.
+///
+/// `path` is a pattern: `%04d` stands for the frame's number, `%v` for the view's; it may lack one that is always the
+/// same. For other formats, progress, or pictures in memory see [`super::render`] and [`Sink`].
+///
+/// # Errors
+/// A pattern that gives several pictures one name, and those of [`super::render`] and of writing files.
+pub fn render_png(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    colours: &Scale,
+    path: impl AsRef<Path>,
+) -> Result<RenderReport> {
+    super::check(scene, config)?;
+    let sink = SinkConfig { force: true, ..SinkConfig::new(scene, config, colours.clone()) };
+    let names = names_of_views(path.as_ref(), config.views.len(), false)?;
+    let shown = |view| config.frames.iter().map(|frame| (view, *frame)).collect();
+    let open = |(view, name): (usize, _)| Sink::open(name, SinkConfig { shown: shown(view), ..sink.clone() });
+    let mut sinks = names.iter().map(std::path::PathBuf::as_path).enumerate().map(open).collect::<Result<Vec<_>>>()?;
+    let report = super::render(scene, config, &Silent, &mut |rendered| sinks[rendered.view].picture(&rendered))?;
+    sinks.into_iter().try_for_each(Sink::finish)?;
+    Ok(report)
+}
