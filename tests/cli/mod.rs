@@ -15,6 +15,7 @@ mod extract;
 mod faults;
 mod formats_out;
 mod generated;
+mod guide;
 mod help;
 mod interrupted;
 mod job;
