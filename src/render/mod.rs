@@ -97,6 +97,7 @@ pub fn render(
 ) -> Result<RenderReport> {
     let started = Instant::now();
     let setups = setups(scene, config)?;
+    Budget::check(config, least(scene, config, &setups)?)?;
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
     report.views = reports(&setups, config);
     let views = report.views.clone();
@@ -123,7 +124,24 @@ pub fn render(
 /// # Errors
 /// The errors that [`render`] would return before its first picture.
 pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
-    setups(scene, config).map(|_| ())
+    least_memory(scene, config).and_then(|least| Budget::check(config, least))
+}
+
+/// The least memory in bytes with which [`render`] renders these views, without the memory of the sink.
+///
+/// # Errors
+/// The errors that [`check`] returns, but for too little memory.
+pub fn least_memory(scene: &dyn Scene, config: &RenderConfig) -> Result<usize> {
+    least(scene, config, &setups(scene, config)?)
+}
+
+/// The least memory for views with these setups.
+fn least(scene: &dyn Scene, config: &RenderConfig, setups: &[ViewSetup]) -> Result<usize> {
+    if config.mode.is_projection() {
+        return Ok(Budget::least(config, scene, setups));
+    }
+    let of_slab = |setup| Ok(Budget::least(config, scene, &slabs::cut(setup, config)?.setups[..1]));
+    setups.iter().try_fold(0, |most: usize, setup| Ok(most.max(of_slab(setup)?)))
 }
 
 /// The report of each view, before anything is splatted.
@@ -132,7 +150,7 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
     config.views.iter().zip(setups).map(|(view, setup)| ViewReport::new(view, setup, slabs(setup))).collect()
 }
 
-/// The setups of all views. An error unless each view alone fits in memory.
+/// The setups of all views.
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check()?;
     if scene.channels() > 1 && !config.mode.is_projection() {
@@ -141,14 +159,5 @@ fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     }
     let volume = (*scene.grid(), scene.blocks());
     let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
-    let setups = config.views.iter().map(setup).collect::<Result<Vec<_>>>()?;
-    match config.mode {
-        Mode::Projection => Budget::check(config, scene, &setups)?,
-        _ => {
-            setups
-                .iter()
-                .try_for_each(|setup| Budget::check(config, scene, &slabs::cut(setup, config)?.setups[..1]))?;
-        }
-    }
-    Ok(setups)
+    config.views.iter().map(setup).collect()
 }

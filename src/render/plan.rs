@@ -36,14 +36,18 @@ pub(super) struct Budget<'a> {
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
-    /// An error unless there is enough memory for each view alone.
-    pub(super) fn check(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> Result<()> {
+    /// The least memory in bytes with which each view can be rendered alone.
+    pub(super) fn least(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
         let planes = most_planes(scene, 1, config);
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
             fixed(config, setups) + Budget::new(config, scene, setups).bytes(1, planes, TILE)
         };
-        let least = setups.iter().map(least).max().unwrap_or(0);
+        setups.iter().map(least).max().unwrap_or(0)
+    }
+
+    /// An error unless the settings allow `least` bytes.
+    pub(super) fn check(config: &RenderConfig, least: usize) -> Result<()> {
         if least <= config.memory {
             return Ok(());
         }

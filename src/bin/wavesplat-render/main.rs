@@ -35,7 +35,7 @@ use wavesplat::render::annotate::{Annotation, room};
 use wavesplat::render::sink::{Depth, PictureFormat, Provenance, Sink};
 use wavesplat::render::{
     CoefficientScene, FrameScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, default_splat_error,
-    render,
+    least_memory, render,
 };
 use wavesplat::source::Archive;
 use wavesplat::view::camera::{Camera, View};
@@ -213,7 +213,7 @@ impl Cli {
         let metadata = file.as_ref().map(|file| file.metadata());
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
-        config.memory = self.memory_besides_sinks(&targets, &config)?;
+        config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.without_extremes(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
@@ -265,17 +265,22 @@ impl Cli {
         self.common.report(reported, self.output == Path::new(STANDARD))
     }
 
-    /// Bytes of memory that are left for rendering.
+    /// The memory that is left for rendering, in bytes. An error if it does not suffice.
     fn memory_besides_sinks(
         &self,
+        scene: &dyn Scene,
         (pictures, errors): &(Targets, Option<Targets>),
         config: &RenderConfig,
     ) -> Result<usize> {
         let errors = errors.as_ref().map_or(Ok(0), |errors| errors.memory(self.depth, config))?;
         let taken = pictures.memory(self.depth, config)? + errors;
-        config.memory.checked_sub(taken).ok_or_else(|| {
-            Error::usage(format!("--memory: writing these pictures takes {}MiB", taken.div_ceil(1 << 20)))
-        })
+        let needed = least_memory(scene, config)? + taken;
+        if needed > config.memory {
+            let ([width, height], mib) = (self.size.0, needed.div_ceil(1 << 20));
+            let what = format!("pictures of {width}x{height} pixels of this volume need at least {mib}MiB");
+            return Err(Error::setting("memory", what));
+        }
+        Ok(config.memory - taken)
     }
 
     /// The files for pictures and for their errors. No file may be written twice, and no input may be overwritten.
