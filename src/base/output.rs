@@ -60,6 +60,7 @@ fn parts() -> MutexGuard<'static, Vec<(PathBuf, Arc<AtomicBool>)>> {
 
 /// Removes all unfinished files but those that can be gone on with, which it names. The process must end now: whoever gives a
 /// file its name, or takes one away, waits for ever.
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "only programs end on signals"))]
 pub(crate) fn abandon() -> Vec<PathBuf> {
     let parts = parts();
     let is_kept = |keep: &AtomicBool| keep.load(Ordering::Relaxed);

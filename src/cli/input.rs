@@ -190,6 +190,7 @@ impl InputArgs {
 }
 
 /// Fills an option that was not given with what a file remembers.
+#[cfg(feature = "cli")]
 fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, of: &CoefficientFile, name: &str) -> Result<()> {
     if option.is_none() {
         *option = remembered(of, name)?;

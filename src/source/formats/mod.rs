@@ -180,7 +180,9 @@ fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<Format>> {
 /// The variables of a file among which the user must choose; none if it is clear which one is meant.
 pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
     match format_of(path, options)? {
+        #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.undecided(),
+        #[cfg(feature = "netcdf")]
         Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.undecided(),
         #[cfg(feature = "zarr")]
         Some(Format::Zarr) => arrays::open_zarr(path, options)?.undecided(),

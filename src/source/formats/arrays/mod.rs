@@ -124,6 +124,7 @@ trait ArrayFile: Send {
 /// How a file is read.
 #[derive(Debug, Clone, Copy)]
 struct ReadConfig {
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code, reason = "Zarr stores are folders, read by their crate"))]
     access: Access,
     /// Bytes that reading may take.
     memory: usize,
@@ -178,13 +179,20 @@ pub(super) struct ArrayArchive {
 }
 
 /// Opens an HDF5 file. One that the NetCDF library wrote is a NetCDF file, whatever its name is.
+#[cfg(feature = "hdf5")]
 pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let archive = ArrayArchive::open(path, path, hdf5::open, options)?;
-    let is_netcdf = archive.file.group("/").contains_key("_NCProperties");
-    if is_netcdf { open_netcdf(path, options) } else { Ok(archive) }
+    match archive.file.group("/").contains_key("_NCProperties") {
+        #[cfg(feature = "netcdf")]
+        true => open_netcdf(path, options),
+        #[cfg(not(feature = "netcdf"))]
+        true => Err(super::not_built_in(path, super::Format::NetCdf)),
+        false => Ok(archive),
+    }
 }
 
 /// Opens a NetCDF file.
+#[cfg(feature = "netcdf")]
 pub(super) fn open_netcdf(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     ArrayArchive::open(path, path, netcdf::open, options)
 }
