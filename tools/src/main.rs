@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use wavesplat::base::error::{Error, Result};
+use wavesplat::base::error::{Error, Remedy, Result};
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::InputArgs;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
@@ -401,7 +401,8 @@ fn bench(args: &BenchArgs) -> Result<()> {
 
 fn report(error: &Error) -> ExitCode {
     // If even the message cannot be written, nothing more can be done.
-    let _ = writeln!(io::stderr().lock(), "error: {error}");
+    let tip = if matches!(error.remedy(), Some(Remedy::Replace)) { "; --force replaces it" } else { "" };
+    let _ = writeln!(io::stderr().lock(), "error: {error}{tip}");
     ExitCode::from(error.exit_code())
 }
 
