@@ -6,7 +6,7 @@ use clap::Command;
 use std::borrow::Cow;
 
 /// An error in one line or more, and a tip where something helps.
-pub(super) fn of_error(error: &Error, command: &Command) -> String {
+pub fn of_error(error: &Error, command: &Command) -> String {
     let text = match error {
         Error::Setting { setting, problem, .. } => format!("error: {}: {problem}", option(setting, command)),
         other => format!("error: {other}"),

@@ -19,7 +19,6 @@ mod generate;
 mod input;
 #[cfg(feature = "cli")]
 mod lines;
-#[cfg(feature = "cli")]
 mod messages;
 #[cfg(feature = "cli")]
 mod optional;
@@ -36,8 +35,7 @@ pub use common::{CommonArgs, report_text};
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
-#[cfg(feature = "cli")]
-pub use messages::of_note as note_text;
+pub use messages::{of_error as error_text, of_note as note_text};
 #[cfg(feature = "cli")]
 pub use program::{command, main};
 #[cfg(feature = "cli")]

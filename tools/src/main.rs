@@ -1,12 +1,13 @@
 //! The program: the demo, the gallery, synthetic archives, differences of pictures and the benchmark.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use wavesplat::base::error::{Error, Remedy, Result};
+use wavesplat::base::error::{Error, Result};
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::InputArgs;
+use wavesplat::cli::error_text;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
@@ -401,8 +402,7 @@ fn bench(args: &BenchArgs) -> Result<()> {
 
 fn report(error: &Error) -> ExitCode {
     // If even the message cannot be written, nothing more can be done.
-    let tip = if matches!(error.remedy(), Some(Remedy::Replace)) { "; --force replaces it" } else { "" };
-    let _ = writeln!(io::stderr().lock(), "error: {error}{tip}");
+    let _ = writeln!(io::stderr().lock(), "{}", error_text(error, &Cli::command()));
     ExitCode::from(error.exit_code())
 }
 
