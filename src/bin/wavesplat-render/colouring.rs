@@ -1,7 +1,6 @@
 //! The colours of the pictures of a run.
 
-use crate::Cli;
-use crate::QuantityName;
+use crate::args::{Cli, QuantityName};
 use crate::ranges::Ranges;
 use crate::targets::Targets;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! `--generate`: the program's completions and man page, instead of pictures.
 
-use crate::Cli;
+use crate::args::Cli;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
 use wavesplat::base::error::Result;
 use wavesplat::cli::{self, Generated};

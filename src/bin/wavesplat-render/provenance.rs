@@ -1,8 +1,8 @@
 //! The settings stored in the pictures of a run.
 
 use crate::along::ModeName;
+use crate::args::{Cli, ErrorName, MethodName, QuantityName};
 use crate::colouring::Colouring;
-use crate::{Cli, ErrorName, MethodName, QuantityName};
 use wavesplat::colour::{Norm, Scale};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::BoundReport;

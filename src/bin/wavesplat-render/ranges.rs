@@ -1,6 +1,6 @@
 //! The default range of colours, taken from small pictures.
 
-use crate::Cli;
+use crate::args::Cli;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};

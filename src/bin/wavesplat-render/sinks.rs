@@ -1,6 +1,6 @@
 //! The sinks that write pictures.
 
-use crate::Cli;
+use crate::args::Cli;
 use crate::colouring::Colouring;
 use crate::provenance::error_provenance;
 use crate::targets::Targets;

@@ -1,10 +1,13 @@
 //! The files that pictures go to.
 
+use crate::args::Cli;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::{STANDARD, names_of_views};
-use wavesplat::render::RenderConfig;
-use wavesplat::render::sink::{Depth, PictureFormat};
+use wavesplat::base::output::{Output, STANDARD, names_of_views};
+use wavesplat::cli::spare_inputs;
+use wavesplat::render::sink::{Depth, PictureFormat, Sink};
+use wavesplat::render::{RenderConfig, Scene, least_memory};
 
 /// The files of pictures: one for each view, or one for all.
 pub(crate) struct Targets {
@@ -30,6 +33,68 @@ impl Targets {
     pub(crate) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
         let each = config.frames.len() * config.views.len() / self.names.len();
         Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())
+    }
+}
+
+impl Cli {
+    /// The memory that is left for rendering, in bytes. An error if it does not suffice.
+    pub(crate) fn memory_besides_sinks(
+        &self,
+        scene: &dyn Scene,
+        (pictures, errors): &(Targets, Option<Targets>),
+        config: &RenderConfig,
+    ) -> Result<usize> {
+        let errors = errors.as_ref().map_or(Ok(0), |errors| errors.memory(self.depth, config))?;
+        let taken = pictures.memory(self.depth, config)? + errors;
+        let needed = least_memory(scene, config)? + taken;
+        if needed > config.memory {
+            let ([width, height], mib) = (self.size.0, needed.div_ceil(1 << 20));
+            let what = format!("pictures of {width}x{height} pixels of this volume need at least {mib}MiB");
+            return Err(Error::setting("memory", what));
+        }
+        Ok(config.memory - taken)
+    }
+
+    /// The files for pictures and for their errors. No file may be written twice, and no input may be overwritten.
+    pub(crate) fn targets(&self, config: &RenderConfig) -> Result<(Targets, Option<Targets>)> {
+        if self.format.is_none() {
+            refuse_video(&self.inputs, &self.output)?;
+        }
+        let pictures = Targets::new(&self.output, self.format, config)?;
+        self.colour.check(pictures.format)?;
+        let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
+        if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
+            return Err(Error::usage("--error-image: takes a file of its own"));
+        }
+        let are_png = [Some(&pictures), errors.as_ref()].into_iter().flatten().any(|targets| targets.format.is_png());
+        if self.depth == Depth::Sixteen && !are_png {
+            let what = "is of png, apng and sheet; gray16 has 16 bits, npy and exr have floats";
+            return Err(Error::usage(format!("--depth 16: {what}")));
+        }
+        let mut written = HashSet::new();
+        if let Some(path) = &self.sidecar {
+            self.check_sidecar(path)?;
+            written.insert(path.clone());
+        }
+        for targets in [Some(&pictures), errors.as_ref()].into_iter().flatten() {
+            for name in &targets.names {
+                spare_inputs(&self.inputs, name)?;
+                let paths = Sink::paths(name, targets.format, &config.frames)?;
+                if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
+                    let what = "would be written twice: --error-image takes a file of its own, as does --sidecar, and every picture a name";
+                    return Err(Error::usage(format!("{}: {what}", twice.display())));
+                }
+            }
+        }
+        Ok((pictures, errors))
+    }
+
+    fn check_sidecar(&self, path: &Path) -> Result<()> {
+        if path == Path::new(STANDARD) {
+            return Err(Error::usage("--sidecar: takes a file of its own; --json prints"));
+        }
+        spare_inputs(&self.inputs, path)?;
+        Output::check(path, self.force)
     }
 }
 
@@ -62,7 +127,7 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
 const VIDEOS: [&str; 6] = ["mp4", "mov", "avi", "mkv", "webm", "gif"];
 
 /// An error with the pipe to type if `output` is the name of a video.
-pub(crate) fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
+fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let ending = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     if !VIDEOS.contains(&ending.as_str()) {
         return Ok(());

@@ -40,7 +40,7 @@ impl Annotation {
 }
 
 /// Width in pixels of the colour bar and its values, at the right edge of a picture of this size; 0 if they do not fit.
-pub fn room([width, height]: [usize; 2]) -> usize {
+pub fn colour_bar_width([width, height]: [usize; 2]) -> usize {
     const LETTERS: usize = 12;
     let bar = LETTERS * Letters::for_side(width.min(height)).width;
     if 2 * bar <= width { bar } else { 0 }

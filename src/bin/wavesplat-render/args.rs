@@ -1,0 +1,170 @@
+//! The arguments of `wavesplat-render`.
+
+use crate::along::AlongArgs;
+use crate::colours::ColourArgs;
+use crate::targets::{parse_depth, parse_format};
+use clap::{Parser, ValueEnum};
+use std::path::PathBuf;
+use wavesplat::cli::{CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share};
+use wavesplat::render::Limit;
+use wavesplat::render::sink::{Depth, PictureFormat};
+
+/// Render pictures of time-varying volumes.
+#[derive(Debug, Parser)]
+#[command(
+    name = "wavesplat-render",
+    version,
+    arg_required_else_help = true,
+    before_help = "\
+Examples:
+  wavesplat-render run.wspl -o frame_%04d.png
+  wavesplat-render run.wspl --view 45,20 --frames 10 --colormap turbo -o picture.png
+  wavesplat-render run.wspl -o values.npy --size 800x600 --sidecar values.json
+  wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
+  wavesplat-render run.wspl --orbit 90 --frames 10 --annotate -o turntable.apng
+  wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
+  wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
+  wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
+  wavesplat-render frames/ --method direct -o frame_%04d.png",
+    after_help = "\
+An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; with --colormap it \
+holds uint8 colours. A PNG stores its render settings as text, an .exr as comments. \
+View 0,0 looks along -y with z up. Azimuth turns the camera about z, counter-clockwise seen from above: 90,0 looks \
+along x. A tau of about 1 / the volume's depth makes the near side stand out."
+)]
+pub(crate) struct Cli {
+    /// Coefficient file; --method direct also takes frames
+    #[arg(required = true)]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// File to write, a pattern like frame_%04d.png, or - for standard output. %v or %03v becomes the number of the
+    /// view; a file name without a pattern takes all views of one frame, one after another
+    #[arg(short, long, value_name = "OUT", help_heading = "Output")]
+    pub(crate) output: PathBuf,
+    /// Replace existing files
+    #[arg(long, help_heading = "Output")]
+    pub(crate) force: bool,
+    /// Azimuth and elevation in degrees; repeat for more views. The views of one run share its reading, and need %v in
+    /// the file name
+    #[arg(
+        long = "view",
+        value_name = "AZ,EL",
+        default_value = "30,30",
+        allow_hyphen_values = true,
+        help_heading = "View"
+    )]
+    pub(crate) views: Vec<Pair>,
+    /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
+    /// their scales
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
+    pub(crate) orbit: u32,
+    /// Turn the picture counter-clockwise by this many degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "View")]
+    pub(crate) roll: f64,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", help_heading = "View")]
+    pub(crate) size: Whole<2>,
+    /// Pixels per world unit [default: fit the whole volume]
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "View")]
+    pub(crate) scale: Option<f64>,
+    /// World point in the middle of the picture [default: the volume's centre]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
+    pub(crate) center: Option<Triple>,
+    /// Render only these frames: ranges a:b:step or numbers, separated by commas
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
+    pub(crate) frames: Option<FrameList>,
+    /// Render only these voxels: x0:x1,y0:y1,z0:z1
+    #[arg(long, value_name = "BOX", help_heading = "View")]
+    pub(crate) region: Option<RegionSpec>,
+    /// Attenuation per world unit of depth. Pixels whose weights sum to less than 1 % of the view's largest are
+    /// background
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
+    pub(crate) tau: f64,
+    /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
+    #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
+    pub(crate) sigma: Option<f64>,
+    /// Error that splatting may add; more is faster. For means it is a share of the value range, at pixels with the
+    /// view's largest weights (elsewhere in inverse proportion to the weights); for emissions, a share of the brightest
+    /// pixel that the largest sample could give. 0 uses the exact method [default: half of --tolerance or the file's
+    /// tolerance, at most 1e-3]
+    #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
+    pub(crate) splat_error: Option<f64>,
+    /// Read and splat less: pictures may be off by this share of the value range (emissions: as if samples were). At
+    /// least the file's largest sample error, or see --error
+    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]
+    pub(crate) tolerance: Option<f64>,
+    /// Error that --tolerance limits; both are reported
+    #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
+    pub(crate) error: ErrorName,
+    /// Also write pictures of the certified error: no pixel is further than this from the picture of the source's
+    /// samples, splatted without a cut (a file or pattern like -o; .npy in units of --quantity, colours from 0 to the
+    /// largest error of small pictures)
+    #[arg(long, value_name = "OUT", help_heading = "Error")]
+    pub(crate) error_image: Option<PathBuf>,
+    /// Quantity that a pixel shows
+    #[arg(long, value_enum, default_value = "mean", help_heading = "Along the ray")]
+    pub(crate) quantity: QuantityName,
+    #[command(flatten)]
+    pub(crate) colour: ColourArgs,
+    #[command(flatten)]
+    pub(crate) along: AlongArgs,
+    /// Render from coefficients, or frame by frame (the conventional method)
+    #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
+    pub(crate) method: MethodName,
+    /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), or exr if
+    /// it was built in [default: by the extension of OUT; png for -]
+    #[arg(long, value_parser = parse_format, help_heading = "Output")]
+    pub(crate) format: Option<PictureFormat>,
+    /// Bits per channel of a PNG: 8, or 16 (with --colormap grey, a single channel)
+    #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth, help_heading = "Output")]
+    pub(crate) depth: Depth,
+    /// Also write the --json report to a file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) sidecar: Option<PathBuf>,
+    /// Frames per second of a y4m or apng
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
+    pub(crate) fps: u32,
+    /// A value that means "missing" in frames, besides NaN and infinities
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = "Input")]
+    pub(crate) missing_value: Option<f64>,
+    /// Show damaged and lost blocks of a coefficient file as missing samples, and render the rest; exit code 3. No
+    /// error is certified then
+    #[arg(long, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Input")]
+    pub(crate) skip_damaged: bool,
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    #[command(flatten)]
+    pub(crate) common: CommonArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QuantityName {
+    /// The weighted mean along the ray, in the samples' unit
+    Mean,
+    /// The sum along the ray: value times length
+    Emission,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ErrorName {
+    /// The largest error of any sample, guaranteed
+    Certified,
+    /// The root mean square error over the pixels, estimated
+    Expected,
+}
+
+impl From<ErrorName> for Limit {
+    fn from(name: ErrorName) -> Self {
+        match name {
+            ErrorName::Certified => Self::Certified,
+            ErrorName::Expected => Self::Expected,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Splat coefficients once for all frames of a window
+    Coefficients,
+    /// Splat every frame
+    Direct,
+}

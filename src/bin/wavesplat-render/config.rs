@@ -1,0 +1,61 @@
+//! The settings of a run.
+
+use crate::args::{Cli, ErrorName, MethodName, QuantityName};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::colour::TransferFunction;
+use wavesplat::convert::range_bound;
+use wavesplat::render::{Quantity, RenderConfig, Scene, default_splat_error};
+use wavesplat::view::footprint::Kernel;
+use wavesplat_format::Metadata;
+
+impl Cli {
+    pub(crate) fn config(
+        &self,
+        scene: &dyn Scene,
+        file: Option<&Metadata>,
+        colours: Option<&TransferFunction>,
+    ) -> Result<RenderConfig> {
+        let grid = scene.grid();
+        let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
+        let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
+        let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
+        if !(splat_error.is_finite() && splat_error >= 0.0) {
+            return Err(Error::usage("--splat-error: takes a number of 0 or more"));
+        }
+        let all = scene.frames().unwrap_or(0);
+        Ok(RenderConfig {
+            views: self.views(grid)?,
+            kernel: Kernel::new(self.sigma, self.tau, grid)?,
+            quantity: match self.quantity {
+                QuantityName::Mean => Quantity::Mean,
+                QuantityName::Emission => Quantity::Emission,
+            },
+            frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
+            region: self.region.map(|r| r.resolve(grid)).transpose()?,
+            splat_error,
+            allowed,
+            limited: self.error.into(),
+            certify: self.error_image.is_some(),
+            mode: self.along.mode(colours)?,
+            memory: self.common.memory.0,
+        })
+    }
+
+    /// The allowed sample error under a looser tolerance, in the unit of the samples.
+    fn allowed(&self, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
+        let Some(file) = file.filter(|_| self.method == MethodName::Coefficients) else {
+            return Err(Error::usage("--tolerance: leaves out coefficients, so it needs --method coefficients"));
+        };
+        if !(0.0..=1.0).contains(&tolerance) {
+            return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
+        }
+        let allowed = range_bound(tolerance, file.range());
+        let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
+        if allowed < reached && self.error == ErrorName::Certified {
+            let least = reached / (file.range().1 - file.range().0);
+            let what = "the file itself is up to";
+            return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
+        }
+        Ok(allowed)
+    }
+}

@@ -1,0 +1,77 @@
+//! What a run reports: notes, the sidecar and `--json`.
+
+use crate::along::ModeName;
+use crate::args::Cli;
+use crate::colouring::ColouredPictures;
+use serde::Serialize;
+use std::io::Write;
+use std::path::Path;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::{Output, STANDARD};
+use wavesplat::cli;
+use wavesplat::render::RenderReport;
+use wavesplat::render::sink::Provenance;
+
+/// The report of `--json`.
+#[derive(Serialize)]
+pub(crate) struct Reported<'a> {
+    #[serde(flatten)]
+    pub(crate) report: &'a RenderReport,
+    #[serde(flatten)]
+    pub(crate) coloured: ColouredPictures,
+    /// The settings stored in every picture; `views` has those of each view.
+    pub(crate) picture: &'a Provenance,
+    /// Bytes read of the coefficient file, including its directory, and its size.
+    pub(crate) file_bytes_read: Option<u64>,
+    pub(crate) file_bytes: Option<u64>,
+}
+
+impl Cli {
+    /// Prints notes on the errors of pictures.
+    pub(crate) fn note_errors(&self, report: &RenderReport) {
+        let RenderReport { certified_sample_error, expected_error, left_out, .. } = report;
+        if self.tolerance.is_some() && self.along.mode != ModeName::Projection {
+            self.common.note(format_args!(
+                "no sample is off by more than {certified_sample_error:.4e}; {} coefficients left out",
+                left_out.coefficients
+            ));
+        } else if self.tolerance.is_some() {
+            self.common.note(format_args!(
+                "no sample is off by more than {certified_sample_error:.4e}; pixels are expected to be by \
+                 {expected_error:.4e} (root mean square); {} coefficients left out",
+                left_out.coefficients
+            ));
+        }
+        if let Some(error) = report.certified_error {
+            self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
+        }
+    }
+
+    /// Writes the sidecar and prints the report, if asked for.
+    pub(crate) fn report(&self, reported: &Reported<'_>) -> Result<()> {
+        if let Some(path) = &self.sidecar {
+            let mut out = Output::create(path, self.force)?;
+            out.write_all(cli::report_text(reported)?.as_bytes()).map_err(|e| Error::io(path, "writing", e))?;
+            out.commit()?;
+        }
+        self.common.report(reported, self.output == Path::new(STANDARD))
+    }
+}
+
+pub(crate) fn summary(r: &RenderReport) -> String {
+    let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
+    let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));
+    let mut methods: Vec<&str> = r.views.iter().map(|view| view.method).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    format!(
+        "{} view(s) of {} frames by {} in {:.3} s: weights {weights}, decode {decode}, splat {splat}, inverse {inverse}; \
+         {} coefficients, {} left out",
+        r.views.len(),
+        r.frames,
+        methods.join(" and "),
+        r.seconds,
+        r.coefficients,
+        r.left_out.coefficients
+    )
+}

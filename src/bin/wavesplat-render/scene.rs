@@ -1,0 +1,96 @@
+//! The scene to render: a coefficient file, or frames.
+
+use crate::along::ModeName;
+use crate::args::{Cli, MethodName};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::STANDARD;
+use wavesplat::cli::transfer_function;
+use wavesplat::colour::TransferFunction;
+use wavesplat::file::{CoefficientFile, setting};
+use wavesplat::render::annotate::Annotation;
+use wavesplat::render::{CoefficientScene, FrameScene, Scene, SplatSource};
+use wavesplat::source::Archive;
+
+/// The scene to render.
+pub(crate) struct Opened {
+    pub(crate) scene: Box<dyn Scene>,
+    /// The coefficient file of the scene.
+    pub(crate) file: Option<Arc<CoefficientFile>>,
+    /// The times of frames.
+    pub(crate) annotation: Annotation,
+    /// The colours of samples, applied before splatting or along the ray.
+    pub(crate) colours: Option<TransferFunction>,
+}
+
+impl Cli {
+    /// Opens the scene to render, and its file.
+    pub(crate) fn scene(&self) -> Result<Opened> {
+        let coefficients = self.method == MethodName::Coefficients;
+        if let [only] = self.inputs.as_slice()
+            && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
+        {
+            if only == Path::new(STANDARD) {
+                return Err(Error::usage("-: a coefficient file is read from its end, so it cannot come from a pipe"));
+            }
+            self.input.refuse_for_coefficients()?;
+            self.along.check(false, self.colour.is_asked())?;
+            let file = CoefficientFile::open_with(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
+            let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
+            let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
+            let unit = setting(file.metadata(), "time-units").map(String::from);
+            let annotation = Annotation { times: file.metadata().times.clone(), unit };
+            let colours = self.along.of_file(self.colour.range, &file)?;
+            let scene = Box::new(CoefficientScene::new(file.clone(), what));
+            return Ok(Opened { scene, file: Some(file), annotation, colours });
+        }
+        if self.skip_damaged {
+            return Err(Error::usage("--skip-damaged: is for a coefficient file"));
+        }
+        if coefficients {
+            return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
+        }
+        if self.inputs == [PathBuf::from(STANDARD)] {
+            return Err(Error::usage(
+                "--method direct reads frames more than once, so they cannot come from standard input",
+            ));
+        }
+        self.along.check(true, self.colour.is_asked())?;
+        let mut source = self.input.open(&self.inputs, &self.common)?;
+        let Archive { times, units, .. } = source.archive().clone();
+        let annotation = Annotation { times, unit: units.times };
+        let missing_value = source.archive().missing_value(self.missing_value);
+        let colours = match self.along.colours() {
+            Some(name) => {
+                let inputs = self.inputs.as_slice();
+                Some(transfer_function(
+                    name,
+                    self.colour.range,
+                    (inputs, source.as_mut()),
+                    missing_value,
+                    &self.common,
+                )?)
+            }
+            None => None,
+        };
+        let before = colours.clone().filter(|_| self.along.mode == ModeName::Projection);
+        let scene = match before {
+            Some(colours) => FrameScene::coloured(source, missing_value, colours),
+            None => FrameScene::new(source, missing_value),
+        };
+        Ok(Opened { scene: Box::new(scene), file: None, annotation, colours })
+    }
+}
+
+const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
+
+/// Adds a hint to the error for a file without coefficients.
+fn hint_at_frames(path: &Path, error: Error) -> Error {
+    let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
+    let named_so = path.extension().is_some_and(|e| e == "wspl");
+    if !named_so && (foreign || path.is_dir()) {
+        return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
+    }
+    error
+}
