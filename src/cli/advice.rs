@@ -1,6 +1,6 @@
 //! What to do next, where arguments are not understood.
 
-use super::config::Config;
+use super::config::{Config, chosen_command};
 use crate::source;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
@@ -16,7 +16,7 @@ pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString], co
     let tip = match error.kind() {
         ErrorKind::InvalidSubcommand => for_a_word(&word(ContextKind::InvalidSubcommand)),
         ErrorKind::UnknownArgument => owner(command, &word(ContextKind::InvalidArg)),
-        ErrorKind::MissingRequiredArgument => example(chosen(command, args)),
+        ErrorKind::MissingRequiredArgument => example(chosen_command(command, args)),
         _ => {
             let option = word(ContextKind::InvalidArg);
             config.place(option.trim_start_matches('-').split([' ', '=']).next().unwrap_or_default())
@@ -29,11 +29,6 @@ pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString], co
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
     error
-}
-
-/// The subcommand that was given, or the program itself.
-pub(super) fn chosen<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
-    args.get(1).and_then(|name| command.find_subcommand(name)).unwrap_or(command)
 }
 
 /// The first example of a command's help.

@@ -1,7 +1,6 @@
 //! Options from a file: TOML whose keys are the long names of options, at its top for every command that has them, or in a table
 //! for the command of its name. They are put before the arguments of the command line, without those that are there too.
 
-use super::advice::chosen;
 use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
@@ -18,6 +17,11 @@ const CONFIG: &str = "config";
 /// What tables may be named for besides the commands of a program: the other program, or a command of it.
 const PROGRAMS: [&str; 2] = ["wavesplat", "wavesplat-render"];
 const COMMANDS: [&str; 7] = ["convert", "append", "info", "verify", "extract", "recover", "generate"];
+
+/// The subcommand that was given, or the program itself.
+pub(super) fn chosen_command<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
+    args.get(1).and_then(|name| command.find_subcommand(name)).unwrap_or(command)
+}
 
 /// What a file gives.
 #[derive(Debug, Default)]
@@ -38,7 +42,7 @@ impl Config {
     /// What the file of `--config`, or of the program's environment variable, gives to a command line; nothing if there is no
     /// file, or a command that takes none.
     pub(super) fn read(program: &Command, args: &[OsString]) -> Result<Self> {
-        let command = chosen(program, args);
+        let command = chosen_command(program, args);
         let parsed = program.clone().ignore_errors(true).try_get_matches_from(args);
         let Ok(matches) = parsed else { return Ok(Self::default()) }; // help, or an error that comes again
         let given = matches.subcommand().map_or(&matches, |(_, of_command)| of_command);

@@ -1,6 +1,6 @@
 //! Options whose value may be left out: `--estimate 0.01` means `--estimate=0.01`, though inputs may follow such an option too.
 
-use super::advice::chosen;
+use super::config::chosen_command;
 use crate::base::error::{Error, Result};
 use clap::Command;
 use std::ffi::{OsStr, OsString};
@@ -11,7 +11,7 @@ use std::path::Path;
 /// # Errors
 /// A word after the option is neither a number nor an input, or it is both.
 pub(super) fn joined(command: &Command, args: &[OsString]) -> Result<Vec<OsString>> {
-    let options: Vec<String> = chosen(command, args)
+    let options: Vec<String> = chosen_command(command, args)
         .get_arguments()
         .filter(|arg| arg.is_require_equals_set())
         .filter_map(|arg| Some(format!("--{}", arg.get_long()?)))
