@@ -1,6 +1,6 @@
 //! Arrays in blocks, each of which is compressed by zlib.
 
-use super::encoded::Count;
+use super::count::Count;
 use crate::source::formats::words::wrong;
 use flate2::bufread::ZlibDecoder;
 use std::io::{self, BufReader, Read, Take};

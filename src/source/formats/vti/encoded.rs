@@ -1,6 +1,7 @@
 //! Where an array is in a file, and how it is written there.
 
 use super::blocks::Blocks;
+use super::count::Count;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
@@ -9,37 +10,7 @@ use crate::source::formats::deflated::FileReader;
 use crate::source::formats::pieces::Packed;
 use crate::source::formats::text::{Characters, Numbers};
 use crate::source::formats::words::wrong;
-use std::io::{self, ErrorKind, Read};
-
-/// A count that VTK puts before the samples of an array.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Count {
-    /// Whether it has 64 bits, not 32.
-    pub(super) wide: bool,
-    /// Whether its most significant byte comes first.
-    pub(super) big_endian: bool,
-}
-
-impl Count {
-    /// Bytes of the count itself.
-    pub(super) fn size(self) -> usize {
-        if self.wide { 8 } else { 4 }
-    }
-
-    /// The next count.
-    pub(super) fn read(self, reader: &mut dyn Read) -> io::Result<u64> {
-        let mut bytes = [0; 8];
-        let stored = &mut bytes[..self.size()];
-        reader.read_exact(stored).map_err(|e| match e.kind() {
-            ErrorKind::UnexpectedEof => wrong("is cut short: its array ends early, before its samples".into()),
-            _ => e,
-        })?;
-        if self.big_endian {
-            stored.reverse();
-        }
-        Ok(u64::from_le_bytes(bytes))
-    }
-}
+use std::io::{self, Read};
 
 /// How bytes are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! A file of VTK's image data, and where its arrays are.
 
-use super::encoded::{Count, EncodedArray, Form};
+use super::count::Count;
+use super::encoded::{EncodedArray, Form};
 use super::header::{self, VtiArray, VtiHeader};
 use super::skeleton::Skeleton;
 use crate::base::error::{Error, Result};

@@ -1,6 +1,7 @@
 //! VTK's image data: one array of a `.vti`, or of the files of a `.pvti`, put together from its pieces.
 
 mod blocks;
+mod count;
 mod encoded;
 mod extent;
 mod header;

@@ -2,7 +2,7 @@
 
 mod pieced;
 
-use super::encoded::Count;
+use super::count::Count;
 use crate::base::sample::SampleType;
 use crate::source::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
 use crate::source::{OpenOptions, open};
