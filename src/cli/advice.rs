@@ -1,4 +1,4 @@
-//! What to do next, where arguments are not understood.
+//! Tips for arguments that are not understood.
 
 use super::config::{Config, chosen_command};
 use crate::source;
@@ -7,19 +7,19 @@ use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;
 use std::path::Path;
 
-/// An error of arguments with a tip, where there is one to give that is better than none or than what it has.
-pub(super) fn advised(mut error: Error, command: &Command, args: &[OsString], config: &Config) -> Error {
+/// Adds a tip to an error of arguments, or replaces its own by a better one.
+pub(super) fn with_tip(mut error: Error, command: &Command, args: &[OsString], config: &Config) -> Error {
     let word = |kind| match error.get(kind) {
         Some(ContextValue::String(word)) => word.clone(),
         _ => String::new(),
     };
     let tip = match error.kind() {
-        ErrorKind::InvalidSubcommand => for_a_word(&word(ContextKind::InvalidSubcommand)),
-        ErrorKind::UnknownArgument => owner(command, &word(ContextKind::InvalidArg)),
+        ErrorKind::InvalidSubcommand => subcommand_tip(&word(ContextKind::InvalidSubcommand)),
+        ErrorKind::UnknownArgument => owner_tip(command, &word(ContextKind::InvalidArg)),
         ErrorKind::MissingRequiredArgument => example(chosen_command(command, args)),
         _ => {
             let option = word(ContextKind::InvalidArg);
-            config.place(option.trim_start_matches('-').split([' ', '=']).next().unwrap_or_default())
+            config.source_of(option.trim_start_matches('-').split([' ', '=']).next().unwrap_or_default())
         }
     };
     if let Some(tip) = tip {
@@ -37,12 +37,12 @@ fn example(command: &Command) -> Option<String> {
     examples.lines().nth(1).map(|line| format!("an example: {}", line.trim()))
 }
 
-/// What may be meant by a word that is no subcommand.
-fn for_a_word(word: &str) -> Option<String> {
+/// A tip for a word that is no subcommand.
+fn subcommand_tip(word: &str) -> Option<String> {
     let ending = Path::new(word).extension().and_then(|ending| ending.to_str());
     match (word, ending) {
         (_, Some("wspl")) => Some(format!(
-            "'wavesplat info {word}' says what it holds, 'wavesplat-render {word} -o frame_%04d.png' makes pictures"
+            "'wavesplat info {word}' describes it, 'wavesplat-render {word} -o frame_%04d.png' makes pictures"
         )),
         _ if Path::new(word).exists() || is_frames(word) => {
             Some(format!("'wavesplat convert {word} -o run.wspl' converts frames"))
@@ -52,31 +52,31 @@ fn for_a_word(word: &str) -> Option<String> {
     }
 }
 
-/// Endings of frames that do not say what they are.
+/// Extensions of headerless frames.
 const HEADERLESS: [&str; 3] = ["raw", "bin", "img"];
 
-/// Whether a word is the name of a file of frames, by how it ends.
+/// Whether a word has the extension of a file of frames.
 fn is_frames(word: &str) -> bool {
     let word = word.to_lowercase();
     let ends = |ending| word.strip_suffix(ending).is_some_and(|name: &str| name.ends_with('.'));
     source::extensions().chain(HEADERLESS).any(ends)
 }
 
-/// Who takes an option that a command does not know.
-fn owner(command: &Command, option: &str) -> Option<String> {
+/// Names the command that has an option which this command lacks.
+fn owner_tip(command: &Command, option: &str) -> Option<String> {
     let name = option.strip_prefix("--")?;
     let takes = |command: &&Command| command.get_arguments().any(|arg| arg.get_long() == Some(name));
     let others: Vec<&str> = command.get_subcommands().filter(takes).map(Command::get_name).collect();
     if !others.is_empty() {
         return Some(format!("{option} is an option of {} {}", command.get_name(), others.join(", ")));
     }
-    let elsewhere = ELSEWHERE.iter().find(|(_, options)| options.contains(&name));
+    let elsewhere = OPTION_OWNERS.iter().find(|(_, options)| options.contains(&name));
     let elsewhere = elsewhere.filter(|(owner, _)| owner.split(' ').next() != Some(command.get_name()));
     elsewhere.map(|(owner, _)| format!("{option} is an option of {owner}"))
 }
 
-/// Options that only one of the programs has; each program knows just its own.
-const ELSEWHERE: [(&str, &[&str]); 2] = [
+/// Options that only one of the programs has. A program cannot look up the options of the other one.
+const OPTION_OWNERS: [(&str, &[&str]); 2] = [
     (
         "wavesplat-render",
         &[

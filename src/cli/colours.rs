@@ -1,4 +1,4 @@
-//! Transfer functions as options name them.
+//! Transfer functions from options.
 
 use super::{CommonArgs, Pair};
 use crate::base::error::{Error, Result};
@@ -7,11 +7,11 @@ use crate::colour::TransferFunction;
 use crate::source::{FrameSource, value_range};
 use std::path::{Path, PathBuf};
 
-/// The transfer function of a name, stretched over `range` if one is given. A map that is of no values of its own is stretched
-/// over those of all frames otherwise: they are read for that.
+/// Opens a transfer function by name and stretches it over `range`. Without a range, a map without values is stretched
+/// over the range of all frames; `source`, opened from `inputs`, is read for that.
 ///
 /// # Errors
-/// Also where that is needed and `inputs`, of which `source` is, are standard input.
+/// Also if all frames would have to be read, and the input is standard input.
 pub fn transfer_function(
     name: &str,
     range: Option<Pair>,
@@ -25,13 +25,13 @@ pub fn transfer_function(
             return Err(Error::usage(format!("--transfer-function {name}: {what}")));
         }
         let (lo, hi) = value_range(source, missing_value, &common.progress("values", "frames"))?.unwrap_or((0.0, 1.0));
-        common.detail(format_args!("values from {lo:.4e} to {hi:.4e}; --range sets those of the colours"));
+        common.detail(format_args!("values from {lo:.4e} to {hi:.4e}; --range sets the range of the colours"));
         Ok((lo, hi))
     };
     stretched(open_colours("--transfer-function", name)?, range, all)
 }
 
-/// The colours of a name that an option has.
+/// Opens the colours that an option names.
 pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
         Error::Path { path, problem, .. } => Error::usage(format!("{option} {}: {problem}", path.display())),
@@ -39,7 +39,7 @@ pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
     })
 }
 
-/// Colours over the range that was asked for, their own, or what suits those of all values.
+/// Colours over the given range, else over their own values, else over a range that suits `all` values.
 pub fn stretched(
     colours: TransferFunction,
     range: Option<Pair>,

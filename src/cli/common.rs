@@ -1,4 +1,4 @@
-//! Options that every program takes, and what they do: workers, notes, progress, reports.
+//! Options of every program: worker threads, notes, progress and reports.
 
 use super::print;
 use super::terminal::{ProgressKind, TerminalProgress};
@@ -13,40 +13,40 @@ use std::path::PathBuf;
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]
 pub struct CommonArgs {
-    /// TOML file with more options, by their long names: tolerance = 0.001; those of one command in a table of its name. What
-    /// the command line says wins [default: the file that WAVESPLAT_CONFIG, or WAVESPLAT_RENDER_CONFIG of wavesplat-render,
-    /// names]
+    /// TOML file with more options by their long names, like tolerance = 0.001; a table [convert] is for that command.
+    /// The command line overrides the file [default: the file named by WAVESPLAT_CONFIG, for wavesplat-render by
+    /// WAVESPLAT_RENDER_CONFIG]
     #[arg(long, value_name = "FILE", help_heading = "Common options")]
     pub config: Option<PathBuf>,
-    /// Worker threads; by default one for each core
+    /// Number of worker threads [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads, help_heading = "Common options")]
     pub threads: Option<NonZeroUsize>,
-    /// Budget for what the program allocates
+    /// Memory that the program may allocate
     #[arg(long, value_name = "SIZE", default_value = "512MiB", help_heading = "Common options")]
     pub memory: Size,
-    /// Progress, on standard error: a bar if that is a terminal, lines of JSON, or none
+    /// Progress on standard error: a bar if it is a terminal, lines of JSON, or none
     #[arg(long, value_enum, value_name = "HOW", default_value = "auto", help_heading = "Common options")]
     pub progress: ProgressKind,
-    /// Neither progress nor notes
+    /// Show no progress and no notes
     #[arg(short, long, help_heading = "Common options")]
     pub quiet: bool,
-    /// More notes
+    /// Show more notes
     #[arg(short, long, conflicts_with = "quiet", help_heading = "Common options")]
     pub verbose: bool,
-    /// Print one JSON object with everything measured and decided (to standard error if data goes to standard output)
+    /// Print a report as one JSON object (to standard error if data goes to standard output)
     #[arg(long, help_heading = "Common options")]
     pub json: bool,
 }
 
 impl CommonArgs {
-    /// Starts the workers. Call once.
+    /// Starts the worker threads. Call once.
     pub fn start(&self) -> Result<()> {
         let threads = self.threads.map_or(0, NonZeroUsize::get);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}")))
     }
 
-    /// The part of the budget that a stream may take for the frames of one window.
+    /// Bytes of the memory budget that a stream may take for the frames of one window.
     pub fn stream_memory(&self) -> usize {
         self.memory.0 / 4
     }
@@ -85,21 +85,21 @@ impl CommonArgs {
     }
 }
 
-/// A number of threads.
+/// Parses a number of threads.
 ///
 /// # Errors
-/// It is no whole number above 0.
+/// The text is not a whole number above 0.
 fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
-    text.parse().map_err(|_| "takes a whole number, at least 1; without --threads each core has one".into())
+    text.parse().map_err(|_| "takes a whole number, at least 1; without it, each core has one thread".into())
 }
 
-/// What `--json` prints of a report.
+/// The text that `--json` prints.
 pub fn report_text(report: &impl Serialize) -> Result<String> {
     let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
     text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
 }
 
-/// The object that `--json` prints; a change of a key's meaning changes `schema`.
+/// The object that `--json` prints. If the meaning of a key changes, so does `schema`.
 #[derive(Debug, Serialize)]
 struct Versioned<'a, T> {
     schema: u32,
@@ -108,5 +108,5 @@ struct Versioned<'a, T> {
 }
 
 pub(super) fn note(text: impl std::fmt::Display) {
-    let _ = writeln!(io::stderr().lock(), "{text}"); // nowhere is left to report a failure
+    let _ = writeln!(io::stderr().lock(), "{text}"); // a failure cannot be reported anywhere else
 }

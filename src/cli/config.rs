@@ -1,5 +1,7 @@
-//! Options from a file: TOML whose keys are the long names of options, at its top for every command that has them, or in a table
-//! for the command of its name. They are put before the arguments of the command line, without those that are there too.
+//! Options from a TOML file.
+//!
+//! Its keys are the long names of options. A key at the top level is for every command that has the option; a key in a
+//! table is for the command of that name. The options are inserted before those of the command line, which override them.
 
 use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
@@ -14,7 +16,7 @@ use toml::de::{DeTable, DeValue};
 /// The id of the option that names a file.
 const CONFIG: &str = "config";
 
-/// What tables may be named for besides the commands of a program: the other program, or a command of it.
+/// Names of tables that are for the other program or for one of its commands.
 const PROGRAMS: [&str; 2] = ["wavesplat", "wavesplat-render"];
 const COMMANDS: [&str; 7] = ["convert", "append", "info", "verify", "extract", "recover", "generate"];
 
@@ -23,28 +25,28 @@ pub(super) fn chosen_command<'a>(command: &'a Command, args: &[OsString]) -> &'a
     args.get(1).and_then(|name| command.find_subcommand(name)).unwrap_or(command)
 }
 
-/// What a file gives.
+/// The options of a file.
 #[derive(Debug, Default)]
 pub(super) struct Config {
     path: PathBuf,
-    options: Vec<Taken>,
+    options: Vec<FileOption>,
 }
 
-/// An option that is taken from a file.
+/// An option of a file, as arguments.
 #[derive(Debug)]
-struct Taken {
+struct FileOption {
     name: String,
     line: usize,
     args: Vec<OsString>,
 }
 
 impl Config {
-    /// What the file of `--config`, or of the program's environment variable, gives to a command line; nothing if there is no
-    /// file, or a command that takes none.
+    /// The options that the file of `--config`, or of the program's environment variable, adds to a command line. None if
+    /// there is no file, or if the command does not take one.
     pub(super) fn read(program: &Command, args: &[OsString]) -> Result<Self> {
         let command = chosen_command(program, args);
         let parsed = program.clone().ignore_errors(true).try_get_matches_from(args);
-        let Ok(matches) = parsed else { return Ok(Self::default()) }; // help, or an error that comes again
+        let Ok(matches) = parsed else { return Ok(Self::default()) }; // help, or an error that the real parse reports
         let given = matches.subcommand().map_or(&matches, |(_, of_command)| of_command);
         if !command.get_arguments().any(|arg| arg.get_id() == CONFIG) {
             return Ok(Self::default());
@@ -60,33 +62,33 @@ impl Config {
         }
     }
 
-    /// The command line with what the file adds.
-    pub(super) fn before(&self, program: &Command, args: &[OsString]) -> Vec<OsString> {
+    /// The command line with the options of the file.
+    pub(super) fn add_to(&self, program: &Command, args: &[OsString]) -> Vec<OsString> {
         let at = if program.has_subcommands() { 2 } else { 1 }.min(args.len());
         let added = self.options.iter().flat_map(|option| &option.args);
         args[..at].iter().chain(added).chain(&args[at..]).cloned().collect()
     }
 
-    /// Where an option is from, if it is from the file.
-    pub(super) fn place(&self, option: &str) -> Option<String> {
+    /// Names the file and line of an option, if it is from the file.
+    pub(super) fn source_of(&self, option: &str) -> Option<String> {
         let taken = self.options.iter().find(|taken| taken.name == option)?;
         Some(format!("{} is from {}, line {}", taken.name, self.path.display(), taken.line))
     }
 
-    /// What was taken from the file, in words.
-    pub(super) fn words(&self) -> Option<String> {
+    /// Lists the options that are from the file.
+    pub(super) fn summary(&self) -> Option<String> {
         let names: Vec<&str> = self.options.iter().map(|taken| taken.name.as_str()).collect();
-        (!names.is_empty()).then(|| format!("{} gives: {}", self.path.display(), names.join(", ")))
+        (!names.is_empty()).then(|| format!("options from {}: {}", self.path.display(), names.join(", ")))
     }
 }
 
-/// The file that a program's variable names: `WAVESPLAT_CONFIG` and so on.
+/// The file named by the environment variable of a program, such as `WAVESPLAT_CONFIG`.
 fn from_environment(program: &Command) -> Option<PathBuf> {
     let name = program.get_name().to_uppercase().replace('-', "_");
     env::var_os(format!("{name}_CONFIG")).filter(|path| !path.is_empty()).map(PathBuf::from)
 }
 
-/// A file that is looked through.
+/// A file of options.
 struct File<'a> {
     path: PathBuf,
     text: &'a str,
@@ -94,31 +96,32 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    /// All options of the file for a command, but those that the command line gives or that cannot go with these.
-    fn options(&self, command: &Command, given: &ArgMatches) -> Result<Vec<Taken>> {
+    /// The options of the file for a command. Left out are those that the command line gives, and those that conflict with
+    /// its options.
+    fn options(&self, command: &Command, given: &ArgMatches) -> Result<Vec<FileOption>> {
         let table = DeTable::parse(self.text);
         let table = table.map_err(|e| self.wrong(&e.span().unwrap_or(0..0), e.message().trim()))?.into_inner();
-        let (mut options, mut own): (Vec<Taken>, Vec<&str>) = (Vec::new(), Vec::new());
+        let (mut options, mut own): (Vec<FileOption>, Vec<&str>) = (Vec::new(), Vec::new());
         for (name, entries) in table.iter().filter_map(|(key, value)| Some((key, value.get_ref().as_table()?))) {
             if self.is_of_another(name.get_ref()) {
                 continue;
             }
             let Some(owner) = self.program.find_subcommand(name.get_ref().as_ref()) else {
-                let what = format!("[{}] is no command of {}", name.get_ref(), self.program.get_name());
+                let what = format!("[{}] is not a command of {}", name.get_ref(), self.program.get_name());
                 return Err(self.wrong(&name.span(), &what));
             };
             for (key, value) in entries {
-                let taken = self.taken(owner, (key.get_ref(), &key.span()), (value.get_ref(), given))?;
+                let option = self.option(owner, (key.get_ref(), &key.span()), (value.get_ref(), given))?;
                 if owner.get_name() == command.get_name() {
                     own.push(key.get_ref());
-                    options.extend(taken);
+                    options.extend(option);
                 }
             }
         }
         for (key, value) in table.iter().filter(|(_, value)| !value.get_ref().is_table()) {
             self.check_known(key.get_ref(), &key.span())?;
             if find(command, key.get_ref()).is_some() && !own.contains(&key.get_ref().as_ref()) {
-                options.extend(self.taken(command, (key.get_ref(), &key.span()), (value.get_ref(), given))?);
+                options.extend(self.option(command, (key.get_ref(), &key.span()), (value.get_ref(), given))?);
             }
         }
         Ok(options)
@@ -143,22 +146,22 @@ impl File<'_> {
         let commands = || std::iter::once(self.program).chain(self.program.get_subcommands());
         let meant = key.trim_start_matches('-').replace('_', "-");
         let what = if commands().any(|command| command.get_positionals().any(|arg| arg.get_id() == key)) {
-            format!("{key}: what is read is named on the command line")
+            format!("{key}: inputs are named on the command line")
         } else if meant != key && commands().any(|command| find(command, &meant).is_some()) {
-            format!("{key}: no option of {owner}; {meant} is one")
+            format!("{key}: no option of {owner}; write {meant}")
         } else {
             format!("{key}: no option of {owner}; its --help lists them")
         };
         self.wrong(at, &what)
     }
 
-    /// What is taken of a key; nothing if the command line has more to say.
-    fn taken(
+    /// The option of a key. None if the command line overrides it.
+    fn option(
         &self,
         owner: &Command,
         (key, at): (&str, &Range<usize>),
         (value, given): (&DeValue<'_>, &ArgMatches),
-    ) -> Result<Option<Taken>> {
+    ) -> Result<Option<FileOption>> {
         let Some(arg) = find(owner, key) else { return Err(self.unknown(owner.get_name(), key, at)) };
         let args = arguments(arg, value).map_err(|what| self.wrong(at, &format!("{key}: {what}")))?;
         let is_given = |arg: &Arg| {
@@ -166,9 +169,9 @@ impl File<'_> {
             given.try_contains_id(id).is_ok() && given.value_source(id) == Some(ValueSource::CommandLine)
         };
         let against = |a: &Arg, b: &Arg| owner.get_arg_conflicts_with(a).iter().any(|c| c.get_id() == b.get_id());
-        let mut asked = owner.get_arguments().filter(|arg| is_given(arg));
-        let yields = is_given(arg) || asked.any(|asked| against(asked, arg) || against(arg, asked));
-        Ok((!yields && !args.is_empty()).then(|| Taken { name: key.into(), line: self.line(at), args }))
+        let mut on_command_line = owner.get_arguments().filter(|arg| is_given(arg));
+        let overridden = is_given(arg) || on_command_line.any(|given| against(given, arg) || against(arg, given));
+        Ok((!overridden && !args.is_empty()).then(|| FileOption { name: key.into(), line: self.line(at), args }))
     }
 
     fn wrong(&self, at: &Range<usize>, what: &str) -> Error {
@@ -180,7 +183,7 @@ impl File<'_> {
     }
 }
 
-/// A command's option of a long name that a file may have.
+/// The option of a command with this long name. None if a file may not set it.
 fn find<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
     let mut options = command.get_opts().chain(command.get_arguments().filter(|arg| is_flag(arg)));
     options.find(|arg| arg.get_long() == Some(name) && arg.get_id() != CONFIG && !arg.is_exclusive_set())
@@ -190,7 +193,7 @@ fn is_flag(arg: &Arg) -> bool {
     matches!(arg.get_action(), ArgAction::SetTrue)
 }
 
-/// An option of a file as arguments.
+/// The arguments for a value of an option.
 fn arguments(arg: &Arg, value: &DeValue<'_>) -> std::result::Result<Vec<OsString>, &'static str> {
     let name = arg.get_long().unwrap_or_default();
     let with = |value: String| OsString::from(format!("--{name}={value}"));
@@ -201,7 +204,9 @@ fn arguments(arg: &Arg, value: &DeValue<'_>) -> std::result::Result<Vec<OsString
             let words = values.iter().map(|value| scalar(value.get_ref()).map(with));
             words.collect::<Option<Vec<_>>>().ok_or("takes strings or numbers")
         }
-        (DeValue::Array(_), _) => Err("takes one value, not several: numbers with commas between them are a string"),
+        (DeValue::Array(_), _) => {
+            Err("takes one value, not several; write numbers with commas between them as a string")
+        }
         (value, _) => scalar(value).map(|value| vec![with(value)]).ok_or("takes a string or a number"),
     }
 }

@@ -1,4 +1,4 @@
-//! What a program can say about itself for others to read: completions of shells, man pages.
+//! Completions for shells, and man pages.
 
 use super::print;
 use crate::base::error::{Error, Result};
@@ -12,7 +12,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What is generated of a program of several commands.
+/// What to generate for a program with several commands.
 #[derive(Debug, Clone, Subcommand)]
 pub enum GenerateArgs {
     /// Completions for a shell, to standard output
@@ -32,7 +32,7 @@ pub enum GenerateArgs {
 }
 
 impl GenerateArgs {
-    /// Does it for a program.
+    /// Generates it for a program.
     pub fn run(&self, program: Command) -> Result<()> {
         match self {
             Self::Completions { shell } => completions(program, *shell),
@@ -41,7 +41,7 @@ impl GenerateArgs {
     }
 }
 
-/// What is generated of a program of one command, always to standard output.
+/// What to generate for a program with one command, to standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Generated {
     /// Completions for a shell.
@@ -65,7 +65,7 @@ impl FromStr for Generated {
 }
 
 impl Generated {
-    /// Does it for a program.
+    /// Generates it for a program.
     pub fn run(self, mut program: Command) -> Result<()> {
         match self {
             Self::Completions(shell) => completions(program, shell),
@@ -83,11 +83,11 @@ fn completions(mut program: Command, shell: Shell) -> Result<()> {
     print(&String::from_utf8_lossy(&text))
 }
 
-/// Writes the pages of a program and its commands, each under its name.
+/// Writes one page for the program and one for each of its commands.
 fn man_pages(program: Command, folder: &Path, force: bool) -> Result<()> {
     let mut program = program.disable_help_subcommand(true);
     program.build();
-    fs::create_dir_all(folder).map_err(|e| Error::io(folder, "making a folder", e))?;
+    fs::create_dir_all(folder).map_err(|e| Error::io(folder, "creating a folder", e))?;
     for command in std::iter::once(&program).chain(program.get_subcommands()) {
         let path = folder.join(Man::new(command.clone()).get_filename());
         let mut out = Output::create(&path, force)?;
@@ -98,10 +98,10 @@ fn man_pages(program: Command, folder: &Path, force: bool) -> Result<()> {
     Ok(())
 }
 
-/// A command's page, with its examples before its options as in its help.
+/// The page of a command. As in the help, its examples come before its options.
 fn man_page(command: &Command) -> Result<String> {
     let mut page = Vec::new();
-    render(command, &mut page).map_err(|e| Error::io("-", "making a man page", e))?;
+    render(command, &mut page).map_err(|e| Error::io("-", "writing a man page", e))?;
     Ok(String::from_utf8_lossy(&page).into_owned())
 }
 
@@ -122,7 +122,7 @@ fn render(command: &Command, page: &mut Vec<u8>) -> io::Result<()> {
     Ok(())
 }
 
-/// The examples, line by line as they are.
+/// The section of examples, with unfilled lines.
 fn examples(command: &Command) -> String {
     let Some(help) = command.get_before_help() else { return String::new() };
     let mut section = ".SH EXAMPLES\n.nf\n".to_string();

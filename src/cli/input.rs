@@ -1,4 +1,4 @@
-//! Options that say how an archive is read.
+//! Options for reading an archive.
 
 #[cfg(feature = "cli")]
 use super::{CommonArgs, note_text};
@@ -38,7 +38,7 @@ impl FromStr for Endian {
     }
 }
 
-/// How an archive is read, besides its names.
+/// Options for reading an archive.
 #[derive(Debug, Clone, Args)]
 pub struct InputArgs {
     /// Voxels (and frames) of headerless data, x fastest: NXxNYxNZ or NXxNYxNZxNT
@@ -53,19 +53,19 @@ pub struct InputArgs {
     /// Bytes before the first sample of each headerless file [default: 0]
     #[arg(long, value_name = "BYTES", help_heading = "Input")]
     pub offset: Option<u64>,
-    /// Which array of the files
+    /// Array of the files to read
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub variable: Option<String>,
-    /// What the axes of an array in HDF5, NetCDF or Zarr count, slowest first: letters of tzyx, c for another
+    /// Meaning of the axes of an array in HDF5, NetCDF or Zarr, slowest first: letters of tzyx, c for another axis
     #[arg(long, value_name = "LETTERS", help_heading = "Input")]
     pub axes: Option<String>,
-    /// World units between voxels, instead of what the files say: SX,SY,SZ
+    /// World units between voxels, instead of those in the files: SX,SY,SZ
     #[arg(long, value_name = "SX,SY,SZ", help_heading = "Input")]
     pub spacing: Option<Triple>,
-    /// World position of the first voxel, instead of what the files say: X,Y,Z
+    /// World position of the first voxel, instead of that in the files: X,Y,Z
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Input")]
     pub origin: Option<Triple>,
-    /// Take frame files whose numbers have gaps
+    /// Accept gaps in the numbers of frame files
     #[arg(long, help_heading = "Input")]
     pub allow_gaps: bool,
     /// Read files instead of mapping them (for network file systems and files that may change)
@@ -74,7 +74,7 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    /// An error if any option says how frames are read, which a coefficient file knows itself.
+    /// An error if an option is given that a coefficient file does not need.
     pub fn refuse_for_coefficients(&self) -> Result<()> {
         let given = [
             (self.dims.is_some(), "--dims"),
@@ -88,22 +88,22 @@ impl InputArgs {
             (self.allow_gaps, "--allow-gaps"),
         ];
         match given.into_iter().find(|(given, _)| *given) {
-            Some((_, name)) => Err(Error::usage(format!("{name}: is for frames; a coefficient file knows it itself"))),
+            Some((_, name)) => Err(Error::usage(format!("{name}: is for frames; a coefficient file does not need it"))),
             None => Ok(()),
         }
     }
 
-    /// How the bytes of files are reached.
+    /// How the bytes of files are read.
     pub fn access(&self) -> Access {
         Access::unless(self.no_mmap)
     }
 
-    /// Opens an archive without a word; `memory` bytes may hold what must be decoded or is piped.
+    /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
         source::open(inputs, &self.options(memory))
     }
 
-    /// The variables among which `--variable` must choose; none if an archive can be opened without that.
+    /// The variables among which `--variable` must choose; none if the archive can be opened without it.
     pub fn undecided(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
         source::undecided(inputs, &self.options(memory))
     }
@@ -128,14 +128,14 @@ impl InputArgs {
 
 #[cfg(feature = "cli")]
 impl InputArgs {
-    /// Opens an archive, with notes on how it is read.
+    /// Opens an archive, and prints notes on how it is read.
     pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
         let source = self.open_quietly(inputs, common.stream_memory())?;
         source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
         Ok(source)
     }
 
-    /// The options that were given, as a file remembers them: [`Self::open_again`] needs them to read the same samples.
+    /// The given options, to be stored in a file. [`Self::open_again`] needs them to read the same samples.
     pub fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
         let given = [
             ("variable", self.variable.clone()),
@@ -150,8 +150,8 @@ impl InputArgs {
         given.into_iter().filter_map(|(name, value)| Some((name, value?)))
     }
 
-    /// Opens the archive that a file was made from, or that continues it: with the options that the file remembers unless they
-    /// are given, and narrowed to its region and to some frames.
+    /// Opens the archive that a file was converted from, or one that continues it. Options that are not given are those
+    /// stored in the file. The archive is narrowed to the file's region and to `frames`.
     pub fn open_again(
         &self,
         of: &CoefficientFile,
@@ -159,26 +159,26 @@ impl InputArgs {
         frames: Option<FrameRange>,
         common: &CommonArgs,
     ) -> Result<Box<dyn FrameSource>> {
-        let dims_are_remembered = !self.says_layout();
+        let dims_are_remembered = !self.describes_layout();
         let options = OpenOptions { dims_are_remembered, ..self.completed(of)?.options(common.stream_memory()) };
         let source = source::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));
         narrow(source, frames, remembered(of, "region")?)
     }
 
-    /// Whether any option says how headerless data is laid out.
-    fn says_layout(&self) -> bool {
+    /// Whether an option that describes headerless data is given.
+    fn describes_layout(&self) -> bool {
         self.dims.is_some() || self.dtype.is_some() || self.endian.is_some() || self.offset.is_some()
     }
 
-    /// These options, and those that a file remembers where they were not given.
+    /// These options, completed with those stored in a file.
     fn completed(&self, of: &CoefficientFile) -> Result<Self> {
         let mut input = self.clone();
         complete(&mut input.variable, of, "variable")?;
         complete(&mut input.axes, of, "axes")?;
         complete(&mut input.spacing, of, "spacing")?;
         complete(&mut input.origin, of, "origin")?;
-        // Without dims, dtype is the type of samples that were coloured.
+        // Without dims, dtype is the type of the samples before they were coloured.
         if setting(of.metadata(), "dims").is_some() {
             complete(&mut input.dims, of, "dims")?;
             complete(&mut input.dtype, of, "dtype")?;
@@ -189,7 +189,7 @@ impl InputArgs {
     }
 }
 
-/// Fills an option that was not given with what a file remembers.
+/// Fills an option that was not given with the value stored in a file.
 #[cfg(feature = "cli")]
 fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, of: &CoefficientFile, name: &str) -> Result<()> {
     if option.is_none() {
@@ -198,16 +198,16 @@ fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, of: &Coeffici
     Ok(())
 }
 
-/// What a file remembers under a name of what was converted.
+/// A setting of the conversion that is stored in a file.
 pub fn remembered<T: FromStr<Err: fmt::Display>>(of: &CoefficientFile, name: &str) -> Result<Option<T>> {
-    let parsed = |what: T::Err| Error::input(of.path(), format!("its settings are not understood: {what}"));
+    let parsed = |what: T::Err| Error::input(of.path(), format!("its setting {name} is not understood: {what}"));
     setting(of.metadata(), name).map(str::parse).transpose().map_err(parsed)
 }
 
-/// Which frames and voxels of an archive are meant.
+/// Options that choose frames and voxels of an archive.
 #[derive(Debug, Clone, Args)]
 pub struct SelectArgs {
-    /// Only these frames: a:b, a:b:step, the end left out
+    /// Only these frames: a:b or a:b:step, without b
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
     pub frames: Option<FrameRange>,
     /// Only these voxels: x0:x1,y0:y1,z0:z1
@@ -216,7 +216,7 @@ pub struct SelectArgs {
 }
 
 impl SelectArgs {
-    /// Narrows an archive to these.
+    /// Narrows an archive to the chosen frames and voxels.
     pub fn narrow(&self, source: Box<dyn FrameSource>) -> Result<Box<dyn FrameSource>> {
         narrow(source, self.frames, self.region)
     }
@@ -238,8 +238,8 @@ pub fn narrow(
     source::select(source, Selection { first, step, frames: count, region })
 }
 
-/// An error if writing `output`, which may be a numbered name, would replace what is read: one of the inputs, or a frame
-/// beside them. `--force` is not for that.
+/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it. `--force` does
+/// not allow that.
 pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let real = |path: &Path| path.canonicalize().ok();
     let folder = |path: &Path| real(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
@@ -257,7 +257,7 @@ pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
     match inputs.iter().find(|input| replaces(input)) {
         Some(input) => {
             let (output, input) = (output.display(), input.display());
-            Err(Error::usage(format!("{output}: would replace what is read from {input}; name another output")))
+            Err(Error::usage(format!("{output}: would replace the input {input}; name another output")))
         }
         None => Ok(()),
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// An object a line on standard error: a few a second, and always one of how far the stage came.
+/// Writes JSON objects to standard error, one per line: up to two a second, and one at the end of the stage.
 #[derive(Debug)]
 pub struct Lines {
     stage: &'static str,
@@ -17,15 +17,15 @@ pub struct Lines {
 struct State {
     total: Option<u64>,
     done: u64,
-    /// Steps of these that an earlier run did.
+    /// Steps that an earlier run did, included in `done`.
     before: u64,
     /// None before the stage begins.
     started: Option<Instant>,
-    /// When a line was written last, and how many steps it said.
-    told: Option<(Instant, u64)>,
+    /// Time of the last line, and its number of steps.
+    written: Option<(Instant, u64)>,
 }
 
-/// What a line says.
+/// One line.
 #[derive(Debug, Serialize)]
 struct Line {
     stage: &'static str,
@@ -40,14 +40,14 @@ const BETWEEN_LINES: Duration = Duration::from_millis(500);
 
 impl Lines {
     pub(super) fn new(stage: &'static str, unit: &'static str) -> Self {
-        let state = State { total: None, done: 0, before: 0, started: None, told: None };
+        let state = State { total: None, done: 0, before: 0, started: None, written: None };
         Self { stage, unit, state: Mutex::new(state) }
     }
 
     pub(super) fn start(&self, total: Option<u64>) {
         let mut state = self.state();
         (state.total, state.started) = (total, Some(Instant::now()));
-        self.tell(&mut state);
+        self.write(&mut state);
     }
 
     pub(super) fn resume(&self, steps: u64) {
@@ -58,20 +58,20 @@ impl Lines {
     pub(super) fn advance(&self, steps: u64) {
         let mut state = self.state();
         state.done += steps;
-        if state.told.is_none_or(|(when, _)| when.elapsed() >= BETWEEN_LINES) {
-            self.tell(&mut state);
+        if state.written.is_none_or(|(when, _)| when.elapsed() >= BETWEEN_LINES) {
+            self.write(&mut state);
         }
     }
 
-    /// Says how far it is, unless that was the last that was said.
-    pub(super) fn tell_last(&self) {
+    /// Writes the number of steps, unless the last line has it.
+    pub(super) fn write_last(&self) {
         let mut state = self.state();
-        if state.started.is_some() && state.told.is_none_or(|(_, done)| done != state.done) {
-            self.tell(&mut state);
+        if state.started.is_some() && state.written.is_none_or(|(_, done)| done != state.done) {
+            self.write(&mut state);
         }
     }
 
-    fn tell(&self, state: &mut State) {
+    fn write(&self, state: &mut State) {
         let State { total, done, before, started, .. } = *state;
         let seconds = started.map_or(0.0, |started| started.elapsed().as_secs_f64());
         let per_second = Some((done - before) as f64 / seconds).filter(|speed| speed.is_finite() && *speed > 0.0);
@@ -81,7 +81,7 @@ impl Lines {
         if let Ok(line) = serde_json::to_string(&line) {
             note(line);
         }
-        state.told = Some((Instant::now(), done));
+        state.written = Some((Instant::now(), done));
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -91,6 +91,6 @@ impl Lines {
 
 impl Drop for Lines {
     fn drop(&mut self) {
-        self.tell_last();
+        self.write_last();
     }
 }

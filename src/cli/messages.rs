@@ -1,11 +1,11 @@
-//! Errors and notes of the library as the programs print them: fields become options, remedies become advice.
+//! Errors and notes of the library in the words of the programs: options for fields, advice for remedies.
 
 use crate::base::error::{Error, Note, Remedy};
 use crate::source::extensions;
 use clap::Command;
 use std::borrow::Cow;
 
-/// An error in one line or more, and a tip where something helps.
+/// The text of an error, with a tip if it has a remedy.
 pub fn of_error(error: &Error, command: &Command) -> String {
     let text = match error {
         Error::Setting { setting, problem, .. } => format!("error: {}: {problem}", option(setting, command)),
@@ -14,12 +14,12 @@ pub fn of_error(error: &Error, command: &Command) -> String {
     error.remedy().map(|remedy| format!("{text}\n  tip: {}", advice(&remedy))).unwrap_or(text)
 }
 
-/// A note, and what can be done about it.
+/// The text of a note, with advice if it has a remedy.
 pub fn of_note(note: &Note) -> String {
     note.remedy.as_ref().map_or(note.text.clone(), |remedy| format!("{note}; {}", advice(remedy)))
 }
 
-/// Fields whose option has another name.
+/// Fields whose options have other names.
 const OPTIONS: [(&str, &str); 6] = [
     ("sample", "dtype"),
     ("big_endian", "endian"),
@@ -29,13 +29,13 @@ const OPTIONS: [(&str, &str); 6] = [
     ("limited", "error"),
 ];
 
-/// What the option of a field is called.
+/// The name of the option for a field.
 fn name(field: &str) -> String {
     let other = OPTIONS.iter().find(|(known, _)| *known == field).map(|(_, option)| (*option).to_string());
     other.unwrap_or_else(|| field.replace('_', "-"))
 }
 
-/// The option that sets a field; the field's own name if a program has none for it.
+/// The option that sets a field, or the field's name if the program has no such option.
 fn option(setting: &str, command: &Command) -> String {
     let name = name(setting);
     let mut commands = std::iter::once(command).chain(command.get_subcommands());
@@ -43,34 +43,34 @@ fn option(setting: &str, command: &Command) -> String {
     if is_option { format!("--{name}") } else { setting.replace('_', " ") }
 }
 
-/// What helps, by the options of the programs.
+/// Advice that names options of the programs.
 fn advice(remedy: &Remedy) -> Cow<'static, str> {
     let fixed = match remedy {
-        Remedy::Set(field) => return format!("--{field} says otherwise").into(),
+        Remedy::Set(field) => return format!("--{field} changes this").into(),
         Remedy::ChooseVariable => "--variable chooses one",
         Remedy::ChooseComponent { name, components } => {
             return format!("--variable '{name}[0]' takes the first, up to [{}]", components.saturating_sub(1)).into();
         }
         Remedy::ChooseIndex { name } => return index(name).into(),
-        Remedy::ChooseFrames => "--frames a:b chooses those that the file holds",
+        Remedy::ChooseFrames => "--frames a:b chooses the frames that the file holds",
         Remedy::DescribeSamples => return known_formats().into(),
         Remedy::Adjust(fields) => return format!("adjust {}", or(fields)).into(),
-        Remedy::SetDims { dims: [x, y, z], frames: 1 } => return format!("say --dims {x}x{y}x{z}").into(),
-        Remedy::SetDims { dims: [x, y, z], frames } => return format!("say --dims {x}x{y}x{z}x{frames}").into(),
-        Remedy::AllowGaps => "--allow-gaps takes the files as they are",
-        Remedy::MaskMissing => "--missing mask keeps them as they are",
+        Remedy::SetDims { dims: [x, y, z], frames: 1 } => return format!("give --dims {x}x{y}x{z}").into(),
+        Remedy::SetDims { dims: [x, y, z], frames } => return format!("give --dims {x}x{y}x{z}x{frames}").into(),
+        Remedy::AllowGaps => "--allow-gaps accepts them",
+        Remedy::MaskMissing => "--missing mask keeps them as missing samples",
         Remedy::BuildWith(feature) => {
-            return format!("cargo build --release --features {feature} builds it in").into();
+            return format!("build with cargo build --release --features {feature}").into();
         }
         Remedy::Replace => "--force replaces it",
-        Remedy::BeginAnew => "--force begins anew",
-        Remedy::ResumeOrBeginAnew => "--resume goes on with it, --force begins anew",
+        Remedy::BeginAnew => "--force starts over",
+        Remedy::ResumeOrBeginAnew => "--resume continues it, --force starts over",
         Remedy::AppendOrBeginAnew { frames } => return append(*frames).into(),
         Remedy::RecoverOrSkip => {
-            "wavesplat recover saves what is whole; --skip-damaged gives the rest where only blocks are damaged"
+            "wavesplat recover saves the undamaged blocks; if only blocks are damaged, --skip-damaged reads the rest"
         }
         Remedy::ResumeOrRecover => {
-            "an unfinished conversion: --resume of what made it goes on, wavesplat recover saves what it holds"
+            "an unfinished conversion: its command with --resume continues it, wavesplat recover saves its finished blocks"
         }
         Remedy::RangeAboveZero => "give --range, or --norm linear",
         Remedy::Project => "leave it out, or make projections with --mode projection",
@@ -79,7 +79,7 @@ fn advice(remedy: &Remedy) -> Cow<'static, str> {
     fixed.into()
 }
 
-/// Options with "or" before the last.
+/// Lists options, with "or" before the last.
 fn or(fields: &[&str]) -> String {
     let options: Vec<String> = fields.iter().map(|field| format!("--{}", name(field))).collect();
     match &options[..] {
@@ -90,16 +90,16 @@ fn or(fields: &[&str]) -> String {
 
 fn index(name: &str) -> String {
     format!(
-        "--variable '{name}[0]' takes its first index, --axes with one letter of t z y x (or c for another) for each axis, \
-         slowest first, says it otherwise"
+        "--variable '{name}[0]' takes its first index; --axes gives the meaning of each axis, slowest first: \
+         one of the letters t z y x, or c for another axis"
     )
 }
 
 fn append(frames: u64) -> String {
-    format!("--frames 0:{frames} makes a file of these, to which append adds the others; --force begins anew")
+    format!("--frames 0:{frames} converts the first frames, and wavesplat append adds the others; --force starts over")
 }
 
-/// What to type for headerless data, and then the formats that need no options.
+/// The options for headerless data, and the formats that need no options.
 fn known_formats() -> String {
     let known: Vec<String> = extensions().map(|extension| format!(".{extension}")).collect();
     format!("for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: {}", known.join(", "))
@@ -127,6 +127,6 @@ mod tests {
     #[test]
     fn notes_end_with_what_can_be_done() {
         assert_eq!(of_note(&"a".into()), "a");
-        assert_eq!(of_note(&Note::with("a", Remedy::Set("axes"))), "a; --axes says otherwise");
+        assert_eq!(of_note(&Note::with("a", Remedy::Set("axes"))), "a; --axes changes this");
     }
 }

@@ -1,10 +1,9 @@
-//! The manners that the programs share: common options, values of options, progress, exit codes.
+//! The parts that the programs share: common options, values of options, progress and exit codes.
 //!
-//! Standard output carries data or one JSON object; notes and progress go to standard error. `config` puts options of a file
-//! before those of the command line, and `program` ends a program: with the exit code of an error, or at once when it is
-//! interrupted.
+//! Data or one JSON object goes to standard output; notes and progress go to standard error. `config` reads options from a
+//! file. `program` runs a program, and ends it with an exit code.
 //!
-//! With the feature `args` alone, there are `input` and `values`: options that name and open frames, for other programs.
+//! With the feature `args` alone, other programs can use `input` and `values`: options that name and open frames.
 
 #[cfg(feature = "cli")]
 mod advice;

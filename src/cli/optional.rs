@@ -1,4 +1,4 @@
-//! Options whose value may be left out: `--estimate 0.01` means `--estimate=0.01`, though inputs may follow such an option too.
+//! Options whose value is optional: `--estimate 0.01` means `--estimate=0.01`, but an input may also follow the option.
 
 use super::config::chosen_command;
 use crate::base::error::{Error, Result};
@@ -6,10 +6,10 @@ use clap::Command;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
-/// The arguments, with every such option joined to the number that follows it.
+/// Joins each such option to the number that follows it.
 ///
 /// # Errors
-/// A word after the option is neither a number nor an input, or it is both.
+/// The word after the option is neither a number nor an input, or it is both.
 pub(super) fn joined(command: &Command, args: &[OsString]) -> Result<Vec<OsString>> {
     let options: Vec<String> = chosen_command(command, args)
         .get_arguments()
@@ -41,7 +41,7 @@ fn is_value(option: &str, word: &OsStr) -> Result<bool> {
             Err(Error::usage(format!("{option} {text}: {what}")))
         }
         (false, false) if !text.starts_with('-') => Err(Error::usage(format!(
-            "{option} {text}: is no number and no file; type {option} 0.01, or {option} alone"
+            "{option} {text}: is neither a number nor a file; type {option} 0.01, or {option} alone"
         ))),
         (is_number, _) => Ok(is_number),
     }

@@ -25,7 +25,7 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     let args = match parse::<A>(&args, &config) {
         Ok(args) => args,
         Err(e) => {
-            let _ = e.print(); // nowhere is left to report a failure
+            let _ = e.print(); // a failure cannot be reported anywhere else
             let help = matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
             return ExitCode::from(if help { 0 } else { 2 });
         }
@@ -35,13 +35,13 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
         Err(e) if e.is_broken_pipe() => ExitCode::SUCCESS,
         Err(e) => {
             let code = failed::<A>(&e);
-            config.words().filter(|_| e.is_usage()).into_iter().for_each(note);
+            config.summary().filter(|_| e.is_usage()).into_iter().for_each(note);
             code
         }
     }
 }
 
-/// What the command line and the file of options say.
+/// The command line, and the file of options.
 fn arguments<A: Parser>() -> Result<(Vec<OsString>, Config)> {
     let (command, args) = (command::<A>(), env::args_os().collect::<Vec<_>>());
     let args = optional::joined(&command, &args)?;
@@ -49,16 +49,16 @@ fn arguments<A: Parser>() -> Result<(Vec<OsString>, Config)> {
     Ok((args, config))
 }
 
-/// Ends the program as a signal asks: what can be gone on with is kept, all else that is unfinished removed.
+/// Ends the program on a signal. Keeps unfinished files that can be resumed, and removes the others.
 fn end(signal: i32) {
     if io::stderr().is_terminal() {
-        note(""); // a bar may be there
+        note(""); // ends the line of a progress bar
     }
     let kept = abandon();
     note("error: interrupted");
     for part in kept {
         note(format_args!(
-            "{}: what is finished is kept; the same command with --resume goes on with it",
+            "{}: the finished windows are kept; the same command with --resume continues after them",
             part.display()
         ));
     }
@@ -72,12 +72,12 @@ fn failed<A: Parser>(error: &Error) -> ExitCode {
 
 fn parse<A: Parser>(args: &[OsString], config: &Config) -> std::result::Result<A, clap::Error> {
     let mut command = command::<A>();
-    let all = config.before(&command, args);
+    let all = config.add_to(&command, args);
     let parsed = command.try_get_matches_from_mut(all).and_then(|matches| A::from_arg_matches(&matches));
-    parsed.map_err(|error| advice::advised(error, &command, args, config))
+    parsed.map_err(|error| advice::with_tip(error, &command, args, config))
 }
 
-/// What a program takes, with help that begins with examples.
+/// The arguments of a program. Its help begins with examples.
 pub fn command<A: Parser>() -> Command {
     const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\n{before-help}{all-args}{after-help}";
     A::command().help_template(HELP).mut_subcommands(|command| command.help_template(HELP))

@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 pub enum ProgressKind {
     /// A bar, if standard error is a terminal
     Auto,
-    /// JSON objects, one a line, a few a second and a last one
+    /// JSON objects, one per line, up to two a second and one at the end
     Json,
     /// Nothing
     None,
@@ -19,14 +19,14 @@ pub enum ProgressKind {
 /// Progress of one stage of a program.
 #[derive(Debug)]
 pub enum TerminalProgress {
-    /// A bar on standard error; nothing unless that is a terminal.
+    /// A bar on standard error, if it is a terminal.
     Bar(Bar),
     /// Lines of JSON on standard error.
     Lines(Lines),
 }
 
 impl TerminalProgress {
-    /// Of a stage that counts `unit`s.
+    /// Progress of a stage that counts `unit`s.
     pub fn new(kind: ProgressKind, stage: &'static str, unit: &'static str) -> Self {
         let target = match kind {
             ProgressKind::Json => return Self::Lines(Lines::new(stage, unit)),
@@ -62,7 +62,7 @@ impl Progress for TerminalProgress {
     fn finish(&self) {
         match self {
             Self::Bar(bar) => bar.bar.finish_and_clear(),
-            Self::Lines(lines) => lines.tell_last(),
+            Self::Lines(lines) => lines.write_last(),
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Values of options, parsed once into what they mean.
+//! Values of options.
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
 use std::fmt;
 use std::str::FromStr;
 
-/// A number of bytes, as `512MiB`.
+/// A number of bytes, like `512MiB`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Size(pub usize);
 
@@ -13,18 +13,18 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let bytes = bytesize::ByteSize::from_str(text).map_err(|_| "takes a size, as 512MiB or 2GB".to_string())?;
+        let bytes = bytesize::ByteSize::from_str(text).map_err(|_| "takes a size, like 512MiB or 2GB".to_string())?;
         if text.parse::<u64>().is_ok_and(|bytes| bytes < 1 << 20) {
-            return Err(format!("is {text} bytes; a size has a unit, as 512MiB or 2GB"));
+            return Err(format!("is {text} bytes; add a unit, like 512MiB or 2GB"));
         }
         usize::try_from(bytes.as_u64()).map(Self).map_err(|_| "is more than this machine can address".into())
     }
 }
 
-/// A share of a whole; whether it is one from 0 to 1 is asked where it is used.
+/// Parses a share. The caller checks that it is from 0 to 1.
 ///
 /// # Errors
-/// It is no number.
+/// The text is not a number.
 pub fn share(text: &str) -> std::result::Result<f64, String> {
     text.parse().map_err(|_| "takes a share, 0 to 1; 2 % is 0.02".into())
 }
@@ -40,7 +40,7 @@ impl FromStr for Dims {
         let dims: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| *n > 0)).collect();
         dims.filter(|d| d.len() == 3 || d.len() == 4)
             .map(Self)
-            .ok_or_else(|| "takes NXxNYxNZ or NXxNYxNZxNT, as 75x75x20x32".into())
+            .ok_or_else(|| "takes NXxNYxNZ or NXxNYxNZxNT, like 75x75x20x32".into())
     }
 }
 
@@ -51,7 +51,7 @@ impl fmt::Display for Dims {
     }
 }
 
-/// Width and height, as `512x512`.
+/// `N` whole numbers with x between them, like `512x512`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Whole<const N: usize>(pub [usize; N]);
 
@@ -61,7 +61,7 @@ impl<const N: usize> FromStr for Whole<N> {
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let numbers: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok()).collect();
         let numbers = numbers.and_then(|n| n.try_into().ok());
-        numbers.map(Self).ok_or_else(|| format!("takes {N} whole numbers with x between them, as 512x512"))
+        numbers.map(Self).ok_or_else(|| format!("takes {N} whole numbers with x between them, like 512x512"))
     }
 }
 
@@ -69,9 +69,9 @@ impl<const N: usize> FromStr for Whole<N> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbers<const N: usize>(pub [f64; N]);
 
-/// Two numbers, as `0,1.5`.
+/// Two numbers, like `0,1.5`.
 pub type Pair = Numbers<2>;
-/// Three numbers, as `1,1,2.5`.
+/// Three numbers, like `1,1,2.5`.
 pub type Triple = Numbers<3>;
 
 impl<const N: usize> FromStr for Numbers<N> {
@@ -91,7 +91,8 @@ impl<const N: usize> fmt::Display for Numbers<N> {
     }
 }
 
-/// `a:b` or `a:b:step`, end exclusive, either end may be left out or counted from the end; or one number.
+/// A range of frames: `a:b` or `a:b:step`, without b, or one number. a and b are optional, and count from the end if
+/// negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameRange {
     start: Option<i64>,
@@ -103,7 +104,7 @@ impl FromStr for FrameRange {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let wrong = || format!("'{text}' is no range of frames: a:b, a:b:step, or one number; the end is left out");
+        let wrong = || format!("'{text}' is not a range of frames: give a:b or a:b:step (without b), or one number");
         let end = |t: &str| if t.is_empty() { Ok(None) } else { t.parse::<i64>().map(Some).map_err(|_| wrong()) };
         let parts: Vec<&str> = text.split(':').collect();
         match parts.as_slice() {
@@ -129,17 +130,17 @@ impl fmt::Display for FrameRange {
 }
 
 impl FrameRange {
-    /// Whether these are the frames that come after `frames` and nothing else: none yet.
+    /// Whether the range has all frames from number `frames` on, so that an archive of `frames` frames has none of them.
     pub fn begins_at_end(&self, frames: usize) -> bool {
         self.end.is_none() && self.start.is_some_and(|start| start == frames as i64)
     }
 
-    /// First frame, step and number of frames, of an archive of `frames` frames; the number is unknown for all that a
-    /// stream brings.
+    /// First frame, step and number of frames in an archive of `frames` frames. The number is None for an open range of a
+    /// stream.
     pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {
         let from_end = |n: i64| match frames {
             Some(all) => Ok((all as i64).saturating_add(n).max(0)),
-            None => Err(Error::usage("--frames: a stream has no end to count from")),
+            None => Err(Error::usage("--frames: a stream cannot be counted from its end")),
         };
         let place = |n: i64| if n < 0 { from_end(n) } else { Ok(n) };
         let start = self.start.map_or(Ok(0), place)? as usize;
@@ -154,7 +155,7 @@ impl FrameRange {
     }
 }
 
-/// Frames, as ranges with commas between them.
+/// Ranges of frames with commas between them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrameList(Vec<FrameRange>);
 
@@ -167,7 +168,7 @@ impl FromStr for FrameList {
 }
 
 impl FrameList {
-    /// The frames of an archive of `frames` frames, ascending, each once.
+    /// The numbers of the frames in an archive of `frames` frames, ascending, each once.
     pub fn resolve(&self, frames: usize) -> Result<Vec<usize>> {
         let mut all = Vec::new();
         for range in &self.0 {
@@ -180,7 +181,7 @@ impl FrameList {
     }
 }
 
-/// `x0:x1,y0:y1,z0:z1`; an end that is left out is the volume's.
+/// A box of voxels: `x0:x1,y0:y1,z0:z1`. The default of each end is that of the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionSpec([(Option<usize>, Option<usize>); 3]);
 
@@ -188,7 +189,7 @@ impl FromStr for RegionSpec {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let wrong = || "takes x0:x1,y0:y1,z0:z1, ends excluded, as 0:32,:,10:20".to_string();
+        let wrong = || "takes x0:x1,y0:y1,z0:z1, without x1, y1 and z1, like 0:32,:,10:20".to_string();
         let end = |t: &str| if t.is_empty() { Ok(None) } else { t.parse().map(Some).map_err(|_| wrong()) };
         let axes: Vec<(Option<usize>, Option<usize>)> = text
             .split(',')
@@ -206,7 +207,7 @@ impl fmt::Display for RegionSpec {
 }
 
 impl RegionSpec {
-    /// The voxels of a grid that are meant.
+    /// The region of a grid.
     pub fn resolve(&self, grid: &Grid) -> Result<Region> {
         let region = Region {
             start: std::array::from_fn(|a| self.0[a].0.unwrap_or(0)),
@@ -220,7 +221,7 @@ impl RegionSpec {
     }
 }
 
-/// Opacities at shares of a range, as `0:0,0.5:0.1,1:0.8`.
+/// Opacities at shares of a range, like `0:0,0.5:0.1,1:0.8`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpacityPoints(pub Vec<(f64, f64)>);
 
@@ -233,7 +234,7 @@ impl FromStr for OpacityPoints {
             Some((share.trim().parse().ok()?, opacity.trim().parse().ok()?))
         };
         let points = text.split(',').map(point).collect::<Option<Vec<_>>>();
-        points.map(Self).ok_or_else(|| "takes pairs of a share and an opacity, as 0:0,0.5:0.1,1:0.8".into())
+        points.map(Self).ok_or_else(|| "takes pairs of a share and an opacity, like 0:0,0.5:0.1,1:0.8".into())
     }
 }
 

@@ -62,10 +62,10 @@ fn nothing_replaces_what_is_read() {
         "convert frames/f_*.npy -o frames/f_3.npy --force",
         "extract a.wspl -o a.wspl --format raw --force",
     ] {
-        work.wavesplat(command).fails(2, &["would replace what is read"]);
+        work.wavesplat(command).fails(2, &["would replace the input"]);
     }
     for command in ["a.wspl -o a.wspl --format npy --force", "frames --method direct -o frames/f_%d.npy --force"] {
-        work.render(command).fails(2, &["would replace what is read"]);
+        work.render(command).fails(2, &["would replace the input"]);
     }
     work.wavesplat("convert frames -o frames/out.wspl --force").ok();
     assert!(before("frames/f_3.npy") == frame && before("a.npy") == whole && before("a.wspl") == file);

@@ -50,7 +50,7 @@ fn a_conversion_from_a_slow_pipe_is_interrupted_and_resumed_to_the_same_bytes() 
         assert!(appears(&work, &mut child, "a.wspl.part", true));
         signal(&child, name);
         let run = Run::of(line, child.wait_with_output().unwrap());
-        run.fails(code, &["interrupted", "a.wspl.part: what is finished is kept", "--resume"]);
+        run.fails(code, &["interrupted", "a.wspl.part: the finished windows are kept", "--resume"]);
         drop(pipe);
         assert_eq!(work.names(), ["a.npy", "a.wspl.part"]);
         let run = work.piped("convert - -o a.wspl --window 8 --resume", &bytes).ok();

@@ -56,7 +56,7 @@ fn messages_about_missing_or_wrong_arguments_give_the_right_form() {
     for (option, words) in [
         ("--tolerance 1%", ["--tolerance", "2 % is 0.02"]),
         ("--threads 0", ["--threads", "at least 1"]),
-        ("--memory 5", ["5 bytes", "as 512MiB"]),
+        ("--memory 5", ["5 bytes", "like 512MiB"]),
         ("--memory 5MiB --window 64", ["MiB; give that", "--window or --block"]),
     ] {
         work.wavesplat(&format!("convert a.npy -o b.wspl {option}")).fails(2, &words);

@@ -247,7 +247,7 @@ fn inputs_that_cannot_be_compared_are_refused() {
     assert_eq!(json(&grey, &bytes, &[])["samples"], "u8", "what they are stored in does not matter");
     let heat = folder.path("heat.jpg");
     refused(&grey, &grey, &["-o", heat.to_str().unwrap()], 2, "expected a name that ends in .png");
-    refused(&grey, &grey, &["-o", grey.to_str().unwrap()], 2, "would replace what is read");
+    refused(&grey, &grey, &["-o", grey.to_str().unwrap()], 2, "would replace the input");
     refused(&grey, &grey, &["--scale", "1"], 2, "--output");
     refused(&grey, &grey, &["--fail-above", "nan"], 2, "is not a number of 0 or more");
 }
