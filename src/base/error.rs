@@ -1,4 +1,4 @@
-//! One error type for the library. Each kind stands for what the caller can do about it.
+//! The error type of the library. Its kinds differ in what the caller can do.
 
 pub use super::remedy::{Note, Remedy};
 
@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 /// Why an operation ended early.
 ///
 /// The kind says who can help: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever made the
-/// data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or nobody ([`Error::BoundMissed`]). Messages name
-/// fields, files and values. [`Error::remedy`] says what helps, where that is known.
+/// data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or no one ([`Error::BoundMissed`]). Messages name
+/// fields, files and values. [`Error::remedy`] says what helps, if that is known.
 ///
 /// ```
 /// use wavesplat::base::error::{Error, Remedy};
@@ -32,36 +32,36 @@ pub enum Error {
     Io {
         /// The file, or `-` for a standard stream.
         path: PathBuf,
-        /// What was being done, as "reading frame 3".
+        /// The action that failed, like "reading frame 3".
         doing: String,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
-    /// A field of a configuration, or an argument, makes no sense or cannot be met. Give it another value.
+    /// A field of a configuration, or an argument, is invalid or cannot be met. Give it another value.
     #[error("{setting}: {problem}")]
     Setting {
-        /// Name of the field, as `memory` or `splat_error`.
+        /// Name of the field, like `memory` or `splat_error`.
         setting: &'static str,
         /// What is wrong with its value.
         problem: String,
         /// What helps besides another value.
         remedy: Option<Remedy>,
     },
-    /// A path cannot be taken as an input or an output. Name another.
+    /// A path cannot be an input or an output. Name another.
     #[error("{}: {problem}", path.display())]
     Path {
         /// The path, a pattern of paths, or `-` for a standard stream.
         path: PathBuf,
-        /// Why it cannot be taken.
+        /// The reason.
         problem: String,
         /// What helps besides another path.
         remedy: Option<Remedy>,
     },
-    /// The arguments of a program make no sense. The library itself never returns this.
+    /// The arguments of a program are invalid. The library never returns this.
     #[error("{0}")]
     Usage(String),
-    /// An input is damaged, contradicts its description, or has a feature that is not supported. Repair it, or describe it
-    /// otherwise.
+    /// An input is damaged, contradicts its description, or has a feature that is not supported. Repair it, or change its
+    /// description.
     #[error("{}: {what}", path.display())]
     Input {
         /// The file, or `-` for a standard stream.
@@ -89,7 +89,7 @@ pub enum Error {
         /// What helps.
         remedy: Option<Remedy>,
     },
-    /// `verify` found samples outside the promised bound, or further off than the file states. The file is of no use.
+    /// `verify` found samples outside the promised bound, or errors above those stated in the file. Do not use the file.
     #[error("{}: {what}", path.display())]
     BoundMissed {
         /// The coefficient file.
@@ -99,7 +99,7 @@ pub enum Error {
     },
 }
 
-/// Why bytes cannot be read that a file had when it was opened; inside an [`io::Error`].
+/// A file has fewer bytes than when it was opened. Stored in an [`io::Error`].
 #[derive(Debug, Clone, Copy, thiserror::Error)]
 #[error("became shorter while it was being read")]
 pub(crate) struct BecameShorter;
@@ -119,7 +119,7 @@ impl Error {
         Self::Setting { setting, problem, remedy }
     }
 
-    /// An error about a path that cannot be taken.
+    /// An error about a path.
     pub fn path(path: impl AsRef<Path>, problem: impl Into<Note>) -> Self {
         let Note { text: problem, remedy } = problem.into();
         Self::Path { path: path.as_ref().into(), problem, remedy }
@@ -136,13 +136,13 @@ impl Error {
         Self::Input { path: path.as_ref().into(), what, remedy }
     }
 
-    /// An error about an input that is not what it was.
+    /// An error about an input that has changed.
     pub fn changed(path: impl AsRef<Path>, what: impl Into<Note>) -> Self {
         let Note { text: what, remedy } = what.into();
         Self::Changed { path: path.as_ref().into(), what, remedy }
     }
 
-    /// What helps, where that is known.
+    /// What helps, if that is known.
     pub fn remedy(&self) -> Option<Remedy> {
         match self {
             Self::Setting { remedy, .. }
@@ -154,13 +154,14 @@ impl Error {
         }
     }
 
-    /// Whether the request is wrong, and neither the data nor the machine: [`Error::Setting`], [`Error::Path`] and
+    /// Whether the fault is in the request, not in the data or the machine: [`Error::Setting`], [`Error::Path`] and
     /// [`Error::Usage`].
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Setting { .. } | Self::Path { .. } | Self::Usage(_))
     }
 
-    /// The programs' exit code: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or input changed.
+    /// The exit code of the programs: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or
+    /// input changed.
     pub fn exit_code(&self) -> u8 {
         if let Some(system) = self.system() {
             let is_shorter = system.get_ref().is_some_and(|inner| inner.downcast_ref::<BecameShorter>().is_some());
@@ -174,12 +175,12 @@ impl Error {
         }
     }
 
-    /// Whether the reader of our output went away, which ends a program quietly.
+    /// Whether the reader of standard output has closed it. A program then ends without a message.
     pub fn is_broken_pipe(&self) -> bool {
         self.system().is_some_and(|system| system.kind() == io::ErrorKind::BrokenPipe)
     }
 
-    /// What the system said, if it said anything.
+    /// The error of the system, if there is one.
     fn system(&self) -> Option<&io::Error> {
         match self {
             Self::Io { source, .. } | Self::CoefficientFile { source: wavesplat_format::Error::Io(source), .. } => {

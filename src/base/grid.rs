@@ -60,12 +60,12 @@ impl Region {
         self.dims().iter().product()
     }
 
-    /// Whether there is no voxel inside.
+    /// Whether the region has no voxel.
     pub fn is_empty(&self) -> bool {
         self.voxels() == 0
     }
 
-    /// The voxels that both regions hold.
+    /// The voxels in both regions.
     pub fn intersect(&self, other: &Self) -> Self {
         Self {
             start: std::array::from_fn(|a| self.start[a].max(other.start[a])),
@@ -98,14 +98,14 @@ impl Region {
         self.rows().flat_map(move |(y, z)| x.clone().map(move |x| [x, y, z]))
     }
 
-    /// Where a voxel of this region stands in the region's own array.
+    /// Index of a voxel in the array of this region.
     pub fn index(&self, voxel: [usize; 3]) -> usize {
         let d = self.dims();
         let [x, y, z] = std::array::from_fn(|a| voxel[a] - self.start[a]);
         (z * d[1] + y) * d[0] + x
     }
 
-    /// The voxel that stands at `index` in the region's own array.
+    /// The voxel at `index` in the array of this region.
     pub fn voxel(&self, index: usize) -> [usize; 3] {
         let [nx, ny, _] = self.dims();
         let inside = [index % nx, index / nx % ny, index / (nx * ny)];

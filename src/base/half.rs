@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Half(u16);
 
-/// Bits of the mantissa of `f64` that a half does not have.
+/// Bits of an `f64` mantissa beyond those of a half.
 const DROPPED: u32 = 52 - 10;
 
 /// Difference of the exponents' biases.
@@ -39,7 +39,7 @@ impl Half {
         let bits = if value.is_nan() {
             INFINITY | QUIET | (value.to_bits() >> DROPPED & 0x3ff)
         } else if magnitude < Self::LEAST_NORMAL {
-            // Numbers of this size are a whole number of LEAST apart, so that the sum is rounded to one.
+            // Here f64 numbers are a multiple of LEAST apart, so the sum is rounded to a half.
             const APART: f64 = Half::LEAST * (1_u64 << 52) as f64;
             (magnitude + APART).to_bits() - APART.to_bits()
         } else {

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
 use std::thread;
 use std::time::SystemTime;
 
-/// How the bytes of a file are reached.
+/// How the bytes of a file are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
     /// Through a read-only memory map.
@@ -35,7 +35,7 @@ impl Access {
     }
 }
 
-/// What tells that a file is still the same, with the same content.
+/// Properties of a file that show whether it has changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct State {
     /// Length in bytes.
@@ -61,7 +61,7 @@ impl State {
         Err(Error::changed(path, format!("changed while it was being read: {what}")))
     }
 
-    /// An error if what has this name is no longer in this state.
+    /// An error if the file of this name is not in this state.
     pub(crate) fn check_path(&self, path: &Path) -> Result<()> {
         let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
         self.check(path, &Self::of(&now))
@@ -137,12 +137,12 @@ impl FileBytes {
         Ok(())
     }
 
-    /// Whether small reads are cheap (mapped), or worth joining into larger ones.
+    /// Whether the file is mapped, so that small reads are cheap.
     pub(crate) fn is_mapped(&self) -> bool {
         self.map.is_some()
     }
 
-    /// An error if what has the file's name is no longer in the state that the file had at open.
+    /// An error if the file of this name has changed since it was opened.
     pub(crate) fn check_unchanged(&self) -> Result<()> {
         self.state.check_path(&self.path)
     }
@@ -158,7 +158,7 @@ impl wavesplat_format::Storage for FileBytes {
     }
 }
 
-/// A map that the SIGBUS handler can name.
+/// A map whose file the SIGBUS handler can name.
 #[derive(Debug)]
 struct RegisteredMap {
     slot: Option<&'static Slot>,
@@ -200,7 +200,7 @@ struct Slot {
     path: AtomicPtr<c_char>,
 }
 
-/// Maps beyond this many at a time work too; a SIGBUS in one of them is reported without its name.
+/// More maps than slots work too, but a SIGBUS in one of those is reported without its name.
 static SLOTS: [Slot; 1024] =
     [const { Slot { start: AtomicUsize::new(0), end: AtomicUsize::new(0), path: AtomicPtr::new(ptr::null_mut()) } };
         1024];
@@ -224,10 +224,10 @@ impl Slot {
     }
 }
 
-/// Makes a SIGBUS in a mapped file end the process with a message that names the file, and exit code 4; and a write beyond
-/// the limit on a file's size an error like others, not the process's end.
+/// After this, a SIGBUS in a mapped file ends the process with exit code 4 and a message that names the file. A write beyond
+/// the limit on file sizes becomes an error and no longer ends the process.
 ///
-/// For programs, called once at their start. A library must not take over signals.
+/// For programs. Call once at the start. A library must not take over signals.
 #[doc(hidden)]
 pub fn explain_sigbus() {
     // SAFETY: `action` is zeroed (a valid value: no flags, empty mask) and then filled in; the handler only uses
@@ -241,13 +241,13 @@ pub fn explain_sigbus() {
     }
 }
 
-/// Bytes of the stack of a thread that waits, then writes a few words: they count where memory is limited.
-const WAITING_STACK: usize = 256 << 10;
+/// Bytes of the stack of the thread that waits for signals. They are few, since they count where memory is limited.
+const SIGNAL_STACK: usize = 256 << 10;
 
-/// Makes SIGINT (Ctrl-C) and SIGTERM call `end` with the signal's number, on a thread that waits for nothing else; a second one
-/// ends the process at once. Signals that are ignored, as those of a background job may be, stay so.
+/// After this, SIGINT (Ctrl-C) and SIGTERM call `end` with the signal's number, on a separate thread. A second signal ends
+/// the process at once. Signals that are ignored, as in some background jobs, stay ignored.
 ///
-/// For programs, called once at their start, before any thread: those that come inherit what is blocked.
+/// For programs. Call once at the start, before other threads start: they inherit the blocked signals.
 #[doc(hidden)]
 pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
     // SAFETY: both sets are made by `sigemptyset`, `was` is zeroed and filled in by `sigaction`, which changes nothing where
@@ -263,7 +263,7 @@ pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
             }
         }
         libc::pthread_sigmask(libc::SIG_BLOCK, &raw const asked, ptr::null_mut());
-        let waits = thread::Builder::new().stack_size(WAITING_STACK).spawn(move || {
+        let waits = thread::Builder::new().stack_size(SIGNAL_STACK).spawn(move || {
             let mut signal = 0;
             if libc::sigwait(&raw const asked, &raw mut signal) == 0 {
                 libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const asked, ptr::null_mut());
@@ -271,7 +271,7 @@ pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
             }
         });
         if waits.is_err() {
-            libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const asked, ptr::null_mut()); // as if nobody had asked
+            libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const asked, ptr::null_mut()); // signals act as before
         }
     }
 }
@@ -280,15 +280,15 @@ extern "C" fn on_sigbus(_signal: c_int, info: *mut libc::siginfo_t, _context: *m
     // SAFETY: the kernel passes a valid `info` to a handler installed with SA_SIGINFO.
     let address = unsafe { (*info).si_addr() } as usize;
     let path = SLOTS.iter().find(|s| s.holds(address)).map(|s| s.path.load(Ordering::SeqCst));
-    say(c"wavesplat: ".as_ptr());
-    say(path.unwrap_or(c"a mapped file".as_ptr().cast_mut()));
-    say(c": became shorter or unreadable while it was being read\n".as_ptr());
+    write_stderr(c"wavesplat: ".as_ptr());
+    write_stderr(path.unwrap_or(c"a mapped file".as_ptr().cast_mut()));
+    write_stderr(c": became shorter or unreadable while it was being read\n".as_ptr());
     // SAFETY: `_exit` is async-signal-safe.
     unsafe { libc::_exit(4) }
 }
 
 /// Writes a C string to standard error, from a signal handler.
-fn say(text: *const c_char) {
+fn write_stderr(text: *const c_char) {
     // SAFETY: `text` is NUL-terminated and alive: a literal, or the path of a registered map that is not dropped
     // while this thread reads from it. A failed write has nowhere to be reported.
     unsafe {

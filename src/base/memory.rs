@@ -1,10 +1,10 @@
-//! What every memory budget has in common.
+//! Constants of memory budgets.
 
-/// Bytes that may be allocated where nobody says it.
+/// The default budget, in bytes.
 pub(crate) const DEFAULT: usize = 512 << 20;
 
-/// Bytes that a budget leaves for the program, stacks and directories.
+/// Bytes of a budget that are reserved for the program, stacks and directories.
 pub(crate) const FIXED: usize = 8 << 20;
 
-/// Blocks worked on at a time: enough to keep workers busy; more would only delay the first result.
+/// Largest number of blocks in work at a time: enough to keep all threads busy. More would only delay the first result.
 pub(crate) const MOST_BLOCKS: usize = 64;

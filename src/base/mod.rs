@@ -1,8 +1,6 @@
-//! What every other folder stands on: errors, progress, samples, grids, maps of files, and outputs that appear when they
-//! are complete.
+//! The parts that all other folders use: errors, progress, samples, grids, mapped files and output files.
 //!
-//! Nothing here knows frames, coefficients or pictures. The modules are listed from the lowest to the highest; each uses
-//! only those above it.
+//! Nothing here depends on frames, coefficients or pictures. A module uses only those listed above it.
 
 mod remedy;
 pub mod error;

@@ -6,10 +6,10 @@ use crate::base::sample::SampleType;
 use literal::{Literal, Value};
 use std::io::{self, Write};
 
-/// How every `.npy` starts; two bytes of its version follow.
+/// The first bytes of every `.npy`; two bytes of its version follow.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Headers are filled up with blanks to a multiple of so many bytes.
+/// Headers are padded with blanks to a multiple of this many bytes.
 const ALIGNMENT: usize = 64;
 
 /// Bytes of a written header before its text.
@@ -28,7 +28,7 @@ pub fn write_header(ty: SampleType, shape: &[usize], out: &mut impl Write) -> io
     writeln!(out, "{text:<0$}", len - 1)
 }
 
-/// What the text of a header says.
+/// The content of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Header {
     /// Sample type and whether its most significant byte is first; or the text of a type that is not supported.
@@ -43,7 +43,7 @@ impl Header {
     /// Reads the text of a header: a dictionary of Python.
     ///
     /// # Errors
-    /// What is wrong with it, in words that follow "its npy header".
+    /// The reason, in words that follow "its npy header".
     pub(crate) fn parse(text: &[u8]) -> Result<Self, String> {
         let text = std::str::from_utf8(text).map_err(|_| "is damaged: it is not text")?;
         let Value::Dictionary(entries) = literal::parse(text)?.value else {
@@ -89,7 +89,7 @@ fn shape(literal: &Literal<'_>) -> Result<Vec<u64>, String> {
     samples.map(|_| lengths).ok_or_else(|| format!("has numbers that are too large: {}", literal.source))
 }
 
-/// NumPy's name of a type without the order of its bytes: `f4`.
+/// NumPy's name of a type without byte order: `f4`.
 fn numpy_name(ty: SampleType) -> String {
     format!("{}{}", &ty.name()[..1], ty.size())
 }

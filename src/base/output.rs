@@ -1,4 +1,4 @@
-//! Results out: to standard output, or to a file whose final name exists only when it is complete.
+//! Writes results to standard output, or to a file that gets its final name when it is complete.
 
 mod names;
 
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 /// The name that stands for a standard stream.
 pub const STANDARD: &str = "-";
 
-/// Where a result goes. Dropped before [`Output::commit`], it leaves nothing behind under the final name.
+/// A file or stream to write. If it is dropped before [`Output::commit`], no file has the final name.
 #[derive(Debug)]
 pub struct Output {
     path: PathBuf,
@@ -28,44 +28,44 @@ pub struct Output {
 #[derive(Debug)]
 enum Target {
     Stdout(BufWriter<Stdout>),
-    /// A device or a pipe, written as it is.
+    /// A device or a pipe, written directly.
     Special(BufWriter<File>),
-    File(Part, BufWriter<File>), // in this order: the name is taken away before the lock is
+    File(Part, BufWriter<File>), // in this order: the file is removed before it is unlocked
 }
 
-/// The unfinished file; removed when dropped, unless it is worth keeping.
+/// The unfinished file. Dropping it removes the file, unless it is to be kept.
 #[derive(Debug)]
 struct Part {
     path: PathBuf,
     replace: bool,
-    /// Whether what is flushed can be gone on with, and must outlive this run.
+    /// Whether a later run can continue the flushed bytes, so that they must be kept.
     resumable: bool,
-    /// No longer to be removed.
+    /// Whether dropping keeps the file.
     keep: Arc<AtomicBool>,
     synced: Instant,
 }
 
-/// What may be lost of a resumable file where power fails: the work of so long.
+/// The work of at most this long is lost from a resumable file in a power failure.
 const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 
-/// How long a lock is waited for: a process that was killed may hold it a little longer.
-const DYING: Duration = Duration::from_secs(1);
+/// How long to wait for a lock: a killed process may hold it a little longer.
+const LOCK_WAIT: Duration = Duration::from_secs(1);
 
-/// The unfinished files of this process, and whether each is worth keeping: for [`abandon`].
+/// The unfinished files of this process, and whether each is to be kept, for [`abandon`].
 static PARTS: Mutex<Vec<(PathBuf, Arc<AtomicBool>)>> = Mutex::new(Vec::new());
 
 fn parts() -> MutexGuard<'static, Vec<(PathBuf, Arc<AtomicBool>)>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes all unfinished files but those that can be gone on with, which it names. The process must end now: whoever gives a
-/// file its name, or takes one away, waits for ever.
+/// Removes all unfinished files except those that can be resumed, and returns the names of these. The process must then
+/// end: threads that commit or drop an output now wait forever.
 #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "only programs end on signals"))]
 pub(crate) fn abandon() -> Vec<PathBuf> {
     let parts = parts();
     let is_kept = |keep: &AtomicBool| keep.load(Ordering::Relaxed);
     for (path, _) in parts.iter().filter(|(_, keep)| !is_kept(keep)) {
-        let _ = fs::remove_file(path); // nobody is left to hear of a failure
+        let _ = fs::remove_file(path); // a failure cannot be reported here
     }
     let kept = parts.iter().filter(|(path, keep)| is_kept(keep) && path.exists());
     let kept = kept.map(|(path, _)| path.clone()).collect();
@@ -77,7 +77,7 @@ impl Drop for Part {
     fn drop(&mut self) {
         parts().retain(|(path, _)| *path != self.path);
         if !self.is_kept() {
-            let _ = fs::remove_file(&self.path); // nobody is left to hear of a failure
+            let _ = fs::remove_file(&self.path); // a failure cannot be reported here
         }
     }
 }
@@ -92,7 +92,7 @@ impl Output {
     }
 
     fn create_after(path: &Path, force: bool, begin: impl FnOnce(&File) -> io::Result<()>) -> Result<Self> {
-        let real = path.is_symlink().then(|| path.canonicalize().ok()).flatten(); // a link stays one
+        let real = path.is_symlink().then(|| path.canonicalize().ok()).flatten(); // writes to the target of a link
         let path = real.as_deref().unwrap_or(path);
         let target = if path == Path::new(STANDARD) {
             if io::stdout().is_terminal() {
@@ -111,8 +111,8 @@ impl Output {
         Ok(Self { path: path.into(), target })
     }
 
-    /// As [`Self::create`], but of a file what is flushed is kept whatever comes, to be gone on with; and what an earlier
-    /// run left is still there, until [`Self::begin_at`] says from where on to write.
+    /// As [`Self::create`], but flushed bytes of a file are always kept, so that a later run can continue it. The bytes of
+    /// an earlier run stay until [`Self::begin_at`] chooses where to continue.
     pub(crate) fn resumable(path: &Path, force: bool) -> Result<Self> {
         let mut out = Self::create_after(path, force, |_| Ok(()))?;
         if let Target::File(part, file) = &mut out.target {
@@ -123,7 +123,7 @@ impl Output {
         Ok(out)
     }
 
-    /// Where what is written lies until [`Self::commit`]; none if it is not a file.
+    /// The path of the unfinished file; None for other outputs.
     pub fn part(&self) -> Option<&Path> {
         match &self.target {
             Target::File(part, _) => Some(&part.path),
@@ -131,7 +131,7 @@ impl Output {
         }
     }
 
-    /// Leaves the first `bytes` of an unfinished file, after which writing goes on.
+    /// Cuts an unfinished file to its first `bytes`, and continues writing after them.
     pub(crate) fn begin_at(&mut self, bytes: u64) -> Result<()> {
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         part.set_kept(bytes > 0);
@@ -139,12 +139,12 @@ impl Output {
         cut.map(drop).map_err(|e| Error::io(&part.path, "cutting", e))
     }
 
-    /// Whether what was written so far stays if the output is dropped.
+    /// Whether dropping the output keeps the bytes written so far.
     pub fn is_kept(&self) -> bool {
         matches!(&self.target, Target::File(part, _) if part.is_kept())
     }
 
-    /// An error if a file cannot be made at `path`, as far as can be told without making it.
+    /// An error if a file clearly cannot be created at `path`. Creates nothing.
     pub fn check(path: &Path, force: bool) -> Result<()> {
         if path.is_dir() {
             return Err(Error::path(path, "is a folder; name a file"));
@@ -172,18 +172,19 @@ impl Output {
         self.commit_if(|_| Ok(()))
     }
 
-    /// As [`Self::commit`], if a file is found right once it is all on its disk.
+    /// As [`Self::commit`], but first calls `right` with the unfinished file, which is then on disk. Its error prevents the
+    /// commit.
     pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
         right(&part.path)?;
-        part.set_kept(true); // if its name cannot be given, the work must not be lost
-        let doing = || format!("giving the finished {} this name", part.path.display());
+        part.set_kept(true); // if renaming fails, the work must not be lost
+        let doing = || format!("renaming the finished {} to this", part.path.display());
         part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))?;
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let synced = File::open(folder).and_then(|folder| folder.sync_all());
-        synced.map_err(|e| Error::io(&self.path, "it is complete; writing its name to the disk", e))
+        synced.map_err(|e| Error::io(&self.path, "writing the name of the finished file to the disk", e))
     }
 }
 
@@ -202,7 +203,7 @@ impl Part {
         self.keep.store(keep, Ordering::Relaxed);
     }
 
-    /// Opens and locks `NAME.part`; one that nobody holds is left over from a run that died.
+    /// Opens and locks `NAME.part`. A file that is not locked was left by a run that was killed.
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
         let part = part_of(path);
         let failed = |e| Error::io(path, "creating", e);
@@ -212,8 +213,8 @@ impl Part {
                 File::options().read(true).write(true).create(true).truncate(false).open(&part).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) if asked.elapsed() < DYING => {
-                    std::thread::sleep(DYING / 20);
+                Err(TryLockError::WouldBlock) if asked.elapsed() < LOCK_WAIT => {
+                    std::thread::sleep(LOCK_WAIT / 20);
                     continue;
                 }
                 Err(TryLockError::WouldBlock) => {
@@ -223,21 +224,21 @@ impl Part {
                 Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
                 Err(TryLockError::Error(e)) => return Err(failed(e)),
             }
-            // Between opening and locking, its last owner may have given the file its final name; or have died before
-            // it took this one away from a finished file.
+            // Between opening and locking, the last owner may have renamed the file. Or it was killed after it had linked
+            // the final name, but before it removed this one.
             let (own, there) = (file.metadata().map_err(failed)?, fs::metadata(&part));
             let is_there = there.is_ok_and(|there| (there.dev(), there.ino()) == (own.dev(), own.ino()));
             match (is_there, own.nlink() > 1) {
                 (true, true) => fs::remove_file(&part).map_err(failed)?,
                 (true, false) if path.exists() && !replace => {
                     if file.metadata().is_ok_and(|m| m.len() == 0) {
-                        let _ = fs::remove_file(&part); // ours, and of no use
+                        let _ = fs::remove_file(&part); // created here, and empty
                     }
                     return Err(exists(path));
                 }
                 (true, false) => {
                     if let Ok(replaced) = fs::metadata(path) {
-                        let mode = replaced.permissions().mode() | 0o200; // it is yet to be written
+                        let mode = replaced.permissions().mode() | 0o200; // it must be writable
                         file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
                     }
                     return Ok((file, Self::new(part, replace)));
@@ -247,7 +248,7 @@ impl Part {
         }
     }
 
-    /// Sees to it that what was written is not lost, if this is a file to go on with.
+    /// Keeps the written bytes of a resumable file, and syncs them to disk from time to time.
     fn keep(&mut self, file: &File) -> io::Result<()> {
         if self.resumable {
             self.set_kept(true);
@@ -260,7 +261,7 @@ impl Part {
     }
 
     fn rename(&self, path: &Path) -> io::Result<()> {
-        let _whole = parts(); // no half of this, and nothing after all was abandoned
+        let _whole = parts(); // `abandon` must not run during this, nor this after it
         if self.replace {
             return fs::rename(&self.path, path);
         }
@@ -268,7 +269,7 @@ impl Part {
             Ok(()) => fs::remove_file(&self.path),
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(e),
             Err(_) if path.exists() => Err(io::ErrorKind::AlreadyExists.into()),
-            Err(_) => fs::rename(&self.path, path), // no hard links here
+            Err(_) => fs::rename(&self.path, path), // the file system has no hard links
         }
     }
 }
@@ -296,7 +297,7 @@ impl Write for Output {
     }
 }
 
-/// The name of the unfinished file that is to become `path`.
+/// The name of the unfinished file of `path`.
 pub fn part_of(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".part");
@@ -307,7 +308,7 @@ fn exists(path: &Path) -> Error {
     Error::path(path, Note::with("exists already", Remedy::Replace))
 }
 
-/// Which process has locked a file, where the system tells.
+/// The process that has locked a file, if the system tells.
 fn holder(file: &File) -> Option<String> {
     let locks = fs::read_to_string("/proc/locks").ok()?;
     let inode = format!(":{}", file.metadata().ok()?.ino());

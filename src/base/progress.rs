@@ -1,20 +1,20 @@
-//! How long work tells how far it is. The library reports; programs draw.
+//! Progress of long work. The library reports it, and programs show it.
 
 /// Receives the progress of one run.
 pub trait Progress: Sync {
-    /// The work has this many steps, or an unknown number.
+    /// The work starts, and has this many steps or an unknown number.
     fn start(&self, steps: Option<u64>);
-    /// So many of them were done before, by an earlier run: they say nothing of the speed.
+    /// An earlier run did this many steps. They do not count for the speed.
     fn resume(&self, steps: u64) {
         self.advance(steps);
     }
-    /// So many more steps are done.
+    /// This many more steps are done.
     fn advance(&self, steps: u64);
-    /// All is done.
+    /// All steps are done.
     fn finish(&self);
 }
 
-/// Reports to nobody.
+/// Shows nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Silent;
 

@@ -1,4 +1,4 @@
-//! What helps against a problem, as values; programs put it into the words of their options.
+//! Remedies for errors and notes. Programs express them by their options.
 
 use std::fmt::{self, Display};
 
@@ -6,7 +6,7 @@ use std::fmt::{self, Display};
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Remedy {
-    /// Give this field a value, in place of what the files say: `spacing`, `origin`, or `axes`.
+    /// Set this field, which overrides the files: `spacing`, `origin` or `axes`.
     Set(&'static str),
     /// Choose an array by `variable`.
     ChooseVariable,
@@ -17,25 +17,26 @@ pub enum Remedy {
         /// How many components it has.
         components: usize,
     },
-    /// Choose one index of an axis beside space and time by `variable`, as `NAME[0]`; or say by `axes` what each axis counts.
+    /// Choose one index of an axis beside space and time by `variable`, as `NAME[0]`; or give the meaning of
+    /// each axis by `axes`.
     ChooseIndex {
         /// The array.
         name: String,
     },
-    /// Choose as many frames as the other side has.
+    /// Choose the frames that the other input has.
     ChooseFrames,
-    /// Say by `dims` and `sample` what headerless data is.
+    /// Describe headerless data by `dims` and `sample`.
     DescribeSamples,
     /// Give one of these fields another value.
     Adjust(&'static [&'static str]),
-    /// Set `dims` to this: the file holds just so many frames of that size.
+    /// Set `dims` to this: the file holds exactly this many frames of this size.
     SetDims {
         /// Voxels along x, y, z.
         dims: [usize; 3],
         /// Frames.
         frames: u64,
     },
-    /// Set `allow_gaps`, which takes files in the order in which they are.
+    /// Set `allow_gaps`, which accepts files with gaps in their numbers.
     AllowGaps,
     /// Set `missing` to [`crate::convert::MissingPolicy::Mask`], which keeps missing samples.
     MaskMissing,
@@ -43,38 +44,38 @@ pub enum Remedy {
     BuildWith(&'static str),
     /// Allow the existing file to be replaced.
     Replace,
-    /// Discard the unfinished file and begin anew.
+    /// Discard the unfinished file and start over.
     BeginAnew,
-    /// Resume the unfinished file, or discard it and begin anew.
+    /// Resume the unfinished file, or discard it and start over.
     ResumeOrBeginAnew,
-    /// Convert the first `frames` frames, and append the others to that file; or begin anew.
+    /// Convert the first `frames` frames, and append the others to that file; or start over.
     AppendOrBeginAnew {
         /// How many the input had before it grew.
         frames: u64,
     },
-    /// Recover what is whole of a damaged file, or read it with damaged blocks left out.
+    /// Recover the undamaged blocks of a file, or read it without the damaged ones.
     RecoverOrSkip,
-    /// Resume the conversion that left this unfinished file, or recover what it holds.
+    /// Resume the conversion that left this unfinished file, or recover its blocks.
     ResumeOrRecover,
     /// Give a range above 0, or take the linear norm.
     RangeAboveZero,
-    /// Make projections: no other mode has this.
+    /// Make projections: other modes do not have this.
     Project,
-    /// Make projections, or convert the samples themselves and not their colours.
+    /// Make projections, or convert the samples instead of their colours.
     ProjectOrConvertSamples,
 }
 
-/// Words about a file or a field, and what can be done about it.
+/// A text about a file or a field, and a remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
-    /// What is to be known. It may follow the name of a file.
+    /// The text. It may follow the name of a file.
     pub text: String,
-    /// What can be done about it.
+    /// What the caller can do.
     pub remedy: Option<Remedy>,
 }
 
 impl Note {
-    /// Words with a remedy.
+    /// A text with a remedy.
     pub fn with(text: impl Into<String>, remedy: Remedy) -> Self {
         Self { text: text.into(), remedy: Some(remedy) }
     }
@@ -93,7 +94,7 @@ impl From<&str> for Note {
 }
 
 impl Display for Note {
-    /// The words alone.
+    /// Writes the text without the remedy.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }

@@ -27,7 +27,7 @@ pub fn load(ty: SampleType, bytes: &[u8], out: &mut [f64]) {
     load_as(ty, bytes, out, |v| v);
 }
 
-/// As [`load`], each number made another by `of`.
+/// As [`load`], with each number converted by `of`.
 pub(crate) fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) -> T) {
     assert_eq!(bytes.len(), out.len() * ty.size(), "bytes of {} samples", out.len());
     macro_rules! run {
@@ -40,7 +40,7 @@ pub(crate) fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl F
     for_type!(ty, run, bytes, out);
 }
 
-/// Fills each of `out` with `N` neighbouring samples, those of the next one `stride` samples further on.
+/// Fills each element of `out` with `N` neighbouring samples. The next element starts `stride` samples later.
 pub(crate) fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride: usize, out: &mut [[f64; N]]) {
     macro_rules! run {
         ($t:ty, $bytes:expr, $out:expr) => {{
@@ -54,7 +54,7 @@ pub(crate) fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride:
     for_type!(ty, run, bytes, out);
 }
 
-/// The number that storing `value` as `ty` leaves: rounded to nearest, integers clamped to their range.
+/// `value` after it was stored as `ty`: rounded to nearest, and for integers clamped to their range.
 pub fn round_to(ty: SampleType, value: f64) -> f64 {
     macro_rules! as_int {
         ($t:ty) => {
@@ -74,7 +74,7 @@ pub fn round_to(ty: SampleType, value: f64) -> f64 {
     }
 }
 
-/// Writes `values` as little-endian samples of type `ty`, rounded as [`round_to`] says.
+/// Writes `values` as little-endian samples of type `ty`, rounded as by [`round_to`].
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     assert_eq!(out.len(), values.len() * ty.size(), "bytes of {} samples", values.len());
@@ -96,18 +96,18 @@ pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
             Half::nearest($v)
         };
         ($t:ident, $v:expr) => {
-            $v.round() as $t // which clamps, too
+            $v.round() as $t // also clamps
         };
     }
     for_type!(ty, run, values, out);
 }
 
-/// Whether a sample is missing: not finite, or `declared` to stand for that.
+/// Whether a sample is missing: not finite, or equal to the `declared` missing value.
 pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
     !value.is_finite() || Some(value) == declared
 }
 
-/// Whether any value is missing; all are looked at, as vector code does.
+/// Whether any value is missing. It reads all values, so that the loop becomes vector code.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub(crate) fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
@@ -119,25 +119,26 @@ pub(crate) fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option
     any
 }
 
-/// A declared missing value as samples of type `ty` have it: 1e35 is another number as f32 than as f64.
+/// A declared missing value rounded to type `ty`: 1e35 as f32 is another number than as f64.
 pub(crate) fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64> {
     declared.map(|v| if ty.is_float() { round_to(ty, v) } else { v })
 }
 
-/// The range of some values; none if any of them is missing. For runs long enough to pay for vector code.
+/// The range of some values; None if any of them is missing. For long runs: it uses vector code.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
-    let mut all = Range::<SIDE_BY_SIDE>::NOTHING;
+    let mut all = Range::<RANGE_LANES>::EMPTY;
     let (many, rest) = values.as_chunks();
     many.iter().for_each(|values| all.add(values, declared));
-    let mut last = Range::<1>::NOTHING;
+    let mut last = Range::<1>::EMPTY;
     rest.iter().for_each(|v| last.add(&[*v], declared));
     let (a, b) = (all.whole()?, last.whole()?);
     Some((a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// The range of all samples that are not missing, (inf, -inf) without any; `missing` gets the index of each of the others.
+/// The range of all samples that are not missing, (inf, -inf) if there are none. `missing` is called with the index of each
+/// missing sample.
 pub fn range_of_present(
     ty: SampleType,
     samples: &[u8],
@@ -165,8 +166,8 @@ pub fn join_ranges(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Values that are looked at together: each comparison waits for the last one.
-const SIDE_BY_SIDE: usize = 16;
+/// Number of independent ranges: a comparison need not wait for the last one.
+const RANGE_LANES: usize = 16;
 
 /// Ranges of `N` runs of values.
 struct Range<const N: usize> {
@@ -177,7 +178,7 @@ struct Range<const N: usize> {
 }
 
 impl<const N: usize> Range<N> {
-    const NOTHING: Self = Self { lo: [f64::INFINITY; N], hi: [f64::NEG_INFINITY; N], missing: [0.0; N] };
+    const EMPTY: Self = Self { lo: [f64::INFINITY; N], hi: [f64::NEG_INFINITY; N], missing: [0.0; N] };
 
     #[inline(always)]
     fn add(&mut self, values: &[f64; N], declared: f64) {
@@ -195,7 +196,7 @@ impl<const N: usize> Range<N> {
     }
 }
 
-/// What storing a few values as `ty` leaves, as [`round_to`].
+/// Rounds a few values as by [`round_to`].
 pub(crate) fn round_all<const N: usize>(ty: SampleType, values: &[f64; N]) -> [f64; N] {
     match ty {
         SampleType::F64 => *values,
@@ -222,7 +223,7 @@ pub fn swap_endian(ty: SampleType, bytes: &mut [u8]) {
     }
 }
 
-/// How far rounding to a type moves numbers that are no larger than `magnitude`, at most.
+/// The largest rounding error for numbers up to `magnitude`.
 pub(crate) fn rounding(ty: SampleType, magnitude: f64) -> f64 {
     match ty {
         SampleType::F16 => magnitude * 2f64.powi(-11),

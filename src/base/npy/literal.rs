@@ -1,6 +1,6 @@
-//! Python literals, as far as headers of `.npy` have them: strings, whole numbers, truth values, tuples, lists, dictionaries.
+//! The Python literals in headers of `.npy`: strings, whole numbers, truth values, tuples, lists, dictionaries.
 
-/// Brackets within brackets that are read: deeper text could use up the stack.
+/// Largest depth of brackets: deeper text could overflow the stack.
 const MAX_NESTING: usize = 8;
 
 /// A value, and the text that it was read from.
@@ -21,10 +21,10 @@ pub(super) enum Value<'a> {
     Dictionary(Vec<(Literal<'a>, Literal<'a>)>),
 }
 
-/// Reads a text that is one value.
+/// Parses a text that is one value.
 ///
 /// # Errors
-/// What is wrong with the text, in words that follow "its npy header".
+/// The reason, in words that follow "its npy header".
 pub(super) fn parse(text: &str) -> Result<Literal<'_>, String> {
     let mut parser = Parser { text, at: 0, depth: 0 };
     let value = parser.literal()?;
@@ -34,7 +34,7 @@ pub(super) fn parse(text: &str) -> Result<Literal<'_>, String> {
 
 struct Parser<'a> {
     text: &'a str,
-    /// Where the rest begins; always between characters.
+    /// Start of the rest, in bytes; always between characters.
     at: usize,
     /// Brackets that are open.
     depth: usize,

@@ -1,20 +1,20 @@
-//! Names of files, by frame and by view.
+//! Names of the files of frames and views.
 
 use super::STANDARD;
 use crate::base::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Names of numbered files, a frame in each.
+/// Names of numbered files, one for each frame.
 #[derive(Debug)]
 pub(crate) struct Numbered {
     before: String,
     after: String,
-    /// Digits of the number; none: there is but one file.
+    /// Digits of the number; None if there is only one file.
     pub digits: Option<usize>,
 }
 
 impl Numbered {
-    /// From a name with one `%d` or `%0Nd`, or a plain name if there is but one frame.
+    /// From a name with one `%d` or `%0Nd`, or a plain name if there is only one frame.
     pub(crate) fn new(path: &Path, frames: usize) -> Result<Self> {
         let name = path.to_string_lossy().into_owned();
         let Some((before, digits, after)) = place_of_number(&name, 'd') else {
@@ -23,7 +23,7 @@ impl Numbered {
             }
             if frames != 1 {
                 let ending = path.extension().unwrap_or_default().to_string_lossy();
-                let what = format!("{frames} frames need a numbered name, as frame_%04d.{ending}");
+                let what = format!("{frames} frames need a numbered name, like frame_%04d.{ending}");
                 return Err(Error::path(path, what));
             }
             return Ok(Self { before: name, after: String::new(), digits: None });
@@ -34,7 +34,7 @@ impl Numbered {
         Ok(Self { before: before.into(), after: after.into(), digits: Some(digits) })
     }
 
-    /// Of files that are named after another, whose name is taken as it is.
+    /// Names made from `name`, in which % has no meaning, with a number and an extension.
     pub(crate) fn after(name: &str, ending: &str) -> Self {
         Self { before: format!("{name}_"), after: format!(".{ending}"), digits: Some(4) }
     }
@@ -49,10 +49,10 @@ impl Numbered {
 }
 
 fn misplaced(path: &Path) -> Error {
-    Error::path(path, "the number's place is %d or, with zeros, %04d; that of a view's %v or %03v")
+    Error::path(path, "write %d or %04d for the number of a frame, and %v or %03v for that of a view")
 }
 
-/// What is before and behind the first `%d` or `%0Nd` of a name, for another letter `%v` or `%0Nv`, and its N.
+/// The text before the first `%d` or `%0Nd` of a name (`%v` or `%0Nv` for the letter v), N, and the text after it.
 fn place_of_number(name: &str, letter: char) -> Option<(&str, usize, &str)> {
     name.match_indices('%').find_map(|(at, _)| {
         let (digits, after) = name[at + 1..].split_once(letter).filter(|(digits, _)| digits.len() < 4)?;
@@ -61,8 +61,8 @@ fn place_of_number(name: &str, letter: char) -> Option<(&str, usize, &str)> {
     })
 }
 
-/// A name for the pictures of each of some views, whose number takes the place of `%v` or, with zeros, `%03v`; or one for
-/// all, if it has no such place and they may be `joined`.
+/// A name for the pictures of each view, with its number for `%v` or, with zeros, `%03v`. A name without `%v` is for all
+/// views, if there is one view or if they may be `joined`.
 pub fn names_of_views(path: &Path, views: usize, joined: bool) -> Result<Vec<PathBuf>> {
     let name = path.to_string_lossy();
     match place_of_number(&name, 'v') {
@@ -73,9 +73,9 @@ pub fn names_of_views(path: &Path, views: usize, joined: bool) -> Result<Vec<Pat
         None if views == 1 || joined => Ok(vec![path.into()]),
         None if path == Path::new(STANDARD) => Err(Error::path(
             path,
-            format!("standard output takes one view, not {views}; files have their number as %v"),
+            format!("standard output takes one view, not {views}; write files with %v in their name"),
         )),
-        None => Err(Error::path(path, format!("{views} views need a name with their number, as view%v_%04d.png"))),
+        None => Err(Error::path(path, format!("{views} views need %v in the name, like view%v_%04d.png"))),
     }
 }
 
