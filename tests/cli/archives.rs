@@ -120,8 +120,7 @@ fn info_describes_frames_and_estimates_their_file() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([50, 40, 30], 40).npy());
     let told = work.wavesplat("info a.npy").ok();
-    for words in ["NumPy array, read where it is", "50 x 40 x 30 voxels", "f32 (unnamed), 40 frame(s)", "9600000 bytes"]
-    {
+    for words in ["NumPy array, read in place", "50 x 40 x 30 voxels", "f32 (unnamed), 40 frame(s)", "9600000 bytes"] {
         assert!(told.text().contains(words), "{words}: {}", told.text());
     }
     for tolerance in ["0.01", "0.0001"] {

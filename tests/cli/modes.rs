@@ -133,7 +133,7 @@ fn verify_a_lie(lie: impl Fn(&mut EncodedBlock, &mut Metadata)) -> Run {
 #[test]
 fn a_block_with_errors_beyond_those_stated_gives_code_4() {
     verify_a_lie(|_, _| ()).ok();
-    let words = ["further off than the file says: 1", "block 5 of window 1"];
+    let words = ["errors above those stated in the file: 1", "block 5 of window 1"];
     verify_a_lie(|b, _| b.stats.reached *= 0.999).fails(4, &words);
     verify_a_lie(|b, _| b.stats.reached = 0.0).fails(4, &words);
     verify_a_lie(|b, _| b.stats.max = b.stats.max.next_down()).fails(4, &words);

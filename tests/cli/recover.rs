@@ -45,8 +45,8 @@ fn without_its_directory_a_file_is_recovered_to_the_same_bytes() {
 fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
     let (work, file) = work();
     work.write("half.wspl", &file[..of_place(&file, b"WEND", 1) + 100]);
-    let run = work.wavesplat("recover half.wspl -o saved.wspl").finds(3, &["half.wspl", "its end is gone"]);
-    assert!(run.err.contains("frames after these"));
+    let run = work.wavesplat("recover half.wspl -o saved.wspl").finds(3, &["half.wspl", "its end is missing"]);
+    assert!(run.err.contains("any later frames"));
     work.wavesplat("verify saved.wspl").ok();
     work.wavesplat("extract saved.wspl -o saved.raw").ok();
     work.wavesplat("extract a.wspl -o a.raw --frames 0:16").ok();
@@ -58,8 +58,8 @@ fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
     let lost = serde_json::json!({ "window": 1, "frames": [8, 16], "first": 20, "last": 23 });
     assert_eq!((&report["blocks_lost"], &report["all_known"], &report["lost"][0]), (&4.into(), &false.into(), &lost));
     work.write("b.wspl.part", &file[..of_place(&file, b"WEND", 2)]);
-    work.wavesplat("recover b.wspl.part -o b.wspl").fails(2, &["b.wspl", "would replace what is read"]);
-    work.wavesplat("recover b.wspl.part -o so-far.wspl -q").fails(3, &["b.wspl.part", "its end is gone"]);
+    work.wavesplat("recover b.wspl.part -o b.wspl").fails(2, &["b.wspl", "would replace the input"]);
+    work.wavesplat("recover b.wspl.part -o so-far.wspl -q").fails(3, &["b.wspl.part", "its end is missing"]);
     work.wavesplat("verify so-far.wspl").ok();
 }
 
@@ -123,6 +123,6 @@ fn unrecoverable_files_are_reported() {
     newer[120..128].copy_from_slice(&sum);
     work.write("newer.wspl", &newer);
     work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 0"]);
-    work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace what is read"]);
+    work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace the input"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
 }

@@ -191,10 +191,10 @@ fn errors_and_tolerances_that_make_no_sense_are_refused() {
     let work = Work::with_file("--tolerance 0.004");
     small().write_frames(&work, "frames");
     let bad = |options: &str, words: &[&str]| drop(work.render(&format!("{options} -o v.npy")).fails(2, words));
-    bad("a.wspl --error-image v.npy", &["--error-image", "a file of its own"]);
-    bad("a.wspl --error-image -", &["--error-image", "a file of its own"]);
+    bad("a.wspl --error-image v.npy", &["--error-image", "different names"]);
+    bad("a.wspl --error-image -", &["--error-image", "not standard output"]);
     bad("a.wspl --error-image e.png", &["e.png", "frame_%04d.png"]);
-    bad("a.wspl --error-image e", &["e: the ending says no format"]);
+    bad("a.wspl --error-image e", &["e: the extension names no format"]);
     bad("a.wspl --tolerance 0.0001", &["--tolerance", "e-3 of its range off"]);
     bad("a.wspl --tolerance nan", &["--tolerance", "0 to 1"]);
     bad("a.wspl --tolerance 2", &["--tolerance", "0 to 1"]);

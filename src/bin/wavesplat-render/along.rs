@@ -1,4 +1,4 @@
-//! How the samples along a ray make a pixel.
+//! Options for the samples along a ray.
 
 use clap::{Args, ValueEnum};
 use wavesplat::base::error::{Error, Result};
@@ -7,7 +7,7 @@ use wavesplat::colour::TransferFunction;
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::Mode;
 
-/// Options on the samples along rays.
+/// Options for the samples along a ray.
 #[derive(Debug, Args)]
 pub(crate) struct AlongArgs {
     /// How the samples along a ray make a pixel

@@ -7,7 +7,7 @@ use wavesplat::cli::{CommonArgs, Pair, open_colours};
 use wavesplat::colour::{Norm, Rgb, TransferFunction};
 use wavesplat::render::sink::PictureFormat;
 
-/// Options on colours.
+/// Options for colours.
 #[derive(Debug, Args)]
 pub(crate) struct ColourArgs {
     /// Colour map: viridis plasma inferno magma cividis turbo coolwarm grey rainbow, or a file: ParaView's .json
@@ -45,7 +45,7 @@ impl From<NormName> for Norm {
 }
 
 impl ColourArgs {
-    /// Whether a map was given, so that arrays hold colours too.
+    /// Whether --colormap was given, so that arrays hold colours too.
     pub(crate) fn is_asked(&self) -> bool {
         self.colormap.is_some()
     }
@@ -53,7 +53,7 @@ impl ColourArgs {
     /// An error if a format cannot hold colours or annotations.
     pub(crate) fn check(&self, format: PictureFormat) -> Result<()> {
         if format == PictureFormat::Exr && self.is_asked() {
-            return Err(Error::usage("--colormap: an .exr holds numbers as they are; take png, with --depth 16"));
+            return Err(Error::usage("--colormap: an .exr holds numbers, not colours; take png with --depth 16"));
         }
         let why = match format {
             PictureFormat::Gray16 => "gray16 has no colours to draw in; take png, or another format",
@@ -69,12 +69,12 @@ impl ColourArgs {
     /// An error if colour options are given for samples that are colours.
     pub(crate) fn refuse_for_colours(&self) -> Result<()> {
         if self.is_asked() {
-            let what = "the colours are fixed, since the samples themselves were turned into them";
+            let what = "the colours are fixed, since the samples were turned into them";
             return Err(Error::usage(format!("--colormap: {what}")));
         }
         match self.norm {
             NormName::Linear => Ok(()),
-            NormName::Log => Err(Error::usage("--norm: spreads values over a --colormap, and these are colours")),
+            NormName::Log => Err(Error::usage("--norm: is for values with a --colormap; these samples are colours")),
         }
     }
 

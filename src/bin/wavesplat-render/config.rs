@@ -41,7 +41,7 @@ impl Cli {
         })
     }
 
-    /// The allowed sample error under a looser tolerance, in the unit of the samples.
+    /// The sample error that `--tolerance` allows, in the unit of the samples.
     fn allowed(&self, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
         let Some(file) = file.filter(|_| self.method == MethodName::Coefficients) else {
             return Err(Error::usage("--tolerance: leaves out coefficients, so it needs --method coefficients"));
@@ -53,7 +53,7 @@ impl Cli {
         let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         if allowed < reached && self.error == ErrorName::Certified {
             let least = reached / (file.range().1 - file.range().0);
-            let what = "the file itself is up to";
+            let what = "the samples of the file are up to";
             return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
         }
         Ok(allowed)

@@ -1,11 +1,11 @@
-//! `--generate`: the program's completions and man page, instead of pictures.
+//! `--generate`: prints completions or the man page.
 
 use crate::args::Cli;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
 use wavesplat::base::error::Result;
 use wavesplat::cli::{self, Generated};
 
-/// What the program was asked to do.
+/// The two things that the program can do.
 pub(crate) enum Program {
     Render(Box<Cli>),
     Generate(Generated),
@@ -26,7 +26,7 @@ impl CommandFactory for Program {
     fn command() -> Command {
         let generate = Arg::new(GENERATE).long(GENERATE).value_name("WHAT").exclusive(true);
         let generate = generate.value_parser(|text: &str| text.parse::<Generated>());
-        let help = "Print the man page (man) or the completions of a shell (completions-bash, -zsh, -fish ...), and nothing else";
+        let help = "Only print the man page (man) or the completions for a shell (completions-bash, -zsh, -fish ...)";
         Cli::command().arg(generate.help(help))
     }
 

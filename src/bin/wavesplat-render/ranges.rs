@@ -6,14 +6,13 @@ use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};
 use wavesplat::render::{Mode, Pixel, RenderConfig, Scene, check, render};
 
-/// Slabs of small pictures that serve only to find a range.
+/// Number of slabs of small pictures, which are only used to find a range.
 const FEW_SLABS: usize = 32;
 
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;
 
-/// The range of ascending values. Extreme values are cut off if a few of them would take most of the colours: at either
-/// end at most one value in 200, and only if those take up two fifths of the range.
+/// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the range.
 fn without_extremes(values: &[f32]) -> (f64, f64) {
     let few = values.len() / 200;
     let at = |n: usize| f64::from(values[n]);
@@ -106,7 +105,7 @@ impl Cli {
         if !of_pictures && !of_errors {
             return Ok(Ranges::default());
         }
-        check(scene, config)?; // so that errors come before small pictures are rendered, and name the full size
+        check(scene, config)?; // before small pictures are rendered, so that errors name the full size
         let mode = if config.mode.is_projection() { Mode::Projection } else { Mode::Mip { slabs: Some(FEW_SLABS) } };
         Ranges::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
     }

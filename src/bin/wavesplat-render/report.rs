@@ -37,7 +37,7 @@ impl Cli {
             ));
         } else if self.tolerance.is_some() {
             self.common.note(format_args!(
-                "no sample is off by more than {certified_sample_error:.4e}; pixels are expected to be by \
+                "no sample is off by more than {certified_sample_error:.4e}; expected error of pixels \
                  {expected_error:.4e} (root mean square); {} coefficients left out",
                 left_out.coefficients
             ));
@@ -47,7 +47,7 @@ impl Cli {
         }
     }
 
-    /// Writes the sidecar and prints the report, if asked for.
+    /// Writes the report of `--sidecar`, and prints that of `--json`.
     pub(crate) fn report(&self, reported: &Reported<'_>) -> Result<()> {
         if let Some(path) = &self.sidecar {
             let mut out = Output::create(path, self.force)?;
@@ -58,6 +58,7 @@ impl Cli {
     }
 }
 
+/// Times, methods and numbers of coefficients in one line.
 pub(crate) fn summary(r: &RenderReport) -> String {
     let times = [r.weight_seconds, r.decode_seconds, r.splat_seconds, r.inverse_seconds];
     let [weights, decode, splat, inverse] = times.map(|t| format!("{t:.3}"));

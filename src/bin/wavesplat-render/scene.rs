@@ -32,7 +32,9 @@ impl Cli {
             && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
         {
             if only == Path::new(STANDARD) {
-                return Err(Error::usage("-: a coefficient file is read from its end, so it cannot come from a pipe"));
+                return Err(Error::usage(
+                    "-: a coefficient file cannot come from a pipe, since it is read from its end",
+                ));
             }
             self.input.refuse_for_coefficients()?;
             self.along.check(false, self.colour.is_asked())?;
@@ -83,7 +85,7 @@ impl Cli {
     }
 }
 
-const FRAMES_HINT: &str = "convert frames first, or render them as they are with --method direct";
+const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";
 
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {

@@ -1,4 +1,4 @@
-//! The files that pictures go to.
+//! The files that pictures are written to.
 
 use crate::args::Cli;
 use std::collections::HashSet;
@@ -37,7 +37,7 @@ impl Targets {
 }
 
 impl Cli {
-    /// The memory that is left for rendering, in bytes. An error if it does not suffice.
+    /// Bytes of memory that are left for rendering. An error if they are too few.
     pub(crate) fn memory_besides_sinks(
         &self,
         scene: &dyn Scene,
@@ -64,11 +64,11 @@ impl Cli {
         self.colour.check(pictures.format)?;
         let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
         if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
-            return Err(Error::usage("--error-image: takes a file of its own"));
+            return Err(Error::usage("--error-image: needs a file, not standard output"));
         }
         let are_png = [Some(&pictures), errors.as_ref()].into_iter().flatten().any(|targets| targets.format.is_png());
         if self.depth == Depth::Sixteen && !are_png {
-            let what = "is of png, apng and sheet; gray16 has 16 bits, npy and exr have floats";
+            let what = "is for png, apng and sheet; gray16 always has 16 bits, npy and exr hold floats";
             return Err(Error::usage(format!("--depth 16: {what}")));
         }
         let mut written = HashSet::new();
@@ -81,7 +81,7 @@ impl Cli {
                 spare_inputs(&self.inputs, name)?;
                 let paths = Sink::paths(name, targets.format, &config.frames)?;
                 if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
-                    let what = "would be written twice: --error-image takes a file of its own, as does --sidecar, and every picture a name";
+                    let what = "would be written twice; give the pictures, --error-image and --sidecar different names";
                     return Err(Error::usage(format!("{}: {what}", twice.display())));
                 }
             }
@@ -91,7 +91,7 @@ impl Cli {
 
     fn check_sidecar(&self, path: &Path) -> Result<()> {
         if path == Path::new(STANDARD) {
-            return Err(Error::usage("--sidecar: takes a file of its own; --json prints"));
+            return Err(Error::usage("--sidecar: needs a file; --json prints the report"));
         }
         spare_inputs(&self.inputs, path)?;
         Output::check(path, self.force)
@@ -118,15 +118,15 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let format = parse_format(ending).ok().filter(|format| *format != PictureFormat::Sheet);
     format.ok_or_else(|| {
-        let what = "the ending says no format: one of png npy y4m rgb24 gray16 apng exr";
+        let what = "the extension names no format; take one of png npy y4m rgb24 gray16 apng exr";
         Error::usage(format!("{}: {what}", path.display()))
     })
 }
 
-/// Endings of videos, which ffmpeg makes from a stream of pictures.
+/// Extensions of videos. ffmpeg makes them from a stream of pictures.
 const VIDEOS: [&str; 6] = ["mp4", "mov", "avi", "mkv", "webm", "gif"];
 
-/// An error with the pipe to type if `output` is the name of a video.
+/// If `output` is the name of a video, an error with the command that makes it.
 fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let ending = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     if !VIDEOS.contains(&ending.as_str()) {

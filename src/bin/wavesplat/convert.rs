@@ -99,13 +99,13 @@ pub(crate) struct ConvertArgs {
 const ERROR_BOUND: &str = "Error bound";
 const CODING: &str = "How it is coded (the defaults are good)";
 
-/// The end of the help: the input formats, resuming, and the bounds.
+/// The end of the help.
 fn after_help() -> String {
     let extensions: Vec<String> = extensions().map(|ending| format!(".{ending}")).collect();
-    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{TO_KNOW}", extensions.join(" "))
+    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{NOTES}", extensions.join(" "))
 }
 
-const TO_KNOW: &str = "\
+const NOTES: &str = "\
 A stopped or killed run leaves its finished windows in run.wspl.part; run.wspl itself appears only when it is complete. \
 With --resume, the same command continues there (converted frames are read again and compared); a program that writes into a \
 pipe must start from its first frame again.
@@ -252,10 +252,10 @@ impl ConvertArgs {
 
     fn bound(&self) -> Result<Bound> {
         if self.floor.is_some() && !matches!(self.bound, BoundName::Relative) {
-            return Err(Error::usage("--floor: goes with --bound relative alone"));
+            return Err(Error::usage("--floor: needs --bound relative"));
         }
         if (self.samples.is_some() || self.seed.is_some()) && !matches!(self.bound, BoundName::Sampled) {
-            return Err(Error::usage("--samples and --seed: go with --bound sampled alone"));
+            return Err(Error::usage("--samples and --seed: need --bound sampled"));
         }
         let floor = self.floor.unwrap_or(0.0);
         if !(floor.is_finite() && floor >= 0.0) {
@@ -277,7 +277,7 @@ impl ConvertArgs {
         let refused = match self.bound {
             BoundName::Relative => "--range: with --bound relative the tolerance refers to each sample, not to a range",
             BoundName::Sampled => "--range: with --bound sampled the tolerance refers to pixels, not to a range",
-            BoundName::Pointwise | BoundName::Rms if lo > hi => "--range: the lower end comes first",
+            BoundName::Pointwise | BoundName::Rms if lo > hi => "--range: give the lower end first",
             BoundName::Pointwise | BoundName::Rms => return Ok(Some((lo, hi))),
         };
         Err(Error::usage(refused))

@@ -140,6 +140,6 @@ fn format_of(path: &Path) -> Result<SampleFormat> {
         return Ok(SampleFormat::Npy);
     }
     let formats = SampleFormat::NAMES.map(|(name, _)| format!(".{name}")).join(" ");
-    let what = || format!("{}: the ending is none of {formats}; rename it or give --format", path.display());
+    let what = || format!("{}: the extension is none of {formats}; rename the file or give --format", path.display());
     SampleFormat::of_ending(path).ok_or_else(|| Error::usage(what()))
 }

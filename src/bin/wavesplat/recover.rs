@@ -64,7 +64,7 @@ fn lost(r: &RecoverReport) -> Option<String> {
     let (blocks, behind) = (r.blocks_lost, r.blocks_left_behind);
     let more = if behind > 0 { format!(", and {behind} more of windows without a record") } else { String::new() };
     let what = format!("{blocks} of {} blocks are lost{more}", r.blocks);
-    let end = "its end is gone, with all frames after these if there were any";
+    let end = "its end is missing, with any later frames";
     match (blocks + behind > 0, r.all_known) {
         (false, true) => None,
         (false, false) => Some(end.into()),

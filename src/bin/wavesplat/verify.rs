@@ -75,7 +75,7 @@ fn missed(c: &Comparison) -> Option<String> {
     let channel = channel.map_or(String::new(), |channel| format!(", {channel}"));
     let blocks = c.blocks_beyond_stated;
     Some(format!(
-        "blocks further off than the file says: {blocks}, the first of them block {block} of window {window}{channel}"
+        "blocks with errors above those stated in the file: {blocks}, the first is block {block} of window {window}{channel}"
     ))
 }
 

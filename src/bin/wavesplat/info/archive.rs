@@ -15,7 +15,7 @@ use wavesplat::source::Archive;
 #[derive(Debug, Serialize)]
 struct Info<'a> {
     format: &'static str,
-    /// Whether frames are decoded a window at a time; else they are read in place.
+    /// Whether frames are decoded a window at a time, or else read in place.
     decoded: bool,
     dims: [usize; 3],
     spacing: [f64; 3],
@@ -85,7 +85,7 @@ impl<'a> Info<'a> {
     fn text(&self) -> String {
         let [x, y, z] = self.dims;
         let with = |unit: Option<&str>, before: &str| unit.map(|unit| format!("{before}{unit}")).unwrap_or_default();
-        let how = if self.decoded { "decoded a window at a time" } else { "read where it is" };
+        let how = if self.decoded { "decoded a window at a time" } else { "read in place" };
         let (space, unit) = (with(self.space_units, " "), with(self.units, " in "));
         let frames =
             self.frames.map_or("frames to the end of the stream".into(), |frames| format!("{frames} frame(s)"));

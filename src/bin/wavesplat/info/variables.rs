@@ -1,4 +1,4 @@
-//! The variables of an archive, where the user must choose one.
+//! Lists the variables of an archive from which the user must choose one.
 
 use serde::Serialize;
 use wavesplat::base::error::Result;
