@@ -1,4 +1,4 @@
-//! What input files say of themselves, in the same words for every format.
+//! The description of an input file, the same for every format.
 
 use super::layout::{Layout, Shape, Strides};
 use super::packing::Packing;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 const FIRST_READ: usize = 4 << 10; // bytes of a header
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 
-/// Spacings and origins that differ by less than this part of the spacing are the same, written differently.
+/// Spacings and origins are equal if they differ by less than this part of the spacing.
 const SAME_PLACE: f64 = 1e-6;
 
 /// The files of an archive, in order.
@@ -81,7 +81,7 @@ pub(super) struct Stored {
     pub(super) strides: Strides,
     /// Bytes of all of them.
     pub(super) bytes: usize,
-    /// What makes samples of them, if they are not samples themselves.
+    /// How they become samples; None if they are the samples.
     pub(super) packing: Option<Packing>,
 }
 
@@ -121,11 +121,11 @@ pub(super) trait Decode: Debug + Send {
     /// What is wrong with the file.
     fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()>;
 
-    /// Lets go of what decoding the next frames could go on with: an archive may have more files than can be open.
+    /// Closes the file, since an archive may have more files than can be open. Decoding can still continue.
     fn rest(&mut self) {}
 }
 
-/// What samples, times and places are measured in, where files say so.
+/// Units of samples, times and places, if the files have them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Units {
     /// Unit of the samples.
@@ -149,7 +149,7 @@ impl Units {
     }
 }
 
-/// What the header of one input file says.
+/// The content of the header of one input file.
 #[derive(Debug)]
 pub(super) struct FileHeader {
     /// What the file is, by name.
@@ -175,7 +175,7 @@ pub(super) struct FileHeader {
 }
 
 impl FileHeader {
-    /// Frames of which no more is known than where they are.
+    /// A header with nothing but frames.
     pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
@@ -218,7 +218,7 @@ impl FileHeader {
     }
 }
 
-/// In what a file differs from the first one, though its frames can follow.
+/// Differences from the first file that are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Mismatch {
     /// Its spacing or origin.
@@ -247,7 +247,7 @@ pub(super) fn check_size(len: u64, start: u64, shape: &Shape, frames: usize) -> 
 fn other_sample(found: u64, shape: &Shape, frames: usize) -> Option<String> {
     let samples = (shape.frame_bytes() / shape.sample().size()) as u64 * frames as u64;
     let size = [1, 2, 4, 8].into_iter().find(|size| samples.checked_mul(*size) == Some(found))?;
-    Some(format!("; that would be right for samples of {size} byte(s)"))
+    Some(format!("; this size fits samples of {size} byte(s)"))
 }
 
 /// The first bytes of a file, fewer if it is shorter.
@@ -258,7 +258,7 @@ pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
     Ok(head)
 }
 
-/// What a header says that ends somewhere: more is read until `parse`, which is told if it has the whole file, finds the end.
+/// Reads a header of unknown length: reads more until `parse` finds its end. The flag says whether it has the whole file.
 pub(super) fn growing_head<T>(file: &FileBytes, parse: impl Fn(&[u8], bool) -> Parsed<Option<T>>) -> Result<T> {
     let mut len = FIRST_READ;
     loop {

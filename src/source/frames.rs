@@ -1,4 +1,4 @@
-//! A window of frames as bytes at known places: the one way in which every format copies boxes out.
+//! A window of frames whose bytes are at known places. All formats copy boxes with it.
 
 use super::FrameWindow;
 use super::file_header::Stored;
@@ -13,21 +13,21 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Reads that lie closer together than this are joined, since the system reads whole pages anyway.
+/// Reads with smaller gaps are joined, since the system reads whole pages anyway.
 const SMALL_GAP: usize = 4096;
-/// A joined read may be this many times as long as what is wanted of it.
+/// A joined read may be at most this many times as long as the bytes that are needed.
 const WASTE: usize = 8;
 /// No joined read is longer than this.
 const MAX_JOINED: usize = 4 << 20;
-/// Nor one of samples that are apart where small reads are cheap: it stays in a processor's cache.
+/// The same limit for separate samples if small reads are cheap, so that the bytes stay in the processor's cache.
 const MAX_SPAN: usize = 64 << 10;
 
 /// Where the bytes of some frames are.
 #[derive(Debug)]
 pub(super) enum Bytes {
-    /// In a file as they are.
+    /// Directly in a file.
     File(FileBytes),
-    /// Taken from a file, which was in a state, or from a stream. The file is not kept open: a window may be of many.
+    /// Copied from a stream, or decoded from a file of this state. The file is closed: a window may have many files.
     SpillBuffer { data: Arc<SpillBuffer>, file: Option<(PathBuf, State)> },
 }
 
@@ -180,7 +180,7 @@ impl SampleLine {
         self.stride.unsigned_abs() as usize
     }
 
-    /// Room for what is read at once: as many samples as are worth it with what lies between them, at least one.
+    /// A buffer for one read: as many samples, with the gaps between them, as the limits allow, at least one.
     fn span(&self, bytes: &Bytes) -> Vec<u8> {
         let (pitch, most) = (self.pitch(), self.size * WASTE);
         let (gap, longest) =
@@ -213,7 +213,7 @@ impl SampleLine {
     }
 }
 
-/// The bytes of a box as equally long rows, in planes: rows as long as they lie together in the frame.
+/// The bytes of a box as rows of equal length, in planes. A row is contiguous in the frame.
 struct Rows {
     row: usize,       // bytes
     pitch: usize,     // bytes from a row to the next one of its plane

@@ -1,4 +1,4 @@
-//! What the user named as inputs, as a list of files in the order of time.
+//! Expands the inputs of the user to a list of files in the order of time.
 
 use super::file_header::FrameFiles;
 use super::formats::{self, Format, file_series, pvd};
@@ -25,7 +25,7 @@ pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameF
     Ok(files)
 }
 
-/// Whether the inputs are files that say themselves what they hold.
+/// Whether the inputs are files with headers.
 pub(super) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
     let files = expand(inputs, &options.for_headers());
     files.is_ok_and(|files| formats::has_header(&files.paths[0]))
@@ -124,7 +124,7 @@ fn directory(folder: &Path, options: &OpenOptions) -> Result<FrameFiles> {
     match lists[..] {
         [list] if options.dims.is_none() => return with_list(list),
         [a, b, ..] if of(Format::Vti).chain(of(Format::Vtk)).next().is_none() => {
-            let what = format!("has several lists of files, {} and {}: name the one", name(a), name(b));
+            let what = format!("has several lists of files, {} and {}: name one of them", name(a), name(b));
             return Err(Error::path(folder, what));
         }
         _ => {}

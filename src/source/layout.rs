@@ -54,7 +54,7 @@ pub(super) enum Counts {
     Frames,
     /// Voxels along x (0), y (1) or z (2).
     Voxels(usize),
-    /// Something else, of which only this one is meant: a component, a member of an ensemble.
+    /// Something else, with this index chosen: a component, or a member of an ensemble.
     Only(usize),
 }
 
@@ -102,8 +102,8 @@ impl Layout {
         self
     }
 
-    /// The array without its slowest axes of which only one is meant, and how many samples come before it.
-    pub(super) fn meant(&self) -> (usize, Self) {
+    /// The number of samples before the chosen part of the array, and that part: without the slowest axes with a chosen index.
+    pub(super) fn chosen_part(&self) -> (usize, Self) {
         let (mut before, mut rest) = (0, self.clone());
         while let Some(Axis { counts: Counts::Only(index), .. }) = rest.0.first().copied() {
             rest.0.remove(0);
@@ -177,10 +177,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_meant_comes_after_what_is_not() {
+    fn the_chosen_part_comes_after_the_indices_before_it() {
         let axes = [(Counts::Only(1), 2), (Counts::Only(3), 4), (Counts::Frames, 5), (Counts::Only(0), 3)];
         let layout = Layout(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec());
-        assert_eq!(layout.meant(), (4 * 5 * 3 + 3 * 5 * 3, Layout(layout.0[2..].to_vec())));
+        assert_eq!(layout.chosen_part(), (4 * 5 * 3 + 3 * 5 * 3, Layout(layout.0[2..].to_vec())));
     }
 
     #[test]

@@ -1,8 +1,8 @@
-//! Frame files in: one source per format behind one trait.
+//! Reads files of frames of many formats through one trait, [`FrameSource`].
 //!
-//! Whatever the format (`formats`), a file comes down to frames at known places or to frames that are decoded, in any
-//! order of axes (`layout`). A source says what an archive holds ([`Archive`]) and hands out windows of frames in order; a window copies boxes
-//! of samples out. Nothing here knows of wavelets or blocks. [`open`] chooses the source by name and content.
+//! A format (`formats`) describes where the frames of a file are or how to decode them, in any order of axes (`layout`). A
+//! source describes its [`Archive`] and returns windows of frames in order. A window copies boxes of samples. Nothing here
+//! depends on wavelets or blocks. [`open`] chooses the source by name and content.
 
 mod array;
 mod colour_transform;
@@ -42,39 +42,39 @@ use crate::base::sample::SampleType;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// What was found in a file, or why not, in words that follow the file's name.
+/// A result for one file. The error is a text that follows the file's name.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// As [`Parsed`], where something may help.
+/// As [`Parsed`], with a remedy in the error.
 type Advised<T> = std::result::Result<T, Note>;
 
-/// What a user may say about inputs.
+/// Options for opening inputs.
 #[derive(Debug, Clone)]
 pub struct OpenOptions {
     /// How the bytes of files are reached.
     pub access: Access,
-    /// Voxels along x, y, z and, for several frames in one file, the number of frames; for headerless data alone.
+    /// Voxels along x, y, z and, for several frames in one file, the number of frames; for headerless data only.
     pub dims: Option<Vec<usize>>,
-    /// The type of the samples; for headerless data alone.
+    /// The type of the samples; for headerless data only.
     pub sample: Option<SampleType>,
-    /// Whether the samples have their most significant byte first; for headerless data alone.
+    /// Whether the samples have their most significant byte first; for headerless data only.
     pub big_endian: bool,
-    /// Bytes before the first sample of each file; for headerless data alone.
+    /// Bytes before the first sample of each file; for headerless data only.
     pub offset: u64,
-    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive: files with a header of their own need
-    /// them no more, and of headerless data the number of frames is counted anew.
+    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive. Then files with a header ignore
+    /// them, and the frames of headerless data are counted again.
     pub dims_are_remembered: bool,
-    /// Which array of a file is meant, or which component of one: `velocity[0]`.
+    /// The array of a file, or a component of one: `velocity[0]`.
     pub variable: Option<String>,
-    /// What the axes of an array count, the slowest first: letters of t z y x, or another for an axis beside these.
+    /// The meaning of each axis of an array, slowest first: letters of t z y x, or another letter for another axis.
     pub axes: Option<String>,
-    /// World units between voxels along x, y, z, in place of what the files say.
+    /// World units between voxels along x, y, z, instead of those in the files.
     pub spacing: Option<[f64; 3]>,
-    /// World position of the first voxel, in place of what the files say.
+    /// World position of the first voxel, instead of those in the files.
     pub origin: Option<[f64; 3]>,
     /// Whether irregular numbers in the names of frame files are accepted.
     pub allow_gaps: bool,
-    /// Bytes that a stream, or what must be decoded, may take for one window before it spools to a temporary file.
+    /// Bytes of memory for one window of a stream or of decoded frames. More go to a temporary file.
     pub memory: usize,
 }
 
@@ -99,7 +99,7 @@ impl Default for OpenOptions {
 }
 
 impl OpenOptions {
-    /// Without what is for headerless data alone.
+    /// Without what is for headerless data only.
     fn for_headers(&self) -> Self {
         Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }
     }
@@ -112,7 +112,7 @@ impl OpenOptions {
 ///
 /// # Errors
 /// Files that are absent, damaged, of a format or with a feature that is not supported, or unlike the first one;
-/// numbers in names that suggest a missing frame; options that the format has no use for.
+/// numbers in names that suggest a missing frame; options that do not apply to the format.
 pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     if let [only] = inputs
         && only == Path::new(STANDARD)
@@ -152,7 +152,7 @@ pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -
 /// What an archive holds, known before any frame is read.
 #[derive(Debug, Clone)]
 pub struct Archive {
-    /// What the files are, by name.
+    /// Name of the format.
     pub format: &'static str,
     /// The lattice of every frame.
     pub grid: Grid,
@@ -164,18 +164,18 @@ pub struct Archive {
     pub times: Vec<f64>,
     /// Name of the variable where the files say so.
     pub variable: Option<String>,
-    /// What its numbers are measured in.
+    /// Units of samples, times and places.
     pub units: Units,
-    /// What stands for missing samples, where the files say that some may be: NaN, or another value.
+    /// The value of missing samples, if the files declare one: NaN, or another value.
     pub missing: Option<f64>,
-    /// Bytes that the source takes for a window, of those that it was opened with.
+    /// Bytes of [`OpenOptions::memory`] that the source takes for a window.
     pub memory: usize,
     /// What a user should know about how the files are read.
     pub notes: Vec<Note>,
 }
 
 impl Archive {
-    /// Frames of which no more is known.
+    /// An archive without times, names and units.
     pub fn new(grid: Grid, sample: SampleType, frames: Option<usize>) -> Self {
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
         let format = "frames";
@@ -198,8 +198,8 @@ pub trait FrameSource: Send {
     /// Streams can only go forward: `first` must be where the last window ended, or later.
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>>;
 
-    /// As [`Self::window`], of every `step`-th frame from `first`, `count` of them. Sources that can do so leave those between
-    /// unread.
+    /// As [`Self::window`], of every `step`-th frame from `first`, `count` of them. Most sources do not read the
+    /// frames between them.
     fn window_of(&mut self, first: usize, count: usize, step: usize) -> Result<Box<dyn FrameWindow>> {
         let window = self.window(first, (count.max(1) - 1) * step + 1)?;
         Ok(select::stepped(window, count, step))
@@ -218,7 +218,7 @@ pub fn read_frames(
     Ok(samples)
 }
 
-/// As [`read_frames`], in the place of what is in `samples`.
+/// As [`read_frames`], into `samples`, which it overwrites.
 pub(crate) fn read_frames_into(
     window: &dyn FrameWindow,
     frames: impl ExactSizeIterator<Item = usize>,

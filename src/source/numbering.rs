@@ -1,4 +1,4 @@
-//! Missing frames, seen from the numbers in file names.
+//! Finds missing frames by the numbers in file names.
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use std::collections::HashMap;
@@ -29,7 +29,7 @@ fn is_a_shells_order(numbers: &[i64]) -> bool {
 
 fn out_of_order(first: &Path) -> Error {
     let what = "and the files after it are in the order that a shell gives, 10 before 2";
-    Error::input(first, format!("{what}; quote the pattern, or name the folder, to have them in that of their numbers"))
+    Error::input(first, format!("{what}; quote the pattern or name the folder, to sort them by number"))
 }
 
 /// An error if numbered names differ in more than their numbers: a folder with frames of two variables, say.

@@ -1,4 +1,4 @@
-//! Numbers that are stored as others: scaled, and with values that stand for what is missing.
+//! Stored numbers that are scaled and have missing values.
 
 use crate::base::sample::{self, SampleType};
 
@@ -23,7 +23,7 @@ impl Packing {
         Self { scale, offset, ..Self::NONE }
     }
 
-    /// The type of the samples: f32 where it holds what numbers become as finely as they were.
+    /// The type of the samples: f32 if it is fine enough for the scaled numbers, else f64.
     pub(super) fn sample(&self, stored: SampleType) -> SampleType {
         let fine = self.scale.abs() / 4.0;
         match stored {

@@ -1,4 +1,4 @@
-//! One look at all samples of a window before it is coded: value range, missing samples, a digest.
+//! Reads all samples of a window before it is coded: value range, missing samples, a digest.
 
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};

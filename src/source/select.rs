@@ -1,4 +1,4 @@
-//! Some frames and some voxels of an archive, as an archive of its own.
+//! Narrows an archive to some frames and voxels.
 
 use super::{Archive, FrameSource, FrameWindow};
 use crate::base::error::{Error, Result};

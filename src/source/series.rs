@@ -1,4 +1,4 @@
-//! Files as one archive: whatever the format, a file comes down to frames at known places, or to frames that are decoded.
+//! Several files of any format as one archive.
 
 use super::file_header::{DataLocation, FileHeader, FrameFiles, Part};
 use super::frames::{Bytes, Frame, Frames};
@@ -25,7 +25,7 @@ pub(super) struct Series {
     last: Option<Decoded>,
 }
 
-/// What was decoded last, for the window after, where its frames are packed together.
+/// The frames that were decoded last. The next window may have frames of the same group.
 #[derive(Debug)]
 struct Decoded {
     part: usize,
@@ -110,7 +110,7 @@ impl Series {
         Ok(self)
     }
 
-    /// Leaves times out that are no numbers, and notes those that do not ascend, whatever says them.
+    /// Drops times that are not finite, and adds a note on times that do not ascend.
     fn check_times(&mut self) {
         let times = &self.archive.times;
         if !times.iter().all(|t| t.is_finite()) {
@@ -121,7 +121,7 @@ impl Series {
         }
     }
 
-    /// Leaves times out, and their unit, since numbers of frames are in none.
+    /// Drops the times and their unit.
     fn drop_times(&mut self, why: &str) {
         self.archive.times.clear();
         self.archive.units.times = None;
@@ -187,7 +187,7 @@ impl Series {
         Ok(data)
     }
 
-    /// Lets go of what parts that no frame is taken of next went on with.
+    /// Closes the decoders of parts that the next window does not need.
     fn rest(&mut self, parts: Range<usize>) {
         for part in &mut self.parts[parts] {
             if let DataLocation::Decoded(decoder) = &mut part.at {
@@ -196,7 +196,7 @@ impl Series {
         }
     }
 
-    /// Those of some frames that a part holds, counted from its first.
+    /// The frames that are in a part, counted from its first.
     fn wanted(&self, part: usize, frames: impl Iterator<Item = usize>) -> Vec<usize> {
         let (start, held) = (self.starts[part], self.parts[part].frames);
         frames.filter_map(|frame| frame.checked_sub(start)).take_while(|index| *index < held).collect()
@@ -238,7 +238,7 @@ impl FrameSource for Series {
     }
 }
 
-/// What a file says, with the user's spacing and origin in place of its own.
+/// Reads a header, and replaces its spacing and origin by those of the user.
 fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let mut file = formats::describe(path, options)?;
     let mut grid = file.grid();
@@ -254,7 +254,7 @@ fn note_once(notes: &mut Vec<Note>, note: impl Into<Note>) {
     }
 }
 
-/// Puts the user's spacing and origin in place of the files'.
+/// Replaces the spacing and origin by those of the user.
 pub(super) fn override_grid(grid: &mut Grid, options: &OpenOptions) {
     grid.spacing = options.spacing.unwrap_or(grid.spacing);
     grid.origin = options.origin.unwrap_or(grid.origin);

@@ -1,4 +1,4 @@
-//! Bytes of frames that cannot be read in boxes where they are: in memory, or in a temporary file if they are too many.
+//! Bytes of decoded or piped frames: in memory, or in a temporary file if they are too many.
 
 use crate::base::error::{Error, Result};
 use std::fs::File;
@@ -19,8 +19,8 @@ pub(super) enum SpillBuffer {
     },
 }
 
-/// A temporary file without a name, made when it is needed first: a window has one for all that it has no memory for, since
-/// a process may not have one open for each frame.
+/// A temporary file without a name, created at first use. The frames of a window share it, since the number of open files
+/// is limited.
 #[derive(Debug, Default)]
 pub(super) struct Spool {
     file: Option<Arc<File>>,
@@ -82,7 +82,7 @@ impl SpillBuffer {
     }
 }
 
-/// Where bytes of a part of a file are, which must be there: what comes after is of others.
+/// Position in the file of bytes that must be within a part of it. The bytes after the part belong to other frames.
 fn place(start: u64, len: u64, at: u64, bytes: usize) -> io::Result<u64> {
     let is_there = at.checked_add(bytes as u64).is_some_and(|end| end <= len);
     if is_there { Ok(start + at) } else { Err(ErrorKind::UnexpectedEof.into()) }

@@ -23,7 +23,7 @@ pub(super) struct Stream<R> {
     shape: Shape,
     stored: Stored, // of one frame
     memory: usize,
-    next: usize, // the frame that comes
+    next: usize, // number of the next frame
     ended: bool,
     chunk: Vec<u8>,
     reader: Chain<Cursor<Vec<u8>>, R>,
@@ -41,7 +41,7 @@ impl<R: Read> Stream<R> {
             (Some(_), false) => headerless(&mut reader, options)?,
             (Some(_), true) if options.dims_are_remembered => numpy(&mut reader, &options.for_headers())?,
             (Some(_), true) => {
-                return Err(Error::setting("dims", "the npy stream says them itself; leave them out"));
+                return Err(Error::setting("dims", "the npy stream has a header; leave them out"));
             }
             (None, true) => numpy(&mut reader, options)?,
             (None, false) => {

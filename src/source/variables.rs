@@ -1,4 +1,4 @@
-//! What variables a file holds, for users who must choose one.
+//! The variables of a file, from which the user must choose one.
 
 use serde::Serialize;
 #[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]

@@ -1,4 +1,4 @@
-//! Frames in one compressed stream, of gzip or zlib: taken one after another, from the beginning again if need be.
+//! Frames in one compressed stream of gzip or zlib. Going back to an earlier frame starts again from the beginning.
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
@@ -61,7 +61,7 @@ impl Stream {
         let Self { compression, start, skip } = self;
         let all = array.bytes(sample.size())?;
         check_room(state.len, skip.saturating_add(all as u64))?;
-        let (before, array) = array.meant();
+        let (before, array) = array.chosen_part();
         let frames = array.len(Counts::Frames);
         let in_turn = array.0.first().is_none_or(|axis| axis.counts == Counts::Frames);
         let together = if in_turn { 1 } else { frames };
@@ -79,7 +79,7 @@ pub(in crate::source) struct Deflated {
     place: Place,
     /// Bytes that the stream holds after the last frame.
     after: u64,
-    /// What goes on, and the frame that it comes to next.
+    /// The open reader, and its next frame.
     reader: Option<(Box<dyn Read + Send>, usize)>,
 }
 
@@ -158,7 +158,7 @@ fn damaged(path: &Path, frame: usize, error: &io::Error) -> Error {
     Error::input(path, format!("frame {frame} cannot be decompressed: {error}"))
 }
 
-/// Refuses sizes that nothing compressed into so few bytes has.
+/// An error if so few compressed bytes cannot hold so many bytes.
 pub(super) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
     if bytes <= compressed.saturating_mul(MOST) {
         return Ok(());
@@ -188,9 +188,9 @@ pub(super) fn hold(
     Ok(got)
 }
 
-/// An error unless just so many bytes come; this also makes the checksum at the end be looked at.
+/// An error unless exactly `after` bytes follow. Reading to the end also checks the checksum.
 pub(super) fn expect_end(reader: &mut dyn Read, path: &Path, after: u64) -> Result<()> {
-    let bad = |e| Error::input(path, format!("its compressed data do not end well: {e}"));
+    let bad = |e| Error::input(path, format!("the end of its compressed data is damaged: {e}"));
     let passed = io::copy(&mut reader.take(after), &mut io::sink()).map_err(bad)?;
     match read_some(reader, &mut [0]).map_err(bad)? {
         0 if passed == after => Ok(()),

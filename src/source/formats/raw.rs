@@ -97,7 +97,7 @@ mod tests {
         refused(&file, &options(None, SampleType::F32), "SetDims { dims: [7, 5, 3], frames: 4 }");
         refused(&file, &options(Some(5), SampleType::F32), "expected 2100 bytes");
         refused(&file, &options(Some(4), SampleType::U8), "SetDims { dims: [7, 5, 3], frames: 16 }");
-        refused(&file, &options(Some(4), SampleType::F64), "right for samples of 4 byte(s)");
+        refused(&file, &options(Some(4), SampleType::F64), "this size fits samples of 4 byte(s)");
         refused(
             &file,
             &OpenOptions { offset: 3, ..options(Some(4), SampleType::F32) },

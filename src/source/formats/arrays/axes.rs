@@ -1,4 +1,4 @@
-//! What the axes of a variable count: by the user's word, by the conventions of CF, by their names, else by their order.
+//! Finds what the axes of a variable count: by the user's letters, the CF conventions, their names, or else their order.
 
 use super::Variable;
 use crate::base::error::{Note, Remedy};
@@ -35,7 +35,7 @@ pub(super) fn counts(
     Ok((complete(variable, by_letters(variable, letters)?, index)?, None))
 }
 
-/// What is left counts nothing that an archive is continued along: of it the index is taken, or the only one.
+/// Sets the axes that count neither voxels nor frames to the chosen index, or to the only one.
 fn complete(variable: &Variable, guess: Vec<Option<Counts>>, index: Option<usize>) -> Advised<Vec<Counts>> {
     let only = |(axis, counts): (usize, Option<Counts>)| match (counts, variable.lengths[axis], index) {
         (Some(counts), _, _) => Ok(counts),
@@ -87,7 +87,7 @@ fn by_letters(variable: &Variable, letters: &str) -> Advised<Vec<Option<Counts>>
     Ok(counts)
 }
 
-/// What axes say of themselves.
+/// The axes that are known by their coordinates or names.
 fn known(variable: &Variable, all: &[Variable]) -> Vec<Option<Counts>> {
     let of = |axis: usize| {
         let by_coordinate = variable.coordinate(axis, all).and_then(of_coordinate);
@@ -138,7 +138,7 @@ fn of_name(dim: &str) -> Option<Counts> {
 /// Names of axes along which an archive is not continued.
 const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
 
-/// What is still free goes to axes that say nothing, in the usual order t z y x. With an index the last such axis is left out.
+/// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, the last such axis gets none.
 fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool) -> Vec<Option<Counts>> {
     let beside = |axis: &usize| BESIDE.contains(&variable.dims[*axis].to_lowercase().as_str());
     let mut free: Vec<usize> = (0..counts.len()).filter(|axis| counts[*axis].is_none() && !beside(axis)).collect();

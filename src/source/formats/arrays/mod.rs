@@ -1,7 +1,7 @@
-//! Files of named arrays: HDF5, NetCDF and their like. One variable of them is an archive, read chunk by chunk.
+//! Files of named arrays, such as HDF5 and NetCDF. One variable is an archive, read chunk by chunk.
 //!
-//! What a file holds is asked of an [`ArrayFile`]; [`choose`] finds the variable that is meant, [`axes`] what its axes count,
-//! [`places`] where its voxels and frames are, [`values`] what its numbers mean, and [`chunks`] reads it.
+//! An [`ArrayFile`] lists the arrays. [`choose`] finds the variable, [`axes`] the meaning of its axes, [`places`] the positions
+//! of voxels and frames, [`values`] the meaning of its numbers, and [`chunks`] reads it.
 
 mod axes;
 mod choose;
@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use values::Values;
 
-/// An array, and what is said of it.
+/// An array and its attributes.
 #[derive(Debug, Clone)]
 struct Variable {
     /// Its name, with those of the groups that it is in.
@@ -51,7 +51,7 @@ struct Variable {
 
 type Attributes = BTreeMap<String, Attribute>;
 
-/// What is said under a name.
+/// The value of an attribute.
 #[derive(Debug, Clone, PartialEq)]
 enum Attribute {
     Text(String),
@@ -59,7 +59,7 @@ enum Attribute {
     Numbers(Vec<f64>),
 }
 
-/// The numbers that are said under a name; none where there are no such.
+/// The numbers of an attribute; empty if it has none.
 fn numbers<'a>(attributes: &'a Attributes, name: &str) -> &'a [f64] {
     match attributes.get(name) {
         Some(Attribute::Numbers(numbers)) => numbers,
@@ -114,7 +114,7 @@ trait ArrayFile: Send {
     /// All numbers of an array with one axis or none, which may be of any type.
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>>;
 
-    /// What is said of a group; nothing if there is none.
+    /// The attributes of a group; empty if there is no such group.
     fn group(&self, path: &str) -> Attributes {
         let _ = path;
         Attributes::new()
@@ -282,7 +282,7 @@ fn joined(mut found: Vec<ResolvedArray>, parts: Vec<Part>) -> Parsed<FileHeader>
     first.described(parts)
 }
 
-/// Of what a window may take, chunks as they are decoded have this part.
+/// Decoded chunks get one part in so many of the memory for a window.
 const SHARE: usize = 4;
 
 /// What variables are found in.

@@ -84,12 +84,12 @@ impl Places {
         matches!(counts, Counts::Voxels(along) if self.backwards[along])
     }
 
-    /// The coordinates of an axis; none, with a note, where they lead nowhere.
+    /// The coordinates of an axis; None, with a note, if they neither ascend nor descend.
     fn line(&mut self, file: &dyn ArrayFile, coordinate: &Variable) -> Option<AxisCoordinates> {
         let line = numbers(file, coordinate).ok().and_then(|at| AxisCoordinates::of(at, coordinate));
         if line.is_none() {
             let name = coordinate.name();
-            self.notes.push(format!("{name} does not lead from one end to the other: its voxels are numbered").into());
+            self.notes.push(format!("{name} does not ascend or descend: its voxels are numbered").into());
         }
         line
     }
@@ -142,7 +142,7 @@ fn numbers(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
     }
 }
 
-/// What turns numbers of one unit into those of another; none if they do not compare.
+/// The factor from one unit to another; None if they are not both lengths.
 fn factor(unit: &str, other: &str) -> Option<f64> {
     let metres = |unit: &str| LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres);
     if unit == other { Some(1.0) } else { Some(metres(unit)? / metres(other)?) }
@@ -162,7 +162,7 @@ fn scalar_time<'a>(all: &'a [Variable], variable: &Variable) -> Option<&'a Varia
 }
 
 impl AxisCoordinates {
-    /// None for coordinates that do not lead from one end to the other.
+    /// None for coordinates that neither ascend nor descend.
     fn of(mut at: Vec<f64>, coordinate: &Variable) -> Option<Self> {
         let unit = unit(coordinate.text("units").unwrap_or_default());
         if unit == "degrees" {
@@ -205,7 +205,7 @@ fn unwrap_degrees(at: &mut [f64]) {
     }
 }
 
-/// Degrees are degrees, wherever they lead.
+/// The unit of a coordinate. Degrees north and east are one unit.
 fn unit(text: &str) -> String {
     if text.to_lowercase().starts_with("degree") { "degrees".into() } else { text.into() }
 }
