@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 /// Why an operation ended early.
 ///
-/// The kind says who can help: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever made the
-/// data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or no one ([`Error::BoundMissed`]). Messages name
-/// fields, files and values. [`Error::remedy`] says what helps, if that is known.
+/// The kind says who can help: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever
+/// made the data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or no one
+/// ([`Error::BoundMissed`]). Messages name fields, files and values. [`Error::remedy`] says what helps, if that is
+/// known.
 ///
 /// ```
 /// use wavesplat::base::error::{Error, Remedy};
@@ -60,8 +61,8 @@ pub enum Error {
     /// The arguments of a program are invalid. The library never returns this.
     #[error("{0}")]
     Usage(String),
-    /// An input is damaged, contradicts its description, or has a feature that is not supported. Repair it, or change its
-    /// description.
+    /// An input is damaged, contradicts its description, or has a feature that is not supported. Repair it, or change
+    /// its description.
     #[error("{}: {what}", path.display())]
     Input {
         /// The file, or `-` for a standard stream.
@@ -89,7 +90,8 @@ pub enum Error {
         /// What helps.
         remedy: Option<Remedy>,
     },
-    /// `verify` found samples outside the promised bound, or errors above those stated in the file. Do not use the file.
+    /// `verify` found samples outside the promised bound, or errors above those stated in the file. Do not use the
+    /// file.
     #[error("{}: {what}", path.display())]
     BoundMissed {
         /// The coefficient file.
@@ -160,8 +162,8 @@ impl Error {
         matches!(self, Self::Setting { .. } | Self::Path { .. } | Self::Usage(_))
     }
 
-    /// The exit code of the programs: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not met or
-    /// input changed.
+    /// The exit code of the programs: 1 failed while running, 2 usage, 3 input damaged or not supported, 4 bound not
+    /// met or input changed.
     pub fn exit_code(&self) -> u8 {
         if let Some(system) = self.system() {
             let is_shorter = system.get_ref().is_some_and(|inner| inner.downcast_ref::<BecameShorter>().is_some());

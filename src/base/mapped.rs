@@ -224,8 +224,8 @@ impl Slot {
     }
 }
 
-/// After this, a SIGBUS in a mapped file ends the process with exit code 4 and a message that names the file. A write beyond
-/// the limit on file sizes becomes an error and no longer ends the process.
+/// After this, a SIGBUS in a mapped file ends the process with exit code 4 and a message that names the file. A write
+/// beyond the limit on file sizes becomes an error and no longer ends the process.
 ///
 /// For programs. Call once at the start. A library must not take over signals.
 #[doc(hidden)]
@@ -244,8 +244,8 @@ pub fn explain_sigbus() {
 /// Bytes of the stack of the thread that waits for signals. They are few, since they count where memory is limited.
 const SIGNAL_STACK: usize = 256 << 10;
 
-/// After this, SIGINT (Ctrl-C) and SIGTERM call `end` with the signal's number, on a separate thread. A second signal ends
-/// the process at once. Signals that are ignored, as in some background jobs, stay ignored.
+/// After this, SIGINT (Ctrl-C) and SIGTERM call `end` with the signal's number, on a separate thread. A second signal
+/// ends the process at once. Signals that are ignored, as in some background jobs, stay ignored.
 ///
 /// For programs. Call once at the start, before other threads start: they inherit the blocked signals.
 #[doc(hidden)]

@@ -1,4 +1,5 @@
-//! The header of an `.npy` file or stream: written without a seek, and read from its text. The payload follows as raw bytes.
+//! The header of an `.npy` file or stream: written without a seek, and read from its text. The payload follows as raw
+//! bytes.
 
 mod literal;
 
@@ -15,7 +16,8 @@ const ALIGNMENT: usize = 64;
 /// Bytes of a written header before its text.
 const BEFORE_TEXT: usize = 10;
 
-/// Writes the header of a C-order array, last axis fastest. The shape must be final: there is one header for all frames.
+/// Writes the header of a C-order array, last axis fastest. The shape must be final: there is one header for all
+/// frames.
 pub fn write_header(ty: SampleType, shape: &[usize], out: &mut impl Write) -> io::Result<()> {
     let order = if ty.size() == 1 { '|' } else { '<' };
     let lengths: String = shape.iter().map(|n| format!("{n}, ")).collect();

@@ -111,8 +111,8 @@ impl Output {
         Ok(Self { path: path.into(), target })
     }
 
-    /// As [`Self::create`], but flushed bytes of a file are always kept, so that a later run can continue it. The bytes of
-    /// an earlier run stay until [`Self::begin_at`] chooses where to continue.
+    /// As [`Self::create`], but flushed bytes of a file are always kept, so that a later run can continue it. The bytes
+    /// of an earlier run stay until [`Self::begin_at`] chooses where to continue.
     pub(crate) fn resumable(path: &Path, force: bool) -> Result<Self> {
         let mut out = Self::create_after(path, force, |_| Ok(()))?;
         if let Target::File(part, file) = &mut out.target {
@@ -172,8 +172,8 @@ impl Output {
         self.commit_if(|_| Ok(()))
     }
 
-    /// As [`Self::commit`], but first calls `right` with the unfinished file, which is then on disk. Its error prevents the
-    /// commit.
+    /// As [`Self::commit`], but first calls `right` with the unfinished file, which is then on disk. Its error prevents
+    /// the commit.
     pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
         let Target::File(part, file) = &mut self.target else { return Ok(()) };

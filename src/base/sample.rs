@@ -137,8 +137,8 @@ pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Opt
     Some((a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// The range of all samples that are not missing, (inf, -inf) if there are none. `missing` is called with the index of each
-/// missing sample.
+/// The range of all samples that are not missing, (inf, -inf) if there are none. `missing` is called with the index of
+/// each missing sample.
 pub fn range_of_present(
     ty: SampleType,
     samples: &[u8],

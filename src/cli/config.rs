@@ -1,7 +1,8 @@
 //! Options from a TOML file.
 //!
 //! Its keys are the long names of options. A key at the top level is for every command that has the option; a key in a
-//! table is for the command of that name. The options are inserted before those of the command line, which override them.
+//! table is for the command of that name. The options are inserted before those of the command line, which override
+//! them.
 
 use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
@@ -41,8 +42,8 @@ struct FileOption {
 }
 
 impl Config {
-    /// The options that the file of `--config`, or of the program's environment variable, adds to a command line. None if
-    /// there is no file, or if the command does not take one.
+    /// The options that the file of `--config`, or of the program's environment variable, adds to a command line. None
+    /// if there is no file, or if the command does not take one.
     pub(super) fn read(program: &Command, args: &[OsString]) -> Result<Self> {
         let command = chosen_command(program, args);
         let parsed = program.clone().ignore_errors(true).try_get_matches_from(args);
@@ -96,8 +97,8 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    /// The options of the file for a command. Left out are those that the command line gives, and those that conflict with
-    /// its options.
+    /// The options of the file for a command. Left out are those that the command line gives, and those that conflict
+    /// with its options.
     fn options(&self, command: &Command, given: &ArgMatches) -> Result<Vec<FileOption>> {
         let table = DeTable::parse(self.text);
         let table = table.map_err(|e| self.wrong(&e.span().unwrap_or(0..0), e.message().trim()))?.into_inner();

@@ -238,8 +238,8 @@ pub fn narrow(
     source::select(source, Selection { first, step, frames: count, region })
 }
 
-/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it. `--force` does
-/// not allow that.
+/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it. `--force`
+/// does not allow that.
 pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let real = |path: &Path| path.canonicalize().ok();
     let folder = |path: &Path| real(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));

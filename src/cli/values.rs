@@ -130,13 +130,14 @@ impl fmt::Display for FrameRange {
 }
 
 impl FrameRange {
-    /// Whether the range has all frames from number `frames` on, so that an archive of `frames` frames has none of them.
+    /// Whether the range has all frames from number `frames` on, so that an archive of `frames` frames has none of
+    /// them.
     pub fn begins_at_end(&self, frames: usize) -> bool {
         self.end.is_none() && self.start.is_some_and(|start| start == frames as i64)
     }
 
-    /// First frame, step and number of frames in an archive of `frames` frames. The number is None for an open range of a
-    /// stream.
+    /// First frame, step and number of frames in an archive of `frames` frames. The number is None for an open range of
+    /// a stream.
     pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {
         let from_end = |n: i64| match frames {
             Some(all) => Ok((all as i64).saturating_add(n).max(0)),

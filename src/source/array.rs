@@ -23,7 +23,8 @@ pub struct ArraySource {
 }
 
 impl ArraySource {
-    /// Frames of `dims` voxels along x, y, z, one world unit apart. In `samples` x is fastest, then y, z, and time slowest.
+    /// Frames of `dims` voxels along x, y, z, one world unit apart. In `samples` x is fastest, then y, z, and time
+    /// slowest.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -53,7 +53,8 @@ impl ColourTransform {
         Some(Self { colours: TransferFunction::of_text(colours?)?, sample: sample?.parse().ok()?, missing_value })
     }
 
-    /// One channel of the colours of some samples, little-endian as these. `out` has room for as many of [`Self::SAMPLE`].
+    /// One channel of the colours of some samples, little-endian as these. `out` has room for as many of
+    /// [`Self::SAMPLE`].
     pub(crate) fn paint(&self, channel: usize, samples: &[u8], out: &mut [u8]) {
         let first = (0.0_f64, self.component(channel, 0.0));
         let last = Cell::new(first); // neighbours are often equal

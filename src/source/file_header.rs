@@ -187,7 +187,8 @@ impl FileHeader {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }
 
-    /// Whether its frames can follow those of the first file, or of the first array of a file, which messages call `name`.
+    /// Whether its frames can follow those of the first file, or of the first array of a file, which messages call
+    /// `name`.
     ///
     /// # Errors
     /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
@@ -258,7 +259,8 @@ pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
     Ok(head)
 }
 
-/// Reads a header of unknown length: reads more until `parse` finds its end. The flag says whether it has the whole file.
+/// Reads a header of unknown length: reads more until `parse` finds its end. The flag says whether it has the whole
+/// file.
 pub(super) fn growing_head<T>(file: &FileBytes, parse: impl Fn(&[u8], bool) -> Parsed<Option<T>>) -> Result<T> {
     let mut len = FIRST_READ;
     loop {

@@ -31,8 +31,8 @@ pub(super) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
     files.is_ok_and(|files| formats::has_header(&files.paths[0]))
 }
 
-/// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case, no
-/// dot), those that match a pattern, or the one of that name, which need not exist.
+/// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case,
+/// no dot), those that match a pattern, or the one of that name, which need not exist.
 ///
 /// # Errors
 /// A folder that cannot be listed, an invalid pattern, and either without any such file.

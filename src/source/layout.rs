@@ -102,7 +102,8 @@ impl Layout {
         self
     }
 
-    /// The number of samples before the chosen part of the array, and that part: without the slowest axes with a chosen index.
+    /// The number of samples before the chosen part of the array, and that part: without the slowest axes with a chosen
+    /// index.
     pub(super) fn chosen_part(&self) -> (usize, Self) {
         let (mut before, mut rest) = (0, self.clone());
         while let Some(Axis { counts: Counts::Only(index), .. }) = rest.0.first().copied() {

@@ -1,8 +1,8 @@
 //! Reads files of frames of many formats through one trait, [`FrameSource`].
 //!
-//! A format (`formats`) describes where the frames of a file are or how to decode them, in any order of axes (`layout`). A
-//! source describes its [`Archive`] and returns windows of frames in order. A window copies boxes of samples. Nothing here
-//! depends on wavelets or blocks. [`open`] chooses the source by name and content.
+//! A format (`formats`) describes where the frames of a file are or how to decode them, in any order of axes
+//! (`layout`). A source describes its [`Archive`] and returns windows of frames in order. A window copies boxes of
+//! samples. Nothing here depends on wavelets or blocks. [`open`] chooses the source by name and content.
 
 mod array;
 mod colour_transform;
@@ -61,8 +61,8 @@ pub struct OpenOptions {
     pub big_endian: bool,
     /// Bytes before the first sample of each file; for headerless data only.
     pub offset: u64,
-    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive. Then files with a header ignore
-    /// them, and the frames of headerless data are counted again.
+    /// Whether `dims`, `sample`, `big_endian` and `offset` are those of an earlier archive. Then files with a header
+    /// ignore them, and the frames of headerless data are counted again.
     pub dims_are_remembered: bool,
     /// The array of a file, or a component of one: `velocity[0]`.
     pub variable: Option<String>,
@@ -105,8 +105,8 @@ impl OpenOptions {
     }
 }
 
-/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`, `.series`), or
-/// `-` for standard input.
+/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`,
+/// `.series`), or `-` for standard input.
 ///
 /// The header and size of every file are checked here; samples are read by [`FrameSource::window`].
 ///
@@ -130,7 +130,8 @@ fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Frame
     Ok(Box::new(series::Series::open(&files, options)?))
 }
 
-/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A stream has one.
+/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A
+/// stream has one.
 ///
 /// # Errors
 /// Files that are absent, damaged or of a format that is not supported.
@@ -182,7 +183,8 @@ impl Archive {
         Self { format, grid, sample, frames, times, variable: None, units, missing: None, memory: 0, notes }
     }
 
-    /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the files.
+    /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the
+    /// files.
     pub fn missing_value(&self, given: Option<f64>) -> Option<f64> {
         given.or(self.missing.filter(|value| value.is_finite()))
     }

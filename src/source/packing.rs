@@ -38,7 +38,8 @@ impl Packing {
         if valid { stored * self.scale + self.offset } else { f64::NAN }
     }
 
-    /// Fills `out` with samples (little-endian, of the type that [`Packing::sample`] says) of stored numbers (little-endian).
+    /// Fills `out` with samples (little-endian, of the type that [`Packing::sample`] says) of stored numbers
+    /// (little-endian).
     pub(super) fn unpack(&self, stored: SampleType, bytes: &[u8], out: &mut [u8]) {
         let ty = self.sample(stored);
         let mut values = Vec::new();

@@ -47,8 +47,8 @@ pub(crate) fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declar
     (0..window.frames()).try_fold(Scan::NOTHING, |seen, frame| scan_frame(seen, window, frame, grid, ty, declared))
 }
 
-/// The range of all samples of an archive whose frames can be read again; none if all are missing. `declared` stands for a
-/// missing sample.
+/// The range of all samples of an archive whose frames can be read again; none if all are missing. `declared` stands
+/// for a missing sample.
 ///
 /// # Errors
 /// Frames that cannot be read.

@@ -4,7 +4,8 @@ use super::{Archive, FrameSource, FrameWindow};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 
-/// Every `step`-th frame from `first`, `frames` of them (all that come, if unknown), and in them the voxels of `region`.
+/// Every `step`-th frame from `first`, `frames` of them (all that come, if unknown), and in them the voxels of
+/// `region`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Selection {
     /// The first frame.

@@ -19,8 +19,8 @@ pub(super) enum SpillBuffer {
     },
 }
 
-/// A temporary file without a name, created at first use. The frames of a window share it, since the number of open files
-/// is limited.
+/// A temporary file without a name, created at first use. The frames of a window share it, since the number of open
+/// files is limited.
 #[derive(Debug, Default)]
 pub(super) struct Spool {
     file: Option<Arc<File>>,

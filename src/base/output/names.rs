@@ -61,8 +61,8 @@ fn place_of_number(name: &str, letter: char) -> Option<(&str, usize, &str)> {
     })
 }
 
-/// A name for the pictures of each view, with its number for `%v` or, with zeros, `%03v`. A name without `%v` is for all
-/// views, if there is one view or if they may be `joined`.
+/// A name for the pictures of each view, with its number for `%v` or, with zeros, `%03v`. A name without `%v` is for
+/// all views, if there is one view or if they may be `joined`.
 pub fn names_of_views(path: &Path, views: usize, joined: bool) -> Result<Vec<PathBuf>> {
     let name = path.to_string_lossy();
     match place_of_number(&name, 'v') {

@@ -12,7 +12,8 @@ const FEW_SLABS: usize = 32;
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;
 
-/// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the range.
+/// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
+/// range.
 fn without_extremes(values: &[f32]) -> (f64, f64) {
     let few = values.len() / 200;
     let at = |n: usize| f64::from(values[n]);

@@ -13,7 +13,8 @@ impl Cli {
         Ok(orbits.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The views of an orbit, with a common scale. Unless a scale or a centre is given, the volume fits beside the annotation.
+    /// The views of an orbit, with a common scale. Unless a scale or a centre is given, the volume fits beside the
+    /// annotation.
     fn orbit(&self, [azimuth, elevation]: [f64; 2], grid: &Grid) -> Result<Vec<View>> {
         let (roll, size, center) = (self.roll, self.size.0, self.center.map(|c| c.0));
         let first = View { azimuth, elevation, roll, size, scale: self.scale, center };

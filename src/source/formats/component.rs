@@ -29,8 +29,8 @@ pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usi
     }
 }
 
-/// Which component of a file's only array the option `variable` means, and what that is called. An array without a name is called
-/// `samples` where it needs one.
+/// Which component of a file's only array the option `variable` means, and what that is called. An array without a name
+/// is called `samples` where it needs one.
 pub(in crate::source) fn of_only(
     own: Option<&str>,
     components: usize,
@@ -59,7 +59,8 @@ pub(in crate::source) struct Chosen {
     pub(in crate::source) component: usize,
 }
 
-/// The array that the option `variable` names, else the active one, else the only one. Arrays have a name and some components.
+/// The array that the option `variable` names, else the active one, else the only one. Arrays have a name and some
+/// components.
 pub(in crate::source) fn choose(
     arrays: &[(&str, usize)],
     active: Option<usize>,
@@ -86,7 +87,8 @@ pub(in crate::source) fn choose(
     Ok(Chosen { array, component: chosen(name, components, index)? })
 }
 
-/// Whether [`choose`] finds neither which array nor which component of it is meant, unless the option `variable` names them.
+/// Whether [`choose`] finds neither which array nor which component of it is meant, unless the option `variable` names
+/// them.
 pub(in crate::source) fn is_undecided(arrays: &[(&str, usize)], active: Option<usize>) -> bool {
     match (active, arrays) {
         (_, []) => false,

@@ -166,8 +166,8 @@ pub(super) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
     Err(format!("expected {bytes} bytes of what it holds, but {compressed} compressed bytes cannot be so many"))
 }
 
-/// Puts what comes from a reader into its place, from `at` on up to `bytes`, and says how many came. `failed` makes an error
-/// of that of reading after some bytes.
+/// Puts what comes from a reader into its place, from `at` on up to `bytes`, and says how many came. `failed` makes an
+/// error of that of reading after some bytes.
 pub(super) fn hold(
     reader: &mut dyn Read,
     path: &Path,

@@ -30,8 +30,8 @@ pub(in crate::source) struct Placed {
 }
 
 impl Directions {
-    /// Steps of these lengths along axes that go in these directions. Lengths below 0 are refused: they would turn an axis
-    /// once more, or would be meant to.
+    /// Steps of these lengths along axes that go in these directions. Lengths below 0 are refused: they would turn an
+    /// axis once more, or would be meant to.
     pub(in crate::source) fn of(directions: [[f64; 3]; 3], spacing: [f64; 3], first: [f64; 3]) -> Parsed<Self> {
         if spacing.iter().any(|step| *step < 0.0) {
             return Err(format!("has the spacing {spacing:?}, which is not positive"));

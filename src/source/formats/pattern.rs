@@ -10,8 +10,8 @@ pub(in crate::source) fn count(first: i64, last: i64, step: i64) -> Parsed<usize
     usize::try_from(steps).ok().and_then(|n| n.checked_add(1)).ok_or_else(wrong)
 }
 
-/// Names from a pattern with one `%d`, perhaps with a width such as `%03d`: of `count` numbers from the first on. There are as
-/// many as [`count`] says.
+/// Names from a pattern with one `%d`, perhaps with a width such as `%03d`: of `count` numbers from the first on. There
+/// are as many as [`count`] says.
 pub(in crate::source) fn names(
     pattern: &str,
     first: i64,

@@ -1,4 +1,5 @@
-//! Finds what the axes of a variable count: by the user's letters, the CF conventions, their names, or else their order.
+//! Finds what the axes of a variable count: by the user's letters, the CF conventions, their names, or else their
+//! order.
 
 use super::Variable;
 use crate::base::error::{Note, Remedy};
@@ -18,8 +19,8 @@ fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Opt
     Some(Note::with(text, Remedy::Set("axes")))
 }
 
-/// What each axis counts, the slowest first, and a note on what is guessed; `index` is that of an axis beside space and time,
-/// `letters` what the user says.
+/// What each axis counts, the slowest first, and a note on what is guessed; `index` is that of an axis beside space and
+/// time, `letters` what the user says.
 pub(super) fn counts(
     variable: &Variable,
     all: &[Variable],
@@ -138,7 +139,8 @@ fn of_name(dim: &str) -> Option<Counts> {
 /// Names of axes along which an archive is not continued.
 const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
 
-/// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, the last such axis gets none.
+/// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, the last such axis gets
+/// none.
 fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool) -> Vec<Option<Counts>> {
     let beside = |axis: &usize| BESIDE.contains(&variable.dims[*axis].to_lowercase().as_str());
     let mut free: Vec<usize> = (0..counts.len()).filter(|axis| counts[*axis].is_none() && !beside(axis)).collect();

@@ -120,7 +120,8 @@ impl Chunks {
     }
 }
 
-/// Writes a box into an array, both with the last axis fastest; each axis by its length in the array and the box's range.
+/// Writes a box into an array, both with the last axis fastest; each axis by its length in the array and the box's
+/// range.
 fn put_box(
     axes: &[(usize, Range<usize>)],
     size: usize,

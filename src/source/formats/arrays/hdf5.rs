@@ -93,7 +93,8 @@ const PLUGIN_FILTERS: [(u16, &str); 9] = [
     (32026, "Blosc2"),
 ];
 
-/// Why something cannot be read. A filter that is not supported is named, with the command that rewrites the file without it.
+/// Why something cannot be read. A filter that is not supported is named, with the command that rewrites the file
+/// without it.
 pub(super) fn reason(error: &Hdf5Error) -> String {
     let Hdf5Error::UnsupportedFilter(filter) = error else { return error.to_string() };
     let Some(id) = filter.strip_prefix("filter id ") else { return error.to_string() };

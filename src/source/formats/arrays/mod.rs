@@ -1,7 +1,7 @@
 //! Files of named arrays, such as HDF5 and NetCDF. One variable is an archive, read chunk by chunk.
 //!
-//! An [`ArrayFile`] lists the arrays. [`choose`] finds the variable, [`axes`] the meaning of its axes, [`places`] the positions
-//! of voxels and frames, [`values`] the meaning of its numbers, and [`chunks`] reads it.
+//! An [`ArrayFile`] lists the arrays. [`choose`] finds the variable, [`axes`] the meaning of its axes, [`places`] the
+//! positions of voxels and frames, [`values`] the meaning of its numbers, and [`chunks`] reads it.
 
 mod axes;
 mod choose;

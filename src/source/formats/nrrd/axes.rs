@@ -117,7 +117,8 @@ impl Axes {
     }
 }
 
-/// What each axis counts, by its kind and by whether it has a direction; where that says too little, x, y, z come first.
+/// What each axis counts, by its kind and by whether it has a direction; where that says too little, x, y, z come
+/// first.
 fn counts(header: &NrrdHeader, axes: usize, directions: Option<&[Option<Vec<f64>>]>) -> Parsed<Vec<AxisKind>> {
     let kinds: Vec<String> =
         header.get("kinds").unwrap_or_default().split_whitespace().map(str::to_lowercase).collect();

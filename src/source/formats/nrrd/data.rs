@@ -87,7 +87,8 @@ impl NrrdSamples {
         Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: DataLocation::Byte(start) })
     }
 
-    /// A file of less than a frame, or of some samples of every frame; where its samples come, [`Self::of_pieces`] says.
+    /// A file of less than a frame, or of some samples of every frame; where its samples come, [`Self::of_pieces`]
+    /// says.
     fn piece(&self, data: &FileBytes, skip: &Skip, bytes: usize) -> Result<Piece> {
         let refused = |what| Error::input(data.path(), what);
         let stream = if self.gzip {

@@ -1,5 +1,5 @@
-//! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`), raw or in gzip: three axes of space, perhaps one of
-//! frames and one of components, in any order.
+//! NRRD, attached (`.nrrd`) or with its samples elsewhere (`.nhdr`), raw or in gzip: three axes of space, perhaps one
+//! of frames and one of components, in any order.
 
 mod axes;
 mod data;
