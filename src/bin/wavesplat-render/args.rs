@@ -2,7 +2,6 @@
 
 use crate::along::AlongArgs;
 use crate::colours::ColourArgs;
-use crate::targets::{parse_depth, parse_format};
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use wavesplat::cli::{CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share};
@@ -167,4 +166,17 @@ pub(crate) enum MethodName {
     Coefficients,
     /// Splat every frame
     Direct,
+}
+
+fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
+    match text {
+        "8" => Ok(Depth::Eight),
+        "16" => Ok(Depth::Sixteen),
+        _ => Err("8 or 16".into()),
+    }
+}
+
+pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
+    let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
+    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet exr".into())
 }

@@ -1,6 +1,6 @@
 //! The files that pictures are written to.
 
-use crate::args::Cli;
+use crate::args::{Cli, parse_format};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -96,19 +96,6 @@ impl Cli {
         spare_inputs(&self.inputs, path)?;
         Output::check(path, self.force)
     }
-}
-
-pub(crate) fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
-    match text {
-        "8" => Ok(Depth::Eight),
-        "16" => Ok(Depth::Sixteen),
-        _ => Err("8 or 16".into()),
-    }
-}
-
-pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
-    let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet exr".into())
 }
 
 fn format_of(path: &Path) -> Result<PictureFormat> {
