@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn powers_of_ten_have_names() {
+    fn powers_of_ten_have_labels() {
         assert_eq!([1e-3, 0.1, 1.0, 1000.0, 1e-12, 2.0].map(decade), ["10⁻³", "0.1", "1", "1000", "10⁻¹²", ""]);
     }
 
