@@ -90,7 +90,7 @@ fn floor(room: &str) -> Option<usize> {
 }
 
 #[test]
-fn rooms_use_lower_floors_only() {
+fn modules_use_only_lower_layers() {
     for (path, code) in sources() {
         let from = room(&path);
         if matches!(from, "lib" | "bin") {
@@ -150,7 +150,7 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
 }
 
 #[test]
-fn every_crate_stays_at_home() {
+fn every_crate_is_used_only_where_it_is_listed() {
     for (path, code) in sources() {
         for (name, homes) in HOMES {
             let uses = code

@@ -117,8 +117,8 @@ impl WindowScan {
         let same = ensure(most, || "too long".into())
             .and_then(|()| decompress(&stored, extent.raw_len))
             .and_then(|raw| leaf.parse(&raw))
-            .and_then(|told| {
-                ensure(told.iter().map(BlockEntry::encoded).eq(entries.iter().map(BlockEntry::encoded)), || {
+            .and_then(|stated| {
+                ensure(stated.iter().map(BlockEntry::encoded).eq(entries.iter().map(BlockEntry::encoded)), || {
                     "differs from its blocks".into()
                 })
             });

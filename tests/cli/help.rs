@@ -40,7 +40,7 @@ fn an_estimate_is_not_reported_as_a_guarantee() {
 }
 
 #[test]
-fn versions_are_told() {
+fn version_options_print_the_version() {
     let work = Work::new();
     let version = env!("CARGO_PKG_VERSION");
     assert_eq!(work.wavesplat("--version").ok().text(), format!("wavesplat {version}\n"));

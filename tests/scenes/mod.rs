@@ -111,7 +111,7 @@ impl Scene {
                 continue;
             }
             let off = (f64::from(*found) - truth.expected(quantity, at)).abs();
-            let most = truth.promise(quantity, at, deltas[at / pixels], &report) + rounding(*found);
+            let most = truth.pixel_bound(quantity, at, deltas[at / pixels], &report) + rounding(*found);
             assert!(!promised || off <= most, "pixel {at}: {found} is off by {off}, promised {most}");
             assert!(
                 errors.get(at).is_none_or(|e| off <= f64::from(*e)),
@@ -175,7 +175,7 @@ impl Reference {
     }
 
     /// The largest allowed error of a pixel before rounding.
-    fn promise(&self, quantity: Quantity, at: usize, delta: f64, report: &RenderReport) -> f64 {
+    fn pixel_bound(&self, quantity: Quantity, at: usize, delta: f64, report: &RenderReport) -> f64 {
         let (lo, hi) = self.range;
         let magnitude = if lo <= hi { lo.abs().max(hi.abs()) } else { 0.0 };
         match quantity {

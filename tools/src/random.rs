@@ -41,13 +41,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_published_sequence_comes_out() {
+    fn the_sequence_is_the_published_one() {
         assert_eq!(mix(GAMMA), 0xE220_A839_7B1D_CDAF); // the first number for seed 0
         assert_eq!(mix(GAMMA.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);
     }
 
     #[test]
-    fn nth_is_what_comes_next() {
+    fn nth_equals_the_numbers_that_follow() {
         let mut random = Random::new(7, 1);
         let ahead: Vec<f64> = (0..5).map(|n| random.nth(n)).collect();
         assert_eq!(ahead, [0; 5].map(|_| random.between(0.0, 1.0)));

@@ -11,7 +11,7 @@ use wavesplat::base::error::{Error, Result};
 /// A figure.
 pub(super) struct Figure {
     pub(super) title: String,
-    /// Where the figures come from.
+    /// The source of the numbers.
     pub(super) note: String,
     /// What the axes are, with units.
     pub(super) x: String,
@@ -31,7 +31,7 @@ pub(super) struct Line {
     pub(super) dashed: bool,
 }
 
-/// What stands at each point.
+/// The shape drawn at each point.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Marker {
     Disc,
@@ -48,7 +48,7 @@ pub(super) struct Panel {
 
 /// Points of one line.
 pub(super) struct Curve {
-    /// Its place in the figure's lines.
+    /// Index into the figure's lines.
     pub(super) line: usize,
     pub(super) points: Vec<(f64, f64)>,
 }
@@ -192,7 +192,7 @@ impl Line {
         self.rgb().stroke_width(3)
     }
 
-    /// Draws what stands at a point, which is so many pixels right and down in the area.
+    /// Draws the marker at a point, given in pixels to the right and down in the area.
     fn mark(&self, at: (i32, i32), area: &Area<'_>) -> Drawn {
         let corners = self.marker.corners().into_iter().map(|(right, down)| (at.0 + right, at.1 + down));
         Ok(area.draw(&Polygon::new(corners.collect::<Vec<_>>(), self.rgb().filled()))?)
@@ -211,7 +211,7 @@ impl Marker {
     }
 }
 
-/// A power of ten, or nothing for what is between.
+/// The label of a power of ten; empty for other values.
 fn decade(value: f64) -> String {
     let power = value.log10();
     if (power - power.round()).abs() > 1e-6 {
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn powers_of_ten_have_names() {
+    fn powers_of_ten_have_labels() {
         assert_eq!([1e-3, 0.1, 1.0, 1000.0, 1e-12, 2.0].map(decade), ["10⁻³", "0.1", "1", "1000", "10⁻¹²", ""]);
     }
 

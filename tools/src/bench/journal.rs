@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_measured_is_there_again_but_for_a_torn_line() {
+    fn a_journal_is_read_back_without_a_torn_line() {
         let folder = tempfile::tempdir().expect("a folder");
         let open = |force| Journal::open(folder.path(), &settings(40), force);
         open(false).expect("new").append(vec![Point::example("a"), Point::example("b")]).expect("written");

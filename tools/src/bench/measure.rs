@@ -161,7 +161,7 @@ impl<'a> Bench<'a> {
     ) -> Point {
         let frames = contender.frames(self.config.sweep.dims[3]);
         let conversion = converted.map(|checked| conversion(checked, frames));
-        let voxel = conversion.as_ref().map_or(Some(0.0), |c| promised(contender, c));
+        let voxel = conversion.as_ref().map_or(Some(0.0), |c| sample_bound(contender, c));
         Point {
             key,
             group: group.name(),
@@ -177,10 +177,10 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The largest error that a sample may have, as a share of the value range.
-fn promised(contender: &Contender, conversion: &Conversion) -> Option<f64> {
+/// The largest error that a sample may have, as a share of the value range; none if there is no guarantee.
+fn sample_bound(contender: &Contender, conversion: &Conversion) -> Option<f64> {
     let Contender::Coefficients(basis, bound) = contender else { return Some(0.0) };
-    (bound.worst)(basis.window as f64).map(|worst| worst * conversion.promised)
+    (bound.worst)(basis.window as f64).map(|worst| worst * conversion.voxel_bound)
 }
 
 fn conversion(checked: &CheckedConversion, frames: usize) -> Conversion {
@@ -195,7 +195,7 @@ fn conversion(checked: &CheckedConversion, frames: usize) -> Conversion {
         coefficients_per_sample: run.coefficients_per_sample,
         coefficients_per_voxel: run.coefficients_per_sample * frames as f64,
         outliers: run.outliers,
-        promised: run.delta / run.range,
+        voxel_bound: run.delta / run.range,
         largest_voxel_error: found.largest_error / run.range,
         rms_voxel_error: found.rms_error / run.range,
         share_of_bound: found.largest_share_of_bound,
@@ -218,7 +218,7 @@ fn rendering(runs: &[Outcome<Rendered>], frames: usize, voxel: Option<f64>) -> R
         further_view,
         splat: run.splat.clone(),
         stated_splat_error: run.stated_splat_error,
-        promised: voxel.zip(run.stated_splat_error).map(|(voxel, splat)| voxel + splat / LEAST_WEIGHT),
+        pixel_bound: voxel.zip(run.stated_splat_error).map(|(voxel, splat)| voxel + splat / LEAST_WEIGHT),
         image_error: run.error,
         certified_error: run.certified_error,
         certificate_tightness: run.certificate_tightness,

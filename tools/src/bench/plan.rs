@@ -1,4 +1,4 @@
-//! Which groups of contenders are measured side by side.
+//! Which groups of methods are measured together.
 
 use crate::synth::Kind;
 use clap::ValueEnum;
@@ -12,9 +12,9 @@ use wavesplat::view::footprint::Method;
 /// A basis, and the window it is measured with.
 #[derive(Debug, PartialEq)]
 pub struct BasisRow {
-    /// Its name.
+    /// The name in results.
     pub name: &'static str,
-    /// What the library calls it.
+    /// The library's setting.
     pub basis: Basis,
     /// Frames of a window.
     pub window: usize,
@@ -26,19 +26,19 @@ pub const BASES: [BasisRow; 2] = [
     BasisRow { name: "multi", basis: Basis::Multi, window: 33 },
 ];
 
-/// A promise.
+/// An error bound.
 #[derive(Debug)]
 pub struct BoundRow {
-    /// Its name.
+    /// The name in results.
     pub name: &'static str,
-    /// What the library calls it.
+    /// The library's setting.
     pub bound: Bound,
-    /// How far one sample, and so one pixel, may be off in a window of so many frames, in units of the voxel bound;
-    /// nothing where the mode is no guarantee.
+    /// The largest error of one sample, and so of one pixel, in a window of this many frames, in units of the voxel
+    /// bound; none if the bound is only an estimate.
     pub worst: fn(f64) -> Option<f64>,
 }
 
-/// All promises; a further one is a further line. The first is the one whose splat methods are compared.
+/// All bounds. Splat methods are compared with the first.
 pub const BOUNDS: [BoundRow; 4] = [
     BoundRow { name: "pointwise", bound: Bound::Pointwise, worst: |_| Some(1.0) },
     BoundRow { name: "relative", bound: Bound::Relative { floor: 0.01 }, worst: |_| Some(1.0) },
@@ -46,7 +46,7 @@ pub const BOUNDS: [BoundRow; 4] = [
     BoundRow { name: "sampled", bound: Bound::Sampled { samples: 300, seed: 0 }, worst: |_| None },
 ];
 
-/// Where textbooks cut the footprint, in standard deviations.
+/// The cut of a textbook's footprint, in standard deviations.
 pub const TEXTBOOK_CUT: f64 = 3.0;
 /// Frames that the conventional method with shared footprints splats together.
 const SHARED_GROUP: usize = 32;
@@ -56,9 +56,9 @@ const SHARED_GROUP: usize = 32;
 pub struct Sweep {
     /// Voxels along x, y, z and the number of frames.
     pub dims: [usize; 4],
-    /// Pixels a side of a picture.
+    /// Width and height of a picture in pixels.
     pub size: usize,
-    /// What the archives show.
+    /// The kinds of archives.
     pub kinds: Vec<Kind>,
     /// The tolerances of the first sweep.
     pub tolerances: Vec<f64>,
@@ -66,7 +66,7 @@ pub struct Sweep {
     pub fine: f64,
     /// The splat methods of the second sweep.
     pub splats: Vec<Method>,
-    /// How often every time is taken.
+    /// Number of repetitions of every time.
     pub repeats: usize,
 }
 
@@ -85,13 +85,16 @@ impl Default for Sweep {
 }
 
 impl Sweep {
-    /// A sweep of seconds that shows whether everything works.
+    /// A sweep that takes seconds, to check that everything works.
     pub fn quick() -> Self {
         let splats = [splat_method(Quantity::Mean, f64::MAX), Method::EXACT].to_vec();
         Self { dims: [12, 10, 8, 33], size: 40, tolerances: vec![1e-1, 1e-3], splats, repeats: 1, ..Self::default() }
     }
 
-    /// An error if a window does not fit, or nothing would be measured.
+    /// Checks that the archive is as long as a window, and that there is something to measure.
+    ///
+    /// # Errors
+    /// A usage error that names the option.
     pub fn check(&self) -> Result<()> {
         let least = BASES.iter().map(|b| b.window).fold(SHARED_GROUP, usize::max);
         if self.dims[3] < least {
@@ -103,7 +106,7 @@ impl Sweep {
         Ok(())
     }
 
-    /// All that is to be measured, archive by archive.
+    /// All groups, archive by archive.
     pub fn groups(&self) -> Vec<Group> {
         self.kinds.iter().flat_map(|kind| self.by_tolerance(*kind).chain(self.by_splat(*kind))).collect()
     }
@@ -118,7 +121,7 @@ impl Sweep {
         })
     }
 
-    /// Every splat method at the fine tolerance; the textbook form cuts its footprints where they do.
+    /// Every splat method at the fine tolerance; the textbook form has the same cut.
     fn by_splat(&self, kind: Kind) -> impl Iterator<Item = Group> {
         self.splats.iter().map(move |method| {
             let coefficients = BASES.iter().map(|b| Contender::Coefficients(b, &BOUNDS[0]));
@@ -135,29 +138,29 @@ fn splat_methods() -> Vec<Method> {
     successors(Some(splat_method(Quantity::Mean, f64::MAX)), next).collect()
 }
 
-/// What is measured in turns, so that what happens to the machine happens to all.
+/// Methods that are measured in turns, so that other load on the machine affects all of them alike.
 #[derive(Debug)]
 pub struct Group {
-    /// What the archive shows.
+    /// The kind of archive.
     pub kind: Kind,
-    /// Of conversions.
+    /// The tolerance of conversions.
     pub tolerance: f64,
-    /// What splatting may add.
+    /// The error that splatting may add, as a share of the value range.
     pub splat_error: f64,
     /// The splat method if the group belongs to the second sweep.
     pub splat: Option<&'static str>,
-    /// Who is measured.
+    /// The methods that are measured.
     pub contenders: Vec<Contender>,
 }
 
-/// A way from frames to pictures.
+/// A method that makes pictures of frames.
 #[derive(Debug, Clone, Copy)]
 pub enum Contender {
-    /// By a coefficient file.
+    /// From a coefficient file.
     Coefficients(&'static BasisRow, &'static BoundRow),
     /// The conventional method with footprints shared by 32 frames.
     Shared,
-    /// The conventional method with a table of footprints, cut at so many standard deviations.
+    /// The conventional method with a table of footprints, cut at this many standard deviations.
     Textbook(f64),
 }
 
@@ -171,12 +174,12 @@ impl Contender {
         }
     }
 
-    /// The promise, where there is one.
+    /// The name of the bound; none for the conventional method.
     pub fn bound(&self) -> Option<&'static str> {
         if let Self::Coefficients(_, bound) = self { Some(bound.name) } else { None }
     }
 
-    /// How often it is timed: but for the first bound, sizes and errors are what matters.
+    /// The number of timed runs: one for all bounds but the first, of which only sizes and errors are compared.
     pub fn rounds(&self, repeats: usize) -> usize {
         match self {
             Self::Coefficients(_, bound) if bound.name != BOUNDS[0].name => 1,
@@ -184,7 +187,7 @@ impl Contender {
         }
     }
 
-    /// How many of an archive's frames are rendered: whole windows, so that times per frame compare.
+    /// The number of frames to render: whole windows, so that times per frame can be compared.
     pub fn frames(&self, all: usize) -> usize {
         let window = if let Self::Coefficients(basis, _) = self { basis.window } else { SHARED_GROUP };
         all - all % window
@@ -192,12 +195,12 @@ impl Contender {
 }
 
 impl Group {
-    /// How often its conversions are timed: the second sweep repeats those of the first.
+    /// The number of timed conversions: one in the second sweep, whose conversions are those of the first.
     pub fn rounds(&self, repeats: usize) -> usize {
         if self.splat.is_some() { 1 } else { repeats }
     }
 
-    /// Its name: sweep, kind, tolerance and, in the second sweep, the splat method.
+    /// The group's name: sweep, kind, tolerance and, in the second sweep, the splat method.
     pub fn name(&self) -> String {
         let kind = kind_name(self.kind);
         match self.splat {
@@ -206,7 +209,7 @@ impl Group {
         }
     }
 
-    /// The names of the points, contender by contender.
+    /// The key of each contender's point.
     pub fn keys(&self) -> Vec<String> {
         let group = self.name();
         let of =
@@ -222,7 +225,7 @@ impl fmt::Display for Group {
     }
 }
 
-/// The name of a kind as the command line has it.
+/// The name of a kind on the command line.
 pub fn kind_name(kind: Kind) -> String {
     kind.to_possible_value().map_or(String::new(), |v| v.get_name().into())
 }

@@ -70,8 +70,8 @@ fn size(results: &Results) -> Figure {
         note: note(&results.settings, false),
         x: "largest voxel error, share of the value range".into(),
         y: "bytes per sample".into(),
-        lines: promises(),
-        panels: panels(points, |kind| by_promise(points, kind, |_, c| (c.largest_voxel_error, c.bytes_per_sample))),
+        lines: bound_lines(),
+        panels: panels(points, |kind| by_bound(points, kind, |_, c| (c.largest_voxel_error, c.bytes_per_sample))),
         level: Some((RAW, "raw f32 frames".into())),
     }
 }
@@ -84,8 +84,8 @@ fn conversion(results: &Results) -> Figure {
         note: note(&results.settings, false),
         x: "tolerance, share of the value range".into(),
         y: "MB of frames per second".into(),
-        lines: promises(),
-        panels: panels(points, |kind| by_promise(points, kind, |p, c| (p.tolerance, c.megabytes_per_second))),
+        lines: bound_lines(),
+        panels: panels(points, |kind| by_bound(points, kind, |p, c| (p.tolerance, c.megabytes_per_second))),
         level: None,
     }
 }
@@ -116,7 +116,7 @@ fn title(kind: &str) -> String {
 }
 
 /// A line for every basis and bound: the basis has the colour, the bound the marker.
-fn promises() -> Vec<Line> {
+fn bound_lines() -> Vec<Line> {
     let markers = [Marker::Disc, Marker::Triangle, Marker::Square, Marker::Diamond];
     let of_basis = |(basis, colour): (&BasisRow, _)| {
         let name = basis.name;
@@ -131,8 +131,8 @@ fn promises() -> Vec<Line> {
     BASES.iter().zip([BLUE, ORANGE]).flat_map(of_basis).collect()
 }
 
-/// A curve for every line of [`promises`].
-fn by_promise(points: &[Point], kind: &str, at: impl Fn(&Point, &Conversion) -> (f64, f64)) -> Vec<Curve> {
+/// A curve for every line of [`bound_lines`].
+fn by_bound(points: &[Point], kind: &str, at: impl Fn(&Point, &Conversion) -> (f64, f64)) -> Vec<Curve> {
     let of = |basis: &str, bound: &str| {
         let chosen = |p: &&Point| p.sweep == "tolerance" && p.kind == kind && p.method == basis;
         let bounded = points.iter().filter(chosen).filter(|p| p.bound.as_deref() == Some(bound));

@@ -1,4 +1,4 @@
-//! What is recorded.
+//! The recorded measurements.
 
 use super::reference::ImageError;
 use super::settings::Settings;
@@ -7,94 +7,96 @@ use serde::{Deserialize, Serialize};
 /// All results of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Results {
-    /// What all points share.
+    /// The settings that all points share.
     pub settings: Settings,
-    /// The day they were written.
+    /// The date of the run.
     pub date: String,
-    /// Everything measured, in the order of the plan.
+    /// All points, in the order of the plan.
     pub points: Vec<Point>,
 }
 
 /// One contender at one setting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// Its name: that of its group, method, bound.
+    /// The name: group, method, bound.
     pub key: String,
-    /// The name of those it was measured in turns with.
+    /// The name of the group, whose points were measured in turns.
     pub group: String,
-    /// Which sweep: `tolerance` or `splat`.
+    /// The sweep: `tolerance` or `splat`.
     pub sweep: String,
-    /// What the archive shows.
+    /// The kind of archive.
     pub kind: String,
-    /// The tolerance of the group; the conventional method itself has none.
+    /// The tolerance of the group. The conventional method does not use it.
     pub tolerance: f64,
     /// `haar` or `multi` for coefficients; `shared` or `textbook` for the conventional method.
     pub method: String,
-    /// What coefficients promise.
+    /// The name of the bound; none for the conventional method.
     pub bound: Option<String>,
-    /// Frames converted and rendered.
+    /// Number of frames converted and rendered.
     pub frames: usize,
-    /// Of coefficients.
+    /// The conversion; none for the conventional method.
     pub conversion: Option<Conversion>,
-    /// The pictures.
+    /// The rendering of two views.
     pub rendering: Rendering,
 }
 
-/// Frames to a file.
+/// The measurements of a conversion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Conversion {
     /// From opening the frames to the last byte written.
     pub seconds: Spread,
-    /// Million bytes of samples a second, by the median time.
+    /// Megabytes of samples per second, from the median time.
     pub megabytes_per_second: f64,
     /// Bytes of the file.
     pub file_bytes: u64,
-    /// Bytes of samples by bytes of the file.
+    /// Bytes of the samples divided by bytes of the file.
     pub ratio: f64,
-    /// Bytes of the file for each sample.
+    /// Bytes of the file per sample.
     pub bytes_per_sample: f64,
-    /// Nonzero coefficients for each sample.
+    /// Nonzero coefficients per sample.
     pub coefficients_per_sample: f64,
-    /// Nonzero coefficients for each voxel, over all frames.
+    /// Nonzero coefficients per voxel, over all frames.
     pub coefficients_per_voxel: f64,
     /// Samples stored exactly because coefficients missed the bound.
     pub outliers: u64,
-    /// The voxel bound as a share of the value range.
-    pub promised: f64,
+    /// The voxel bound as a share of the value range; `promised` in JSON.
+    #[serde(rename = "promised")]
+    pub voxel_bound: f64,
     /// The largest error of any sample as a share of the value range.
     pub largest_voxel_error: f64,
-    /// The root of the mean squared error as a share of the value range.
+    /// The root mean square error as a share of the value range.
     pub rms_voxel_error: f64,
-    /// The largest error in what the bound is about, in units of the bound.
+    /// The largest error in the bound's own measure, as a share of the bound.
     pub share_of_bound: f64,
-    /// Series outside the bound.
+    /// Number of series that exceed the bound.
     pub series_outside: u64,
     /// Peak memory of the process, with pages of mapped files.
     pub peak_bytes: Option<u64>,
 }
 
-/// Two views of all frames.
+/// The measurements of two views of all frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rendering {
-    /// From opening the input to the last picture: seconds for all frames.
+    /// Seconds for all frames of the first view, from opening the input to the last picture.
     pub first_view: Spread,
-    /// Another view: seconds for all frames.
+    /// Seconds for all frames of another view.
     pub further_view: Spread,
-    /// Milliseconds for each frame of a further view, by the median.
+    /// Milliseconds per frame of the further view, from the median.
     pub milliseconds_per_frame: f64,
     /// The splat method.
     pub splat: String,
-    /// What splatting may add, as a share of the value range; unknown for the textbook form.
+    /// The splat error that the renderer states, as a share of the value range; unknown for the textbook form.
     pub stated_splat_error: Option<f64>,
-    /// What no pixel's error may exceed by promise, as a share of the value range, where there is a promise.
-    pub promised: Option<f64>,
-    /// Against brute force, as shares of the value range.
+    /// The bound of every pixel's error, as a share of the value range, if there is one; `promised` in JSON.
+    #[serde(rename = "promised")]
+    pub pixel_bound: Option<f64>,
+    /// The errors compared with brute force, as shares of the value range.
     pub image_error: ImageError,
-    /// The largest error that the renderer certifies for any compared pixel, as a share of the value range.
+    /// The largest certified error of any compared pixel, as a share of the value range.
     pub certified_error: Option<f64>,
-    /// That in units of the largest true error of the same pictures.
+    /// The largest certified error divided by the largest true error of the same pictures.
     pub certificate_tightness: Option<f64>,
-    /// Compared pixels that are further off than certified.
+    /// Number of compared pixels whose error exceeds their certificate.
     pub beyond_certificate: usize,
     /// Peak memory of the process, with pages of mapped files.
     pub peak_bytes: Option<u64>,
@@ -105,14 +107,14 @@ pub struct Rendering {
 pub struct Spread {
     /// The smallest.
     pub min: f64,
-    /// The middle one, or the mean of the two in the middle.
+    /// The median.
     pub median: f64,
-    /// All, in the order taken.
+    /// All, in the order in which they were taken.
     pub all: Vec<f64>,
 }
 
 impl Spread {
-    /// Of any measurements; not a number of none.
+    /// The spread of these measurements; NaN if there are none.
     pub fn of(all: Vec<f64>) -> Self {
         let mut sorted = all.clone();
         sorted.sort_by(f64::total_cmp);
@@ -132,7 +134,7 @@ impl Point {
             milliseconds_per_frame: 4.0,
             splat: "exact".into(),
             stated_splat_error: None,
-            promised: None,
+            pixel_bound: None,
             image_error: ImageError { largest: 0.5, rms: 0.25 },
             certified_error: None,
             certificate_tightness: None,
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spreads_have_a_middle() {
+    fn spreads_have_a_median() {
         let spread = |all: &[f64]| Spread::of(all.to_vec());
         assert_eq!((spread(&[3.0, 1.0, 8.0]).min, spread(&[3.0, 1.0, 8.0]).median), (1.0, 3.0));
         assert_eq!(spread(&[4.0, 1.0, 8.0, 2.0]).median, 3.0);

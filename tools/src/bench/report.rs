@@ -61,7 +61,7 @@ pub(super) fn kinds(points: &[Point]) -> Vec<&str> {
 }
 
 const RENDER_HEAD: &str = "\
-| tolerance | method | bound | splat | first, ms | further, ms | textbook / this | shared / this | largest error | rms error | promised | certified / true | MB |
+| tolerance | method | bound | splat | first, ms | further, ms | textbook / this | shared / this | largest error | rms error | bound of pixels | certified / true | MB |
 |---|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|
 ";
 
@@ -92,7 +92,7 @@ fn rendered(point: &Point, all: &[Point]) -> String {
         against("shared"),
         r.image_error.largest,
         r.image_error.rms,
-        share(r.promised),
+        share(r.pixel_bound),
         megabytes(r.peak_bytes),
     )
 }

@@ -1,16 +1,16 @@
-//! What must hold of every point, on any machine and however fast it is.
+//! Checks of every point that hold on any machine, however fast it is.
 
 use super::point::{Conversion, Point};
 
-/// Rounding of pictures to f32, which the promise of samples does not hold.
+/// Rounding of pictures to f32, which the bound of samples does not include; a share of the value range.
 const ROUNDING: f64 = 1e-6;
 
-/// A sentence for everything that cannot be right.
+/// A sentence for every failed check.
 pub fn complaints(points: &[Point]) -> Vec<String> {
     points.iter().flat_map(alone).chain(order(points)).collect()
 }
 
-/// What is wrong with a point by itself.
+/// The failed checks of a point by itself.
 fn alone(point: &Point) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut expect = |holds: bool, what: &str| {
@@ -23,20 +23,21 @@ fn alone(point: &Point) -> Vec<String> {
         expect(c.file_bytes > 0 && c.ratio.is_finite(), "the file is empty");
         expect(c.rms_voxel_error <= c.largest_voxel_error, "errors contradict each other");
         let of_range = matches!(point.bound.as_deref(), Some("pointwise" | "rms"));
-        expect(!of_range || c.promised <= point.tolerance * (1.0 + 1e-9), "more than the tolerance is promised");
+        expect(!of_range || c.voxel_bound <= point.tolerance * (1.0 + 1e-9), "the bound is larger than the tolerance");
     }
     let (r, error) = (&point.rendering, point.rendering.image_error);
     expect(error.rms <= error.largest && error.largest.is_finite(), "a pixel is background that should not be");
-    expect(r.promised.is_none_or(|p| error.largest <= p + ROUNDING), "a pixel is further off than promised");
-    expect(r.beyond_certificate == 0, "a pixel is beyond its own certificate");
+    expect(r.pixel_bound.is_none_or(|bound| error.largest <= bound + ROUNDING), "a pixel exceeds its bound");
+    expect(r.beyond_certificate == 0, "a pixel exceeds its certificate");
     let by_library = point.method != "textbook" && point.sweep == "splat";
-    let as_asked = point.group.ends_with(&r.splat) || r.splat == "lattice"; // within the same error, where it is cheaper
-    expect(!by_library || as_asked, "another splat method was taken");
+    // The renderer may use the lattice instead, within the same error, where that is faster.
+    let as_requested = point.group.ends_with(&r.splat) || r.splat == "lattice";
+    expect(!by_library || as_requested, "another splat method was used");
     expect(r.first_view.min > 0.0 && r.further_view.min > 0.0, "it took no time");
     wrong
 }
 
-/// What is wrong with how points of one sweep follow each other.
+/// The failed checks of pairs of points that differ only in tolerance.
 fn order(points: &[Point]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (i, a) in points.iter().enumerate() {
@@ -44,7 +45,7 @@ fn order(points: &[Point]) -> Vec<String> {
             if let (true, Some(x), Some(y)) = (alike(a, b), &a.conversion, &b.conversion) {
                 let (loose, tight) = if a.tolerance > b.tolerance { (x, y) } else { (y, x) };
                 if !falls(loose, tight) {
-                    wrong.push(format!("{}, {}: more is kept at a larger tolerance", a.key, b.key));
+                    wrong.push(format!("{}, {}: the larger tolerance keeps more coefficients", a.key, b.key));
                 }
             }
         }
@@ -52,8 +53,8 @@ fn order(points: &[Point]) -> Vec<String> {
     wrong
 }
 
-/// Whether two points differ in tolerance alone. A sampled bound may be so tight that blocks are stored exactly, which
-/// can be smaller.
+/// Whether two points differ only in tolerance and can be compared. Sampled bounds cannot: one may be so tight that blocks
+/// are stored exactly, which can be smaller.
 fn alike(a: &Point, b: &Point) -> bool {
     a.bound.as_deref() != Some("sampled")
         && a.sweep == "tolerance"
@@ -61,8 +62,8 @@ fn alike(a: &Point, b: &Point) -> bool {
         && (&a.kind, &a.method, &a.bound) == (&b.kind, &b.method, &b.bound)
 }
 
-/// Whether a larger tolerance keeps no more. Blocks that are stored exactly have no coefficients, so that a smaller
-/// tolerance may have fewer, but then its file is larger.
+/// Whether the larger tolerance keeps no more coefficients, or makes a smaller file. Blocks that are stored exactly have no
+/// coefficients, so a smaller tolerance may keep fewer, but then its file is larger.
 fn falls(loose: &Conversion, tight: &Conversion) -> bool {
     loose.coefficients_per_sample <= tight.coefficients_per_sample || loose.file_bytes < tight.file_bytes
 }
@@ -82,7 +83,7 @@ mod tests {
             coefficients_per_sample,
             coefficients_per_voxel: 1.0,
             outliers: 0,
-            promised: tolerance,
+            voxel_bound: tolerance,
             largest_voxel_error: tolerance,
             rms_voxel_error: 0.5 * tolerance,
             share_of_bound: 1.0,
@@ -102,31 +103,31 @@ mod tests {
     }
 
     #[test]
-    fn points_that_may_be_are_accepted() {
+    fn valid_points_are_accepted() {
         assert_eq!(complaints(&[converted(0.1, 0.2, 10), converted(0.01, 0.3, 20)]), [""; 0]);
         assert_eq!(wrong(&[converted(0.1, 0.2, 10), converted(0.01, 0.0, 20)]), 0, "stored exactly");
     }
 
     #[test]
-    fn a_larger_tolerance_must_not_keep_more() {
+    fn a_larger_tolerance_must_not_keep_more_coefficients() {
         assert_eq!(wrong(&[converted(0.1, 0.2, 10), converted(0.01, 0.1, 9)]), 1);
         assert_eq!(wrong(&[converted(0.01, 0.1, 9), converted(0.1, 0.2, 10)]), 1);
     }
 
     #[test]
-    fn broken_promises_are_noticed() {
+    fn missed_bounds_are_reported() {
         let broken = |change: fn(&mut Point)| {
             let mut point = converted(0.1, 0.2, 10);
             change(&mut point);
             wrong(&[point])
         };
-        assert_eq!(broken(|p| p.rendering.promised = Some(0.4)), 1);
-        assert_eq!(broken(|p| p.rendering.promised = Some(0.5)), 0);
+        assert_eq!(broken(|p| p.rendering.pixel_bound = Some(0.4)), 1);
+        assert_eq!(broken(|p| p.rendering.pixel_bound = Some(0.5)), 0);
         assert_eq!(broken(|p| p.rendering.beyond_certificate = 1), 1);
         assert_eq!(broken(|p| p.rendering.image_error.largest = f64::INFINITY), 1);
         assert_eq!(broken(|p| p.rendering.further_view.min = 0.0), 1);
         let of_conversion: [fn(&mut Conversion); 3] =
-            [|c| c.series_outside = 1, |c| c.file_bytes = 0, |c| c.promised = 0.11];
+            [|c| c.series_outside = 1, |c| c.file_bytes = 0, |c| c.voxel_bound = 0.11];
         for change in of_conversion {
             let mut point = converted(0.1, 0.2, 10);
             point.conversion.as_mut().into_iter().for_each(change);

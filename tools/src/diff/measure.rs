@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_identical_has_no_noise() {
+    fn identical_pictures_have_infinite_psnr() {
         let found = Differences::of(&[f32::INFINITY, 2.0], &[f32::INFINITY, 2.0]);
         assert!(found.is_identical() && found.at.is_none());
         assert_eq!(found.psnr(1.0), Some(f64::INFINITY));

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn places_are_found_from_their_count() {
+    fn positions_follow_from_indices() {
         let shape = Shape { frames: 3, height: 4, width: 5, channels: 2, sample: SampleType::U8 };
         let at = 2 * 40 + 3 * 10 + 4 * 2 + 1;
         assert_eq!(PixelPosition::of(at, &shape), PixelPosition { frame: 2, x: 4, y: 3, channel: 1 });

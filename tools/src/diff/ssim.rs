@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_double_sum_over_windows() {
+    fn similarity_equals_the_double_sum_over_windows() {
         let (a, b) = (numbers(1, 1), numbers(1, 2));
         let fast = ssim(picture(&a, 1), picture(&b, 1), SCOPE).unwrap();
         assert!((fast - slow(picture(&a, 1), picture(&b, 1), 255.0, 0)).abs() < 1e-12, "{fast}");
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_identical_has_similarity_one() {
+    fn identical_pictures_have_similarity_one() {
         let a = numbers(2, 3);
         assert_eq!(ssim(picture(&a, 2), picture(&a, 2), SCOPE), Some(1.0));
     }

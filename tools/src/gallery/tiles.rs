@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn what_shows_nothing_has_a_range_all_the_same() {
+    fn empty_pictures_have_a_range_too() {
         for tile in look((7.0, 7.0), &[7.0, f32::NAN]).tiles().unwrap() {
             for picture in [[f32::NAN; 4], [7.0; 4], [-1.0; 4], [0.0; 4]] {
                 assert_eq!(tile.image(&picture, 2).unwrap().pixels.len(), 4, "{}", tile.label);

@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_script_makes_what_needs_it() {
+    fn archives_of_the_script_need_peers() {
         let names = |peers| Subject::usual(peers).into_iter().map(Subject::name).collect::<Vec<_>>();
         assert_eq!(names(true), ["demo", "plate", "plate_fe", "vortex", "cloud"]);
         assert_eq!(names(false), ["demo", "smooth", "moving", "oscillating", "noise", "sparse"]);

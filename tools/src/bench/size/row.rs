@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_value_breaks_every_bound_and_outlives_json() {
+    fn an_infinite_error_exceeds_every_bound_and_survives_json() {
         let row = Row { largest_error: f64::INFINITY, ..Row::example("sz3-4d", 10, false) };
         assert!(!row.holds());
         let text = serde_json::to_string(&row).expect("it is written");

@@ -14,14 +14,14 @@ use wavesplat::base::error::Result;
 
 /// The paper's tolerance, about 5/256.
 const TOLERANCE: f64 = 0.02;
-/// The scheme, frames of its window, and how many times faster than the conventional method the paper has it:
-/// with its transform, and without (a further view).
+/// The scheme, frames of its window, and its speed-up over the conventional method in the paper: with the transform, and
+/// without it (a further view).
 const PAPER: [(Scheme, usize, f64, f64); 2] =
     [(Scheme::Haar, 32, 4.1, 1643.0 / (323.3 + 8.0)), (Scheme::Multi, 33, 2.9, 1643.0 / (341.6 + 15.4))];
 const CONVENTIONAL: [(&str, Method); 2] = [("direct", Method::Direct), ("textbook", Method::Textbook)];
 
 impl Bench<'_> {
-    /// Rows without targets: the paper's numbers stand in their notes.
+    /// Rows without targets. Their notes give the paper's numbers.
     pub(super) fn paper(&self, say: &mut dyn FnMut(&str)) -> Result<Vec<Row>> {
         say("making the paper's case");
         let small = self.config.dims.iter().all(|[x, y, z, _]| x * y * z < 75 * 75 * 20);

@@ -8,7 +8,7 @@ use crate::bench::size::Data;
 use std::path::{Path, PathBuf};
 use wavesplat::render::default_splat_error;
 
-/// A way of converting, and how closely.
+/// A scheme and a tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coded {
     pub(super) scheme: Scheme,
@@ -27,7 +27,7 @@ impl Coded {
     }
 }
 
-/// What of an archive is measured.
+/// The measurements of an archive.
 pub(super) struct Plan<'a> {
     pub(super) data: &'a Data,
     /// The default scheme at every tolerance, then Haar.
@@ -154,7 +154,7 @@ impl Plan<'_> {
         tasks
     }
 
-    /// The default scheme as close as it was measured.
+    /// The file of the default scheme with the smallest tolerance.
     pub(super) fn finest(&self) -> &Coded {
         let of_auto = self.files.iter().filter(|f| f.scheme == Scheme::Auto);
         of_auto.min_by(|a, b| a.tolerance.total_cmp(&b.tolerance)).unwrap_or(&self.files[0])

@@ -46,7 +46,7 @@ fn made(results: &Results) -> String {
     text
 }
 
-/// How much the clock ran ahead of the processor: where that is far from 1, others used it too.
+/// The ratio of wall time to processor time; far above 1, other programs used the processor, too.
 fn noise(results: &Results) -> String {
     let one = |a: &&Archive| {
         let alone = a.measured.iter().filter(|(key, m)| key.ends_with(" x1") && m.from_storage.is_none());

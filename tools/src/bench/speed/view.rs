@@ -25,14 +25,14 @@ pub(super) struct View {
     pub(super) input: PathBuf,
     pub(super) method: Method,
     pub(super) camera: CameraSettings,
-    /// What splatting may add.
+    /// The error that splatting may add, as a share of the value range.
     pub(super) splat_error: f64,
     pub(super) frames: Vec<usize>,
     /// A box of voxels; by default all.
     pub(super) region: Option<[[usize; 3]; 2]>,
-    /// What the root mean square of the pixels' errors may be expected to come to, in the samples' unit.
+    /// The limit of the expected root mean square error of the pixels, in the samples' unit.
     pub(super) allowed: Option<f64>,
-    /// With nothing of the input in the cache.
+    /// Whether to drop the input from the system's cache first.
     pub(super) cold: bool,
 }
 
@@ -47,7 +47,7 @@ pub(super) enum Method {
     Direct,
     /// From an archive, by a table of footprints.
     Textbook,
-    /// What that takes before the first frame.
+    /// Only the set-up of the table, before the first frame.
     TextbookSetUp,
 }
 
@@ -117,7 +117,7 @@ enum Opened {
     Textbook(Box<dyn FrameSource>),
 }
 
-/// What became of a view.
+/// The renderer's report about a view.
 struct Shown {
     splatting: Option<f64>,
     method: String,
