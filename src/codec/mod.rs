@@ -2,7 +2,8 @@
 //!
 //! [`encode`] transforms, truncates and quantises samples, decodes the result, and stores the samples that miss the
 //! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
-//! renderer use it. To change the transform along time, only this folder's use of [`crate::wavelet`] must change.
+//! renderer use it. Nothing here depends on the kind of transform along time, except that samples without one
+//! (`Basis::Samples`) may also be predicted along time.
 
 pub(crate) mod bound;
 pub(crate) mod buffer;
