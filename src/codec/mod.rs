@@ -10,6 +10,7 @@ pub(crate) mod buffer;
 mod check;
 pub(crate) mod decode;
 pub(crate) mod encode;
+mod error_weights;
 pub(crate) mod field;
 mod gain;
 mod load;
@@ -20,7 +21,6 @@ mod rows;
 pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
-mod weigh;
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};
