@@ -29,7 +29,8 @@ use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 use std::time::Instant;
 
-/// Renders a composite or a maximum intensity projection slab by slab, one view after another. Progress counts rows of pixels of slabs.
+/// Renders a composite or a maximum intensity projection slab by slab, one view after another. Progress counts rows of
+/// pixels of slabs.
 pub(super) fn composite(
     scene: &mut dyn Scene,
     config: &RenderConfig,

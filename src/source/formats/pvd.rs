@@ -1,6 +1,6 @@
 //! ParaView's `.pvd`: a list of files and their times.
 
-use super::xml::{attribute, required};
+use super::shared::xml::{attribute, required};
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
 use crate::source::file_header::FrameFiles;

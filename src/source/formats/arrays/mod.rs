@@ -17,7 +17,7 @@ mod vtkhdf;
 #[cfg(feature = "zarr")]
 mod zarr;
 
-use super::component;
+use super::shared::component;
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
@@ -186,7 +186,7 @@ pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchi
         #[cfg(feature = "netcdf")]
         true => open_netcdf(path, options),
         #[cfg(not(feature = "netcdf"))]
-        true => Err(super::not_built_in(path, super::Format::NetCdf)),
+        true => Err(super::not_built_in(path, super::Format::NetCdf, "netcdf")),
         false => Ok(archive),
     }
 }

@@ -3,9 +3,9 @@
 mod data;
 mod header;
 
-use super::component;
-use super::directions::{Directions, Placed};
-use super::words::numbers;
+use super::shared::component;
+use super::shared::directions::{Directions, Placed};
+use super::shared::words::numbers;
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;

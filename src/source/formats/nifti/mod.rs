@@ -5,8 +5,8 @@ mod header;
 
 pub(in crate::source) use header::is_nifti;
 
-use super::component;
-use super::deflated::{Compression, Stream};
+use super::shared::component;
+use super::shared::deflated::{Compression, Stream};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;

@@ -7,8 +7,8 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
 use crate::source::file_header::{DataLocation, Part, Stored, check_size};
-use crate::source::formats::deflated::{Compression, Stream, check_room};
-use crate::source::formats::pieces::{self, Piece, Pieces};
+use crate::source::formats::shared::deflated::{Compression, Stream, check_room};
+use crate::source::formats::shared::pieces::{self, Piece, Pieces};
 use crate::source::layout::{Counts, Layout};
 use std::path::Path;
 

@@ -9,8 +9,8 @@ mod image;
 mod pieced;
 mod skeleton;
 
-use super::component::{self, Chosen};
-use super::directions::{Directions, Placed};
+use super::shared::component::{self, Chosen};
+use super::shared::directions::{Directions, Placed};
 use crate::base::error::{Error, Result};
 use crate::source::file_header::{FileHeader, Stored};
 use crate::source::layout::Shape;

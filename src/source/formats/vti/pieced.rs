@@ -7,7 +7,7 @@ use super::header::{VtiArray, VtiPiece};
 use super::image::VtiFile;
 use crate::base::error::{Error, Result};
 use crate::source::file_header::{DataLocation, Part};
-use crate::source::formats::pieces::{self, Pieces};
+use crate::source::formats::shared::pieces::{self, Pieces};
 use crate::source::layout::Shape;
 use std::path::Path;
 

@@ -5,9 +5,9 @@ mod lines;
 
 pub(in crate::source) use header::MAGIC;
 
-use super::component::{self, Chosen};
-use super::pieces::{Piece, Pieces};
-use super::text::Words;
+use super::shared::component::{self, Chosen};
+use super::shared::pieces::{Piece, Pieces};
+use super::shared::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::file_header::{DataLocation, FileHeader, Part, Stored};
