@@ -3,11 +3,11 @@
 //! To add a format:
 //!
 //! 1. Read its header into a [`FileHeader`] in a file or folder of its own here. [`shared`] has what formats have in
-//!    common. The header says where the frames are ([`DataLocation`](crate::source::file_header)), or how to decode them.
+//!    common. The header says where the frames are, or how to decode them (`source/parts.rs`).
 //! 2. Add a variant to [`Format`] and extensions to `EXTENSIONS`; the compiler then asks for the rest. If files without
 //!    an extension can be recognised, add their first bytes to `Format::by_content`.
-//! 3. Name it in `tools/guide/formats.md` and the README, add it to the tests of inputs, and name its crate, if it has one,
-//!    in `tests/layering.rs`.
+//! 3. Name it in `tools/guide/formats.md` and the README, add it to the tests of inputs, and name its crate, if it has
+//!    one, in `tests/layering.rs`.
 
 #[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 mod arrays;
