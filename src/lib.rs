@@ -67,23 +67,37 @@
 //!
 //! # Folders
 //!
-//! The folders below `src/` follow the path of the data:
+//! The folders below `src/`. Each uses only folders listed before it; so the order is nearly the path of the data.
 //!
 //! | folder | content |
 //! |---|---|
 //! | `base` | errors, grids, samples, mapped files, output files |
-//! | `source` | input formats behind one trait: frames in order, a window at a time |
 //! | `colour` | transfer functions, and the colours of pixels |
+//! | `source` | input formats behind one trait: frames in order, a window at a time |
 //! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
 //! | `codec` | one block: samples to codes under the error bound, and back |
 //! | `file` | the coefficient file: open, verify, recover, continue |
-//! | `convert` | frames to a coefficient file: reader, workers and writer |
 //! | `view` | cameras and footprints (eq 4) |
+//! | `convert` | frames to a coefficient file: reader, workers and writer |
 //! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
 //! | `extract` | a coefficient file back to samples and to files of other programs |
 //! | `cli` | what the programs in `bin/` share |
 //!
 //! The bytes of a coefficient file are a package of their own, `wavesplat-format`. [`method`] explains the mathematics.
+//!
+//! # From a file to a pixel
+//!
+//! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.
+//! 2. `render` (`render/mod.rs`) makes a `ViewSetup` of each view, and calls `project` or, for modes with slabs,
+//!    `composite`. Both loop over batches of frames with `for_each_batch` (`render/driver.rs`).
+//! 3. `Scene::open` (`render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
+//! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/batch.rs`), decodes
+//!    it (`codec/decode.rs`) and gives the values of its planes (`render/scenes/coded.rs`).
+//! 5. The values are added to a lattice (`render/splat/lattice/spread.rs`), or to pixels (`render/splat/footprints.rs`).
+//! 6. `PixelReconstructor::tile` (`render/reconstruct.rs`) gathers the planes at pixels from the lattice
+//!    (`render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`wavelet/`), and divides by
+//!    weights.
+//! 7. `Sink::picture` (`render/sink/mod.rs`) colours and writes each picture.
 //!
 //! # Words
 //!
@@ -119,21 +133,21 @@
 //! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all
 //!   operations are correctly rounded or come from `libm`.
 //! - Memory use follows the budget, not the size of the archive.
-//! - A transform can be replaced: other folders use it through the trait `wavelet::TimeBasis` only. A data source of the
-//!   renderer can be replaced, too: see [`render::Scene`].
+//! - All folders transform through the trait `wavelet::TimeBasis`. Its page says what else a new basis needs. A data
+//!   source of the renderer can be replaced, too: see [`render::Scene`].
 
 pub use base::error::{Error, Result};
 pub use base::grid::{Grid, Region};
 pub use base::sample::SampleType;
 
 pub mod base;
-pub mod source;
 pub mod colour;
+pub mod source;
 mod wavelet;
 mod codec;
 pub mod file;
-pub mod convert;
 pub mod view;
+pub mod convert;
 pub mod render;
 pub mod extract;
 #[doc(hidden)]

@@ -91,8 +91,11 @@ fn floor(room: &str) -> Option<usize> {
 
 #[test]
 fn modules_use_only_lower_layers() {
-    for (path, code) in sources() {
-        let from = room(&path);
+    let all = sources();
+    let order = modules(&all.iter().find(|(path, _)| path == "lib.rs").expect("src/lib.rs").1);
+    let at = |room: &str| order.iter().position(|module| module == room);
+    for (path, code) in &all {
+        let from = room(path);
         if matches!(from, "lib" | "bin") {
             continue;
         }
@@ -102,6 +105,7 @@ fn modules_use_only_lower_layers() {
             let to: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
             let Some(other) = floor(&to) else { continue };
             assert!(to == from || other < own, "src/{path}: {from} may not use {to}");
+            assert!(at(&to) <= at(from), "src/{path}: lib.rs lists {from} before {to}, so it may not use it");
         }
     }
 }
@@ -112,6 +116,11 @@ const ORDERED: [&str; 6] = ["base", "view", "file", "render", "render/splat", "r
 /// The modules of a folder, in the order of its `mod.rs`.
 fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
     let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/mod.rs")).expect("a folder with a mod.rs");
+    modules(code)
+}
+
+/// The modules that a file names, in order.
+fn modules(code: &str) -> Vec<String> {
     let module = |line: &str| Some(line.split("mod ").nth(1)?.strip_suffix(';')?.to_string());
     code.lines().filter(|line| !line.starts_with(' ')).filter_map(module).collect()
 }

@@ -20,7 +20,8 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// The name used on the command line and in reports.
+    /// The name used in reports. The command line differs for [`Self::Samples`]: this basis is only useful with a
+    /// pyramid, and is called "pyramid" there.
     pub fn name(self) -> &'static str {
         match self {
             Self::Haar => "haar",

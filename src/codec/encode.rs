@@ -13,12 +13,12 @@
 
 use super::buffer::clear;
 use super::check::Tally;
+use super::error_weights::QuantizerSetup;
 use super::load::{Missing, load_group};
 use super::pyramid::PredictionPasses;
 use super::refine::{Coded, Source};
 use super::rows::Change;
 use super::truncate::Group;
-use super::weigh::QuantizerSetup;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};

@@ -4,8 +4,8 @@
 //! memory than eight bytes for every sample.
 
 use super::WindowCodec;
+use super::error_weights::QuantizerSetup;
 use super::truncate::Group;
-use super::weigh::QuantizerSetup;
 use crate::base::sample;
 use crate::wavelet::{LANES, Lane};
 

@@ -2,13 +2,15 @@
 //!
 //! [`encode`] transforms, truncates and quantises samples, decodes the result, and stores the samples that miss the
 //! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
-//! renderer use it. To change the transform along time, only this folder's use of [`crate::wavelet`] must change.
+//! renderer use it. Nothing here depends on the kind of transform along time, except that samples without one
+//! (`Basis::Samples`) may also be predicted along time.
 
 pub(crate) mod bound;
 pub(crate) mod buffer;
 mod check;
 pub(crate) mod decode;
 pub(crate) mod encode;
+mod error_weights;
 pub(crate) mod field;
 mod gain;
 mod load;
@@ -19,7 +21,6 @@ mod rows;
 pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
-mod weigh;
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};

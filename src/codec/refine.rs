@@ -6,13 +6,13 @@
 
 use super::buffer::clear;
 use super::check::{Compared, Tally};
+use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::load::{Missing, load_group};
 use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
-use super::weigh::QuantizerSetup;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use crate::codec::bound::Measure;

@@ -2,11 +2,11 @@
 
 use super::WindowCodec;
 use super::buffer::clear;
+use super::error_weights::QuantizerSetup;
 use super::load::Missing;
 use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::refine::Source;
-use super::weigh::QuantizerSetup;
 use wavesplat_format::{Pyramid, estimate_cells};
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.

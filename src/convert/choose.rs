@@ -47,8 +47,11 @@ impl SchemeConstraint {
 impl From<Basis> for SchemeConstraint {
     /// The bases of [Dobashi](crate::bibliography) along time alone, others with a pyramid.
     fn from(basis: Basis) -> Self {
-        let alone = matches!(basis, Basis::Haar | Basis::Multi);
-        Self { basis: Some(basis), space: if alone { SpatialPredictor::Alone } else { SpatialPredictor::Any } }
+        let space = match basis {
+            Basis::Haar | Basis::Multi => SpatialPredictor::Alone, // the published method, for comparisons
+            Basis::Samples | Basis::Learned => SpatialPredictor::Any, // only a pyramid makes these files small
+        };
+        Self { basis: Some(basis), space }
     }
 }
 

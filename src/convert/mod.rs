@@ -384,7 +384,8 @@ fn batch_len(
 fn most_coefficients(config: &ConvertConfig) -> usize {
     match config.coding.basis {
         Some(basis @ (Basis::Haar | Basis::Multi)) => wavelet::basis(basis, &[], config.window).coefficients(),
-        _ => config.window,
+        // as many as frames; without a given basis, one of these two is chosen
+        Some(Basis::Samples | Basis::Learned) | None => config.window,
     }
 }
 

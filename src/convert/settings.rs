@@ -17,8 +17,7 @@ pub(super) fn stored_settings(
     colour_transform: Option<&ColourTransform>,
 ) -> Vec<(String, String)> {
     let ConvertConfig { coding, window, level, missing, range, .. } = config;
-    let basis = BASES.iter().find(|(_, basis)| *basis == coding.basis).map_or("auto", |(name, _)| name);
-    let space = SPACES.iter().find(|(_, space)| *space == coding.space).map_or("auto", |(name, _)| name);
+    let (basis, space) = (basis_name(coding.basis), space_name(coding.space));
     let missing = if *missing == MissingPolicy::Mask { "mask" } else { "error" };
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
@@ -38,8 +37,8 @@ pub(super) fn stored_settings(
 /// The configuration of the conversion that wrote a file, to append to it; none if the file's settings are incomplete.
 pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
     let named = |name: &str| setting(file, name);
-    let basis = BASES.iter().find(|(name, _)| named("basis") == Some(name))?.1;
-    let space = SPACES.iter().find(|(name, _)| named("space") == Some(name))?.1;
+    let basis = BASES.into_iter().find(|basis| named("basis") == Some(basis_name(*basis)))?;
+    let space = SPACES.into_iter().find(|space| named("space") == Some(space_name(*space)))?;
     let range = match named("range") {
         Some(range) => Some(range.split_once(',').and_then(|(lo, hi)| Some((number(lo)?, number(hi)?)))?),
         None => None,
@@ -171,17 +170,35 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
 const OWN: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
 
-const BASES: [(&str, Option<Basis>); 5] = [
-    ("auto", None),
-    ("haar", Some(Basis::Haar)),
-    ("multi", Some(Basis::Multi)),
-    ("learned", Some(Basis::Learned)),
-    ("pyramid", Some(Basis::Samples)),
-];
+/// The stored name of a basis, which is that of the option. No basis means that any is allowed.
+fn basis_name(basis: Option<Basis>) -> &'static str {
+    match basis {
+        None => "auto",
+        Some(Basis::Haar) => "haar",
+        Some(Basis::Multi) => "multi",
+        Some(Basis::Learned) => "learned",
+        Some(Basis::Samples) => "pyramid",
+    }
+}
 
-const SPACES: [(&str, SpatialPredictor); 4] = [
-    ("auto", SpatialPredictor::Any),
-    ("none", SpatialPredictor::Alone),
-    ("linear", SpatialPredictor::Pyramid(Stencil::Linear)),
-    ("cubic", SpatialPredictor::Pyramid(Stencil::Cubic)),
+/// The stored name of a prediction in space, which is that of the option.
+fn space_name(space: SpatialPredictor) -> &'static str {
+    match space {
+        SpatialPredictor::Any => "auto",
+        SpatialPredictor::Alone => "none",
+        SpatialPredictor::Pyramid(Stencil::Linear) => "linear",
+        SpatialPredictor::Pyramid(Stencil::Cubic) => "cubic",
+    }
+}
+
+/// What [`of_file`] finds by name. The settings of a file with a name that is missing here are incomplete.
+const BASES: [Option<Basis>; 5] =
+    [None, Some(Basis::Haar), Some(Basis::Multi), Some(Basis::Learned), Some(Basis::Samples)];
+
+/// As [`BASES`].
+const SPACES: [SpatialPredictor; 4] = [
+    SpatialPredictor::Any,
+    SpatialPredictor::Alone,
+    SpatialPredictor::Pyramid(Stencil::Linear),
+    SpatialPredictor::Pyramid(Stencil::Cubic),
 ];

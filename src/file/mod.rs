@@ -1,6 +1,6 @@
 //! The `.wspl` file and its safety: opening it, reporting what it promises, checking it, and saving what is whole.
 //!
-//! [`CoefficientFile`] is the only door from the format package to this library. Nothing here writes blocks (that is
+//! [`CoefficientFile`] is the only door to stored bytes. Nothing here writes blocks (that is
 //! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
 
 mod counted;

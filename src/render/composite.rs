@@ -1,5 +1,5 @@
-//! Composites and maximum intensity projections: splats every frame batch slab by slab, and blends the slabs front to
-//! back.
+//! The modes with slabs, which are composites and maximum intensity projections: splats every frame batch slab by slab,
+//! and blends the slabs front to back.
 //!
 //! ```text
 //! for each view
@@ -29,7 +29,8 @@ use crate::wavelet::{LANES, Lane};
 use std::ops::Range;
 use std::time::Instant;
 
-/// Renders slab by slab, one view after another. Progress counts rows of pixels of slabs.
+/// Renders a composite or a maximum intensity projection slab by slab, one view after another. Progress counts rows of
+/// pixels of slabs.
 pub(super) fn composite(
     scene: &mut dyn Scene,
     config: &RenderConfig,

@@ -121,6 +121,7 @@ pub enum Limit {
     Expected,
 }
 
+// `RenderConfig::new` is in scene.rs, because the defaults depend on the scene.
 impl RenderConfig {
     /// Width and height of the pictures.
     pub(super) fn size(&self) -> [usize; 2] {

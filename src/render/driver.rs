@@ -1,4 +1,4 @@
-//! The loop over frame batches, shared by projections and composites.
+//! The loop over frame batches, shared by projections and the modes with slabs.
 
 use super::config::RenderConfig;
 use super::expectation::Expectation;
@@ -12,7 +12,7 @@ use crate::base::error::Result;
 pub(super) struct Job<'a> {
     pub(super) config: &'a RenderConfig,
     pub(super) budget: &'a Budget<'a>,
-    /// The views in which to estimate errors; empty for composites.
+    /// The views in which to estimate errors; empty unless pictures are projections.
     pub(super) views: &'a [Expectation<'a>],
 }
 

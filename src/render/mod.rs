@@ -12,7 +12,7 @@
 //! for each cell of a lattice from which the pixels are computed. Coefficients are splatted once for all frames of a
 //! window, and a new view needs no new conversion. Partial sums over any split of the voxels add up.
 //!
-//! The modules are listed in the order of the data path, from codes to pixels. Each uses only the modules above it.
+//! Each module uses only the modules listed above it:
 //!
 //! ```text
 //! config            the caller's settings
@@ -20,12 +20,14 @@
 //! splat/            a view's camera and backend; blocks into bands; bands into tiles
 //! weights           the divisors of means; expectation: the effect of block errors on the pixels of a view
 //! scene             the source of blocks: a frame batch and the blocks selected for it
+//! report            what a rendering did: counts, times and errors
 //! scenes/           a coefficient file or an archive's frames as a scene
 //! slabs/            composites and maximum intensity projections: the volume in slabs
-//! plan              how much fits in memory; weigh: the weights of a view
+//! plan              how much fits in memory
+//! certificate       the error bound of a pixel; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
-//! project, composite   the pictures of each batch
+//! project           the pictures of a batch as projections; composite: slab by slab
 //! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!

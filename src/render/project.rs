@@ -4,7 +4,6 @@ use super::config::RenderConfig;
 use super::driver::{Job, RenderedBatch, for_each_batch};
 use super::expectation::Expectation;
 use super::plan::Budget;
-use super::plane_values::{BlockPlanes, BlockSource};
 use super::reconstruct::PixelReconstructor;
 use super::report::{RenderReport, Rendered, lap};
 use super::scene::{FrameBatch, Scene};
@@ -69,16 +68,6 @@ fn expect(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize,
     (0..frames).for_each(|_| *sum += mean);
 }
 
-impl BlockSource for &dyn FrameBatch {
-    fn fetch(&self, blocks: &[usize]) -> Result<()> {
-        FrameBatch::fetch(*self, blocks)
-    }
-
-    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        FrameBatch::planes(*self, block)
-    }
-}
-
 /// Renders all frames of a batch from some views.
 fn render_batch(
     batch: &dyn FrameBatch,
@@ -89,7 +78,7 @@ fn render_batch(
     let layout = batch.layout();
     let blocks = visible_blocks(batch, weighted, report);
     let reconstructors: Vec<_> = weighted.iter().map(|view| PixelReconstructor::new(batch, view, config)).collect();
-    let empty = |pixels: &PixelReconstructor<'_>| vec![f32::NAN; pixels.planes() * budget.pixels()];
+    let empty = |pixels: &PixelReconstructor<'_>| vec![f32::NAN; pixels.pictures() * budget.pixels()];
     let mut pictures: Vec<Vec<f32>> = reconstructors.iter().map(empty).collect();
     for rows in budget.bands(&layout) {
         let mut bands: Vec<_> =

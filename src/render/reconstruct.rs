@@ -26,7 +26,7 @@ impl<'a> PixelReconstructor<'a> {
     }
 
     /// Number of pictures of a tile: one for each frame, and one more for its error bounds if pictures are certified.
-    pub(super) fn planes(&self) -> usize {
+    pub(super) fn pictures(&self) -> usize {
         self.layout.frames * (1 + usize::from(self.certificate.is_some()))
     }
 

@@ -7,7 +7,7 @@
 use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
 use super::layout::Layout;
-use super::plane_values::BlockPlanes;
+use super::plane_values::{BlockPlanes, BlockSource};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::memory;
@@ -99,7 +99,7 @@ pub struct BatchRequest<'a> {
     pub channel: usize,
     /// The settings of the rendering.
     pub config: &'a RenderConfig,
-    /// The views in which to estimate errors; empty for composites.
+    /// The views in which to estimate errors; empty unless pictures are projections.
     pub views: &'a [Expectation<'a>],
 }
 
@@ -140,6 +140,16 @@ pub trait FrameBatch: Sync {
     fn finish(&self) -> Result<BatchOutcome>;
 }
 
+impl BlockSource for &dyn FrameBatch {
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        FrameBatch::fetch(*self, blocks)
+    }
+
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        FrameBatch::planes(*self, block)
+    }
+}
+
 /// Computes the frames at some pixels (second argument) from all planes (first argument). May overwrite the planes.
 pub type Inverse<'a> = dyn FnMut(&mut [Lane], &mut [Lane]) + 'a;
 
@@ -157,8 +167,8 @@ pub enum BatchOutcome {
 pub struct Selection {
     /// Blocks that touch the region and add to a plane, ascending.
     pub blocks: Vec<usize>,
-    /// For composites: every block that touches the region, with a range that holds its samples as splatted. The range
-    /// is inverted if all samples are missing. Empty for projections.
+    /// For modes with slabs: every block that touches the region, with a range that holds its samples as splatted. The
+    /// range is inverted if all samples are missing. Empty for projections.
     pub ranges: Vec<(usize, (f64, f64))>,
     /// Number of blocks that hold nothing in the region.
     pub empty: u64,

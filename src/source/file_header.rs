@@ -1,129 +1,17 @@
 //! The description of an input file, the same for every format.
 
-use super::layout::{Layout, Shape, Strides};
-use super::packing::Packing;
-use super::spill_buffer::SpillBuffer;
+use super::layout::Shape;
+use super::parts::Part;
 use super::{Advised, Parsed};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
-use crate::base::mapped::{FileBytes, State};
-use crate::base::sample::SampleType;
-use std::fmt::Debug;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use crate::base::mapped::FileBytes;
 
 const FIRST_READ: usize = 4 << 10; // bytes of a header
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
 
 /// Spacings and origins are equal if they differ by less than this part of the spacing.
 const SAME_PLACE: f64 = 1e-6;
-
-/// The files of an archive, in order.
-#[derive(Debug, Default)]
-pub(super) struct FrameFiles {
-    /// The files, at least one, none twice.
-    pub(super) paths: Vec<PathBuf>,
-    /// Time of each where a list says so, else empty.
-    pub(super) times: Vec<f64>,
-    /// What a user should know about how they were found.
-    pub(super) notes: Vec<Note>,
-}
-
-impl FrameFiles {
-    /// Checks what a list says of files and times.
-    pub(super) fn of_list(self) -> Parsed<Self> {
-        if !self.times.is_empty() && self.times.len() != self.paths.len() {
-            return Err("gives a time to some of its files only".into());
-        }
-        if let Some(at) = self.times.windows(2).position(|t| t[0] == t[1]) {
-            return Err(format!("lists two files for the time {}; one is supported", self.times[at]));
-        }
-        Ok(self)
-    }
-}
-
-/// Some frames in one file.
-#[derive(Debug)]
-pub(super) struct Part {
-    /// The file.
-    pub(super) path: PathBuf,
-    /// Its state when it was checked.
-    pub(super) state: State,
-    /// Number of frames.
-    pub(super) frames: usize,
-    /// How they are stored, once they are decoded.
-    pub(super) stored: Stored,
-    /// Where they are.
-    pub(super) at: DataLocation,
-}
-
-impl Part {
-    /// Frames one after another from a byte of a file, x fastest.
-    pub(super) fn plain(
-        (path, state): (&Path, State),
-        (shape, frames): (&Shape, usize),
-        big_endian: bool,
-        start: u64,
-    ) -> Parsed<Self> {
-        let stored = Stored::plain(shape, frames, big_endian)?;
-        Ok(Self { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
-    }
-}
-
-/// How the samples of some frames are stored.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stored {
-    /// The type of the stored numbers.
-    pub(super) sample: SampleType,
-    /// Whether these have their most significant byte first.
-    pub(super) big_endian: bool,
-    /// Where they are.
-    pub(super) strides: Strides,
-    /// Bytes of all of them.
-    pub(super) bytes: usize,
-    /// How they become samples; None if they are the samples.
-    pub(super) packing: Option<Packing>,
-}
-
-impl Stored {
-    /// Samples in the order of an array, as they are.
-    pub(super) fn new(layout: &Layout, sample: SampleType, big_endian: bool) -> Parsed<Self> {
-        let (strides, bytes) = (layout.strides(sample.size())?, layout.bytes(sample.size())?);
-        Ok(Self { sample, big_endian, strides, bytes, packing: None })
-    }
-
-    /// Frames one after another, x fastest.
-    pub(super) fn plain(shape: &Shape, frames: usize, big_endian: bool) -> Parsed<Self> {
-        Self::new(&Layout::plain(shape.dims(), frames), shape.sample(), big_endian)
-    }
-}
-
-/// Where the bytes of a part are.
-#[derive(Debug)]
-pub(super) enum DataLocation {
-    /// In the file as they are, from this byte.
-    Byte(u64),
-    /// In the file, but packed.
-    Decoded(Box<dyn Decode>),
-}
-
-/// Frames that must be decoded before boxes can be read.
-pub(super) trait Decode: Debug + Send {
-    /// Frames whose bytes are packed together, counted from the part's first: they are decoded at once, and
-    /// [`Part::stored`] is how so many lie together.
-    fn together(&self) -> usize {
-        1
-    }
-
-    /// Writes the bytes of `frames` that are packed together.
-    ///
-    /// # Errors
-    /// What is wrong with the file.
-    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()>;
-
-    /// Closes the file, since an archive may have more files than can be open. Decoding can still continue.
-    fn rest(&mut self) {}
-}
 
 /// Units of samples, times and places, if the files have them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! A window of frames whose bytes are at known places. All formats copy boxes with it.
 
 use super::FrameWindow;
-use super::file_header::Stored;
 use super::layout::Shape;
+use super::parts::Stored;
 use super::spill_buffer::SpillBuffer;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;

@@ -1,13 +1,36 @@
 //! Expands the inputs of the user to a list of files in the order of time.
 
-use super::file_header::FrameFiles;
 use super::formats::{self, Format, file_series, pvd};
-use super::{OpenOptions, numbering};
+use super::{OpenOptions, Parsed, numbering};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::STANDARD;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// The files of an archive, in order.
+#[derive(Debug, Default)]
+pub(super) struct FrameFiles {
+    /// The files, at least one, none twice.
+    pub(super) paths: Vec<PathBuf>,
+    /// Time of each where a list says so, else empty.
+    pub(super) times: Vec<f64>,
+    /// What a user should know about how they were found.
+    pub(super) notes: Vec<Note>,
+}
+
+impl FrameFiles {
+    /// Checks what a list says of files and times.
+    pub(super) fn of_list(self) -> Parsed<Self> {
+        if !self.times.is_empty() && self.times.len() != self.paths.len() {
+            return Err("gives a time to some of its files only".into());
+        }
+        if let Some(at) = self.times.windows(2).position(|t| t[0] == t[1]) {
+            return Err(format!("lists two files for the time {}; one is supported", self.times[at]));
+        }
+        Ok(self)
+    }
+}
 
 /// The files that the inputs stand for.
 pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {

@@ -14,6 +14,7 @@ mod inputs;
 mod layout;
 mod numbering;
 mod packing;
+mod parts;
 pub(crate) mod scan;
 mod select;
 mod series;

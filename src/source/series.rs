@@ -1,8 +1,10 @@
 //! Several files of any format as one archive.
 
-use super::file_header::{DataLocation, FileHeader, FrameFiles, Part};
+use super::file_header::FileHeader;
 use super::frames::{Bytes, Frame, Frames};
+use super::inputs::FrameFiles;
 use super::layout::Shape;
+use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
 use crate::base::error::{Error, Note, Remedy, Result};

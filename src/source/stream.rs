@@ -1,9 +1,9 @@
 //! Frames from a pipe: forward only, one window held at a time, in memory or in a temporary file.
 
-use super::file_header::Stored;
 use super::formats::{self, Format, npy, raw};
 use super::frames::{Bytes, Frame, Frames};
 use super::layout::Shape;
+use super::parts::Stored;
 use super::series::{check_grid, override_grid};
 use super::spill_buffer::{SpillBuffer, read_some};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};

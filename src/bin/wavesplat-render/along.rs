@@ -39,27 +39,69 @@ pub(crate) enum ModeName {
     Mip,
 }
 
+impl ModeName {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Projection => "projection",
+            Self::Composite => "composite",
+            Self::Mip => "mip",
+        }
+    }
+
+    /// Whether samples along the ray have colours and opacities. In the other modes pixels have values, for --colormap.
+    pub(crate) fn colours_samples(self) -> bool {
+        match self {
+            Self::Composite => true,
+            Self::Projection | Self::Mip => false,
+        }
+    }
+
+    /// Whether the volume is cut into slabs.
+    fn has_slabs(self) -> bool {
+        match self {
+            Self::Composite | Self::Mip => true,
+            Self::Projection => false,
+        }
+    }
+
+    /// Why --transfer-function does not apply to the mode, if it does not.
+    fn refuse_colours(self, is_direct: bool) -> Option<String> {
+        let why = match self {
+            Self::Composite => return None,
+            Self::Projection if is_direct => return None, // frames are turned into colours before they are splatted
+            Self::Projection => {
+                "with a coefficient file, it colours samples along the ray (--mode composite); --colormap colours \
+                 projections, and wavesplat convert --transfer-function makes files of colours"
+            }
+            Self::Mip => "--mode mip takes --colormap",
+        };
+        Some(format!("--transfer-function: {why}"))
+    }
+
+    /// The names of all modes with a property, for messages.
+    fn names(of: impl Fn(Self) -> bool) -> String {
+        let modes = Self::value_variants().iter().filter(|mode| of(**mode));
+        modes.map(|mode| mode.name()).collect::<Vec<_>>().join(" or ")
+    }
+}
+
 impl AlongArgs {
     /// An error if an option does not apply to the mode.
     pub(crate) fn check(&self, is_direct: bool, colour_map: bool) -> Result<()> {
-        let composite = self.mode == ModeName::Composite;
-        let colours = "colours samples along the ray (--mode composite); --colormap colours projections, and wavesplat convert \
-                       --transfer-function makes files of colours";
-        let wrong = [
-            (self.opacity.is_some() && !composite, "--opacity: needs --mode composite"),
-            (self.opacity_unit.is_some() && !composite, "--opacity-unit: needs --mode composite"),
-            (self.slabs.is_some() && self.mode == ModeName::Projection, "--slabs: needs --mode composite or mip"),
-            (composite && colour_map, "--colormap: a composite takes its colours from --transfer-function"),
-            (
-                self.transfer_function.is_some() && self.mode == ModeName::Mip,
-                "--transfer-function: --mode mip takes --colormap",
-            ),
-        ];
-        if let Some((_, what)) = wrong.into_iter().find(|(wrong, _)| *wrong) {
+        let needs = |given: bool, option: &str, of: fn(ModeName) -> bool| {
+            (given && !of(self.mode)).then(|| format!("{option}: needs --mode {}", ModeName::names(of)))
+        };
+        let colours = || {
+            (colour_map && self.mode.colours_samples())
+                .then(|| format!("--colormap: a {} takes its colours from --transfer-function", self.mode.name()))
+        };
+        let refused = needs(self.opacity.is_some(), "--opacity", ModeName::colours_samples)
+            .or_else(|| needs(self.opacity_unit.is_some(), "--opacity-unit", ModeName::colours_samples))
+            .or_else(|| needs(self.slabs.is_some(), "--slabs", ModeName::has_slabs))
+            .or_else(colours)
+            .or_else(|| self.transfer_function.as_ref().and_then(|_| self.mode.refuse_colours(is_direct)));
+        if let Some(what) = refused {
             return Err(Error::usage(what));
-        }
-        if self.transfer_function.is_some() && self.mode == ModeName::Projection && !is_direct {
-            return Err(Error::usage(format!("--transfer-function: with a coefficient file, it {colours}")));
         }
         let positive = self.opacity_unit.is_none_or(|unit| unit.is_finite() && unit > 0.0);
         if positive { Ok(()) } else { Err(Error::usage("--opacity-unit: takes a length above 0")) }
@@ -67,13 +109,13 @@ impl AlongArgs {
 
     /// The name of the colours of a composite, or of coloured frames.
     pub(crate) fn colours(&self) -> Option<&str> {
-        let of_composite = (self.mode == ModeName::Composite).then_some("viridis");
+        let of_composite = self.mode.colours_samples().then_some("viridis");
         self.transfer_function.as_deref().or(of_composite)
     }
 
     /// Whether the range of a composite's colours is automatic: neither given nor stored with the colours.
     pub(crate) fn is_automatic(&self, range: Option<Pair>) -> Result<bool> {
-        let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite && range.is_none()) else {
+        let Some(name) = self.colours().filter(|_| self.mode.colours_samples() && range.is_none()) else {
             return Ok(false);
         };
         Ok(!TransferFunction::open(name)?.is_of_values())
@@ -81,22 +123,23 @@ impl AlongArgs {
 
     /// The colours of a composite of a file, over the given range, their own range, or that of all samples.
     pub(crate) fn of_file(&self, range: Option<Pair>, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
-        let Some(name) = self.colours().filter(|_| self.mode == ModeName::Composite) else { return Ok(None) };
+        let Some(name) = self.colours().filter(|_| self.mode.colours_samples()) else { return Ok(None) };
         stretched(open_colours("--transfer-function", name)?, range, || Ok(file.source_range())).map(Some)
     }
 
-    /// The mode with these colours.
+    /// The mode with these colours, which a composite needs.
     pub(crate) fn mode(&self, colours: Option<&TransferFunction>) -> Result<Mode> {
         let slabs = self.slabs;
-        Ok(match (self.mode, colours) {
-            (ModeName::Composite, Some(transfer)) => {
+        Ok(match self.mode {
+            ModeName::Projection => Mode::Projection,
+            ModeName::Composite => {
+                let transfer = colours.ok_or_else(|| Error::usage("--mode composite: needs --transfer-function"))?;
                 let points = self.opacity.as_ref().map(|points| transfer.with_opacity(&points.0));
                 let transfer = points.unwrap_or_else(|| Ok(transfer.clone()));
                 let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
                 Mode::Composite { transfer, unit: self.opacity_unit, slabs }
             }
-            (ModeName::Mip, _) => Mode::Mip { slabs },
-            _ => Mode::Projection,
+            ModeName::Mip => Mode::Mip { slabs },
         })
     }
 }

@@ -53,11 +53,7 @@ impl Cli {
                 MethodName::Coefficients => "coefficients",
                 MethodName::Direct => "direct",
             },
-            mode: match self.along.mode {
-                ModeName::Projection => "projection",
-                ModeName::Composite => "composite",
-                ModeName::Mip => "mip",
-            },
+            mode: self.along.mode.name(),
             quantity: (self.along.mode == ModeName::Projection).then_some(quantity),
             ..Provenance::default()
         }

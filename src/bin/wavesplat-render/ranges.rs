@@ -107,7 +107,12 @@ impl Cli {
             return Ok(Ranges::default());
         }
         check(scene, config)?; // before small pictures are rendered, so that errors name the full size
-        let mode = if config.mode.is_projection() { Mode::Projection } else { Mode::Mip { slabs: Some(FEW_SLABS) } };
+        let mode = match config.mode {
+            Mode::Projection => Mode::Projection,
+            // The colours of a composite are those of its samples, and the largest samples along rays are enough to
+            // find where they end.
+            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
+        };
         Ranges::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
     }
 

@@ -1,6 +1,5 @@
 //! The scene to render: a coefficient file, or frames.
 
-use crate::along::ModeName;
 use crate::args::{Cli, MethodName};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,7 +75,7 @@ impl Cli {
             }
             None => None,
         };
-        let before = colours.clone().filter(|_| self.along.mode == ModeName::Projection);
+        let before = colours.clone().filter(|_| !self.along.mode.colours_samples());
         let scene = match before {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),

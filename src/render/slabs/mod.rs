@@ -1,4 +1,5 @@
-//! Composites slab by slab: cuts the volume, computes the medium of a slab, and blends slabs.
+//! Composites and maximum intensity projections, slab by slab: cuts the volume, computes the medium of a slab, and
+//! blends slabs, by compositing or by their maximum.
 //!
 //! The volume is cut into slabs perpendicular to the view direction, as in image-aligned splatting
 //! ([Mueller](crate::bibliography)). The functions here are pure; [`super::composite`] calls them.
@@ -11,8 +12,9 @@
 //! w_{i,slab} = w_i (Phi((far - z_i) / sigma) - Phi((near - z_i) / sigma))                                 (eq 29)
 //! ```
 //!
-//! With these weights, a pixel of a slab has the length l = sum of w and the mean g = sum of w v / l. Its light follows
-//! the emission-absorption model of [Max](crate::bibliography):
+//! With these weights, a pixel of a slab has the length l = sum of w and the mean g = sum of w v / l. A maximum
+//! intensity projection takes the largest g of all slabs. The light of a composite follows the emission-absorption
+//! model of [Max](crate::bibliography):
 //!
 //! ```text
 //! through = exp(-kappa(g) l)        kappa(v) = -ln(1 - opacity(v)) / unit                                 (eq 30)

@@ -2,7 +2,7 @@
 
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::file_header::FrameFiles;
+use crate::source::inputs::FrameFiles;
 use serde::Deserialize;
 use std::fs;
 use std::path::Path;

@@ -1,26 +1,26 @@
 //! Which format a file has: by its extension, or by its first bytes where the extension says nothing.
+//!
+//! To add a format:
+//!
+//! 1. Read its header into a [`FileHeader`] in a file or folder of its own here. [`shared`] has what formats have in
+//!    common. The header says where the frames are, or how to decode them (`source/parts.rs`).
+//! 2. Add a variant to [`Format`] and extensions to `EXTENSIONS`; the compiler then asks for the rest. If files without
+//!    an extension can be recognised, add their first bytes to `Format::by_content`.
+//! 3. Name it in `tools/guide/formats.md` and the README, add it to the tests of inputs, and name its crate, if it has
+//!    one, in `tests/layering.rs`.
 
 #[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 mod arrays;
-mod association;
-mod base64;
-mod component;
-mod deflated;
-mod directions;
 pub(in crate::source) mod file_series;
 mod metaimage;
 mod nifti;
 pub(in crate::source) mod npy;
 mod nrrd;
-mod pattern;
-mod pieces;
 pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
-mod text;
+mod shared;
 mod vti;
 mod vtk;
-mod words;
-mod xml;
 
 pub use npy::{ArrayHeader, array_header};
 
@@ -107,7 +107,34 @@ impl Format {
 
     /// Whether a file of it holds frames, and says itself what they are.
     pub(in crate::source) fn holds_frames(self) -> bool {
-        !matches!(self, Self::Pvd | Self::FileSeries | Self::Coefficients)
+        match self {
+            Self::Npy
+            | Self::Nrrd
+            | Self::Nifti
+            | Self::MetaImage
+            | Self::Vti
+            | Self::Vtk
+            | Self::Hdf5
+            | Self::NetCdf
+            | Self::Zarr => true,
+            Self::Pvd | Self::FileSeries | Self::Coefficients => false,
+        }
+    }
+
+    /// Whether the option `axes` may say what the axes of its arrays count. Other formats say that themselves.
+    fn takes_axes(self) -> bool {
+        match self {
+            Self::Hdf5 | Self::NetCdf | Self::Zarr => true,
+            Self::Npy
+            | Self::Nrrd
+            | Self::Nifti
+            | Self::MetaImage
+            | Self::Vti
+            | Self::Vtk
+            | Self::Pvd
+            | Self::FileSeries
+            | Self::Coefficients => false,
+        }
     }
 
     /// What people call it.
@@ -179,17 +206,24 @@ fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<Format>> {
 
 /// The variables of a file among which the user must choose; none if it is clear which one is meant.
 pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
-    match format_of(path, options)? {
+    let Some(format) = format_of(path, options)? else { return Ok(Vec::new()) };
+    match format {
         #[cfg(feature = "hdf5")]
-        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.undecided(),
+        Format::Hdf5 => arrays::open_hdf5(path, options)?.undecided(),
         #[cfg(feature = "netcdf")]
-        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.undecided(),
+        Format::NetCdf => arrays::open_netcdf(path, options)?.undecided(),
         #[cfg(feature = "zarr")]
-        Some(Format::Zarr) => arrays::open_zarr(path, options)?.undecided(),
-        Some(Format::Vti) => vti::undecided(path),
-        Some(Format::Vtk) => vtk::undecided(path),
-        Some(Format::Nrrd | Format::Nifti | Format::MetaImage) => Ok(components(path, options)),
-        _ => Ok(Vec::new()),
+        Format::Zarr => arrays::open_zarr(path, options)?.undecided(),
+        Format::Vti => vti::undecided(path),
+        Format::Vtk => vtk::undecided(path),
+        Format::Nrrd | Format::Nifti | Format::MetaImage => Ok(components(path, options)),
+        #[cfg(not(feature = "hdf5"))]
+        Format::Hdf5 => Ok(Vec::new()), // opening it says that it is not built in
+        #[cfg(not(feature = "netcdf"))]
+        Format::NetCdf => Ok(Vec::new()),
+        #[cfg(not(feature = "zarr"))]
+        Format::Zarr => Ok(Vec::new()),
+        Format::Npy | Format::Pvd | Format::FileSeries | Format::Coefficients => Ok(Vec::new()),
     }
 }
 
@@ -226,11 +260,11 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         #[cfg(feature = "zarr")]
         Some(Format::Zarr) => arrays::open_zarr(path, options)?.describe(options),
         #[cfg(not(feature = "hdf5"))]
-        Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5)),
+        Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5, "hdf5")),
         #[cfg(not(feature = "netcdf"))]
-        Some(Format::NetCdf) => Err(not_built_in(path, Format::NetCdf)),
+        Some(Format::NetCdf) => Err(not_built_in(path, Format::NetCdf, "netcdf")),
         #[cfg(not(feature = "zarr"))]
-        Some(Format::Zarr) => Err(not_built_in(path, Format::Zarr)),
+        Some(Format::Zarr) => Err(not_built_in(path, Format::Zarr, "zarr")),
         Some(Format::Pvd | Format::FileSeries) => Err(Error::path(path, "a list of files must be the only input")),
         Some(Format::Coefficients) => Err(Error::path(path, "is a coefficient file already, not frames to convert")),
         None if options.dims.is_none() => Err(unknown(path)),
@@ -240,12 +274,7 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
 
 /// The error of a format whose crates this build does not have.
 #[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "zarr")))]
-fn not_built_in(path: &Path, format: Format) -> Error {
-    let feature = match format {
-        Format::Hdf5 => "hdf5",
-        Format::NetCdf => "netcdf",
-        _ => "zarr",
-    };
+fn not_built_in(path: &Path, format: Format, feature: &'static str) -> Error {
     Error::input(path, Note::with(format!("{} is not built in", format.name()), Remedy::BuildWith(feature)))
 }
 
@@ -261,7 +290,7 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
         (options.big_endian, "big_endian"),
         (options.offset > 0, "offset"),
         (options.variable.is_some() && format == Format::Npy, "variable"),
-        (options.axes.is_some() && !matches!(format, Format::Hdf5 | Format::NetCdf | Format::Zarr), "axes"),
+        (options.axes.is_some() && !format.takes_axes(), "axes"),
     ];
     let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
     let what = match setting {

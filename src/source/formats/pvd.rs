@@ -1,9 +1,9 @@
 //! ParaView's `.pvd`: a list of files and their times.
 
-use super::xml::{attribute, required};
+use super::shared::xml::{attribute, required};
 use crate::base::error::{Error, Result};
 use crate::source::Parsed;
-use crate::source::file_header::FrameFiles;
+use crate::source::inputs::FrameFiles;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;

@@ -3,8 +3,9 @@
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::OpenOptions;
-use crate::source::file_header::{FileHeader, Part, check_size};
+use crate::source::file_header::{FileHeader, check_size};
 use crate::source::layout::Shape;
+use crate::source::parts::Part;
 use std::path::Path;
 
 /// The frames that the options `dims` and `sample` describe, and how many of them if `dims` says so.

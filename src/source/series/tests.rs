@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::base::sample::SampleType;
-use crate::source::file_header::{Decode, Mismatch, Stored, Units};
+use crate::source::file_header::{Mismatch, Units};
 use crate::source::open;
+use crate::source::parts::{Decode, Stored};
 use crate::source::testing::{DIMS, Folder, message, payload, refused};
 use std::sync::Mutex;
 

@@ -17,12 +17,13 @@ mod vtkhdf;
 #[cfg(feature = "zarr")]
 mod zarr;
 
-use super::component;
+use super::shared::component;
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
-use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units};
+use crate::source::file_header::{FileHeader, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
+use crate::source::parts::{DataLocation, Part, Stored};
 use crate::source::{self, Advised, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
@@ -186,7 +187,7 @@ pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchi
         #[cfg(feature = "netcdf")]
         true => open_netcdf(path, options),
         #[cfg(not(feature = "netcdf"))]
-        true => Err(super::not_built_in(path, super::Format::NetCdf)),
+        true => Err(super::not_built_in(path, super::Format::NetCdf, "netcdf")),
         false => Ok(archive),
     }
 }

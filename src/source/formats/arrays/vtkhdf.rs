@@ -2,7 +2,7 @@
 
 use super::{ArrayFile, Attribute, Variable};
 use crate::source::Parsed;
-use crate::source::formats::association::Association;
+use crate::source::formats::shared::association::Association;
 
 /// What such a file says of its arrays.
 pub(super) struct Image {

@@ -5,10 +5,11 @@ use super::header::MetaImageHeader;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::file_header::{DataLocation, Part, check_size};
-use crate::source::formats::deflated::{Compression, Deflated, Place, check_room};
-use crate::source::formats::pattern;
-use crate::source::formats::pieces::{Piece, Pieces, Stream};
+use crate::source::file_header::check_size;
+use crate::source::formats::shared::deflated::{Compression, Deflated, Place, check_room};
+use crate::source::formats::shared::pattern;
+use crate::source::formats::shared::pieces::{Piece, Pieces, Stream};
+use crate::source::parts::{DataLocation, Part};
 use std::path::{Path, PathBuf};
 
 /// The files that hold the frames, checked for their size.

@@ -1,7 +1,7 @@
 //! The text of a MetaImage header: fields, and the list of data files that may end it.
 
 use crate::source::Parsed;
-use crate::source::formats::words::shortened;
+use crate::source::formats::shared::words::shortened;
 use std::collections::HashMap;
 
 /// The fields of a header, and where it ends.

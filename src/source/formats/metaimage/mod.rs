@@ -3,15 +3,16 @@
 mod data;
 mod header;
 
-use super::component;
-use super::directions::{Directions, Placed};
-use super::words::numbers;
+use super::shared::component;
+use super::shared::directions::{Directions, Placed};
+use super::shared::words::numbers;
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::file_header::{FileHeader, Stored, growing_head};
+use crate::source::file_header::{FileHeader, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::parts::Stored;
 use crate::source::{Advised, Parsed};
 use header::MetaImageHeader;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! What the header of a NIfTI says: 348 bytes in version 1, 540 in version 2, in either byte order.
 
 use crate::source::Parsed;
-use crate::source::formats::directions::Directions;
+use crate::source::formats::shared::directions::Directions;
 
 /// Bytes of the longest header.
 pub(super) const LONGEST: usize = SECOND;

@@ -5,15 +5,16 @@ mod header;
 
 pub(in crate::source) use header::is_nifti;
 
-use super::component;
-use super::deflated::{Compression, Stream};
+use super::shared::component;
+use super::shared::deflated::{Compression, Stream};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::file_header::{DataLocation, FileHeader, Part, Stored, Units, check_size, head};
+use crate::source::file_header::{FileHeader, Units, check_size, head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::packing::Packing;
+use crate::source::parts::{DataLocation, Part, Stored};
 use crate::source::{Advised, Parsed};
 use header::{LONGEST, NiftiHeader};
 use std::io::Read;

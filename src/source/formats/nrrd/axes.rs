@@ -3,8 +3,8 @@
 use super::header::{NrrdHeader, vectors};
 use crate::source::Parsed;
 use crate::source::file_header::Units;
-use crate::source::formats::directions::Directions;
-use crate::source::formats::words::{list, numbers};
+use crate::source::formats::shared::directions::Directions;
+use crate::source::formats::shared::words::{list, numbers};
 
 /// The axes of an array, numbered from the fastest as in the file.
 #[derive(Debug)]

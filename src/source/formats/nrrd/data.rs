@@ -6,10 +6,11 @@ use super::header::NrrdHeader;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::source::Parsed;
-use crate::source::file_header::{DataLocation, Part, Stored, check_size};
-use crate::source::formats::deflated::{Compression, Stream, check_room};
-use crate::source::formats::pieces::{self, Piece, Pieces};
+use crate::source::file_header::check_size;
+use crate::source::formats::shared::deflated::{Compression, Stream, check_room};
+use crate::source::formats::shared::pieces::{self, Piece, Pieces};
 use crate::source::layout::{Counts, Layout};
+use crate::source::parts::{DataLocation, Part, Stored};
 use std::path::Path;
 
 const PIECE: usize = 64 << 10; // bytes read at a time when lines are counted

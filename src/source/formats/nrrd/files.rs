@@ -1,7 +1,7 @@
 //! The names of the data files of a NRRD.
 
 use crate::source::Parsed;
-use crate::source::formats::pattern;
+use crate::source::formats::shared::pattern;
 
 /// What `data file` says.
 pub(super) enum DataFiles {

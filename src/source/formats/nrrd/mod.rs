@@ -8,8 +8,8 @@ mod header;
 
 pub(in crate::source) use header::MAGIC;
 
-use super::component;
-use super::directions::Placed;
+use super::shared::component;
+use super::shared::directions::Placed;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;

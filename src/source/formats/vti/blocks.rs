@@ -1,7 +1,7 @@
 //! Arrays in blocks, each of which is compressed by zlib.
 
 use super::count::Count;
-use crate::source::formats::words::wrong;
+use crate::source::formats::shared::words::wrong;
 use flate2::bufread::ZlibDecoder;
 use std::io::{self, BufReader, Read, Take};
 

@@ -1,6 +1,6 @@
 //! The numbers that VTK writes before the samples of an array.
 
-use crate::source::formats::words::wrong;
+use crate::source::formats::shared::words::wrong;
 use std::io::{self, ErrorKind, Read};
 
 /// A count that VTK puts before the samples of an array.

@@ -5,11 +5,11 @@ use super::count::Count;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
-use crate::source::formats::base64::Text;
-use crate::source::formats::deflated::FileReader;
-use crate::source::formats::pieces::Packed;
-use crate::source::formats::text::{Characters, Numbers};
-use crate::source::formats::words::wrong;
+use crate::source::formats::shared::base64::Text;
+use crate::source::formats::shared::deflated::FileReader;
+use crate::source::formats::shared::pieces::Packed;
+use crate::source::formats::shared::text::{Characters, Numbers};
+use crate::source::formats::shared::words::wrong;
 use std::io::{self, Read};
 
 /// How bytes are written.

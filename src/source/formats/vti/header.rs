@@ -2,9 +2,9 @@
 
 use super::extent::Extent;
 use crate::source::Parsed;
-use crate::source::formats::association::Association;
-use crate::source::formats::words::array;
-use crate::source::formats::xml::{attribute, required};
+use crate::source::formats::shared::association::Association;
+use crate::source::formats::shared::words::array;
+use crate::source::formats::shared::xml::{attribute, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 

@@ -7,7 +7,7 @@ use super::skeleton::Skeleton;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::{self, SampleType, swap_endian};
-use crate::source::formats::pieces::Packed;
+use crate::source::formats::shared::pieces::Packed;
 use std::io::Read;
 use std::path::Path;
 

@@ -9,12 +9,13 @@ mod image;
 mod pieced;
 mod skeleton;
 
-use super::component::{self, Chosen};
-use super::directions::{Directions, Placed};
+use super::shared::component::{self, Chosen};
+use super::shared::directions::{Directions, Placed};
 use crate::base::error::{Error, Result};
-use crate::source::file_header::{FileHeader, Stored};
+use crate::source::file_header::FileHeader;
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::parts::Stored;
 use crate::source::{Advised, Parsed, VariableInfo};
 use extent::Extent;
 use header::{VtiArray, VtiHeader};

@@ -6,9 +6,9 @@ use super::extent::{Extent, check_pieces};
 use super::header::{VtiArray, VtiPiece};
 use super::image::VtiFile;
 use crate::base::error::{Error, Result};
-use crate::source::file_header::{DataLocation, Part};
-use crate::source::formats::pieces::{self, Pieces};
+use crate::source::formats::shared::pieces::{self, Pieces};
 use crate::source::layout::Shape;
+use crate::source::parts::{DataLocation, Part};
 use std::path::Path;
 
 const MOST: usize = 1 << 14; // pieces: each is compared with every other one

@@ -5,10 +5,10 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::{self, SampleType};
 use crate::source::Parsed;
-use crate::source::formats::association::Association;
-use crate::source::formats::pieces::Packed;
-use crate::source::formats::text::Words;
-use crate::source::formats::words::{array, number, shortened};
+use crate::source::formats::shared::association::Association;
+use crate::source::formats::shared::pieces::Packed;
+use crate::source::formats::shared::text::Words;
+use crate::source::formats::shared::words::{array, number, shortened};
 use std::io::Read;
 
 /// How every such file starts.

@@ -5,14 +5,15 @@ mod lines;
 
 pub(in crate::source) use header::MAGIC;
 
-use super::component::{self, Chosen};
-use super::pieces::{Piece, Pieces};
-use super::text::Words;
+use super::shared::component::{self, Chosen};
+use super::shared::pieces::{Piece, Pieces};
+use super::shared::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::source::file_header::{DataLocation, FileHeader, Part, Stored};
+use crate::source::file_header::FileHeader;
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
+use crate::source::parts::{DataLocation, Part, Stored};
 use crate::source::{Parsed, VariableInfo};
 use header::{VtkArray, VtkHeader, sample_type};
 use std::path::Path;

@@ -4,8 +4,8 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
-use crate::source::file_header::{DataLocation, Decode, Part, Stored};
 use crate::source::layout::{Counts, Layout};
+use crate::source::parts::{DataLocation, Decode, Part, Stored};
 use crate::source::spill_buffer::{SpillBuffer, read_some};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use std::fmt;
@@ -159,7 +159,7 @@ fn damaged(path: &Path, frame: usize, error: &io::Error) -> Error {
 }
 
 /// An error if so few compressed bytes cannot hold so many bytes.
-pub(super) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
+pub(in crate::source) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
     if bytes <= compressed.saturating_mul(MOST) {
         return Ok(());
     }
@@ -168,7 +168,7 @@ pub(super) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
 
 /// Puts what comes from a reader into its place, from `at` on up to `bytes`, and says how many came. `failed` makes an
 /// error of that of reading after some bytes.
-pub(super) fn hold(
+pub(in crate::source) fn hold(
     reader: &mut dyn Read,
     path: &Path,
     (at, bytes): (u64, usize),
@@ -189,7 +189,7 @@ pub(super) fn hold(
 }
 
 /// An error unless exactly `after` bytes follow. Reading to the end also checks the checksum.
-pub(super) fn expect_end(reader: &mut dyn Read, path: &Path, after: u64) -> Result<()> {
+pub(in crate::source) fn expect_end(reader: &mut dyn Read, path: &Path, after: u64) -> Result<()> {
     let bad = |e| Error::input(path, format!("the end of its compressed data is damaged: {e}"));
     let passed = io::copy(&mut reader.take(after), &mut io::sink()).map_err(bad)?;
     match read_some(reader, &mut [0]).map_err(bad)? {
@@ -206,13 +206,13 @@ impl fmt::Debug for Deflated {
 }
 
 /// The bytes of a file one after another.
-pub(super) struct FileReader {
+pub(in crate::source) struct FileReader {
     file: FileBytes,
     at: u64,
 }
 
 impl FileReader {
-    pub(super) fn new(file: FileBytes, start: u64) -> Self {
+    pub(in crate::source) fn new(file: FileBytes, start: u64) -> Self {
         Self { file, at: start }
     }
 }

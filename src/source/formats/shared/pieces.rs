@@ -3,7 +3,7 @@
 use super::deflated::{Compression, FileReader, expect_end, hold};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::source::file_header::Decode;
+use crate::source::parts::Decode;
 use crate::source::spill_buffer::SpillBuffer;
 use std::fmt::Debug;
 use std::io::{self, Read};

@@ -1,0 +1,95 @@
+//! Where the frames of a file are: in the file as they are, or to be decoded first.
+
+use super::Parsed;
+use super::layout::{Layout, Shape, Strides};
+use super::packing::Packing;
+use super::spill_buffer::SpillBuffer;
+use crate::base::error::Result;
+use crate::base::mapped::State;
+use crate::base::sample::SampleType;
+use std::fmt::Debug;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Some frames in one file.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// The file.
+    pub(super) path: PathBuf,
+    /// Its state when it was checked.
+    pub(super) state: State,
+    /// Number of frames.
+    pub(super) frames: usize,
+    /// How they are stored, once they are decoded.
+    pub(super) stored: Stored,
+    /// Where they are.
+    pub(super) at: DataLocation,
+}
+
+impl Part {
+    /// Frames one after another from a byte of a file, x fastest.
+    pub(super) fn plain(
+        (path, state): (&Path, State),
+        (shape, frames): (&Shape, usize),
+        big_endian: bool,
+        start: u64,
+    ) -> Parsed<Self> {
+        let stored = Stored::plain(shape, frames, big_endian)?;
+        Ok(Self { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
+    }
+}
+
+/// How the samples of some frames are stored.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stored {
+    /// The type of the stored numbers.
+    pub(super) sample: SampleType,
+    /// Whether these have their most significant byte first.
+    pub(super) big_endian: bool,
+    /// Where they are.
+    pub(super) strides: Strides,
+    /// Bytes of all of them.
+    pub(super) bytes: usize,
+    /// How they become samples; None if they are the samples.
+    pub(super) packing: Option<Packing>,
+}
+
+impl Stored {
+    /// Samples in the order of an array, as they are.
+    pub(super) fn new(layout: &Layout, sample: SampleType, big_endian: bool) -> Parsed<Self> {
+        let (strides, bytes) = (layout.strides(sample.size())?, layout.bytes(sample.size())?);
+        Ok(Self { sample, big_endian, strides, bytes, packing: None })
+    }
+
+    /// Frames one after another, x fastest.
+    pub(super) fn plain(shape: &Shape, frames: usize, big_endian: bool) -> Parsed<Self> {
+        Self::new(&Layout::plain(shape.dims(), frames), shape.sample(), big_endian)
+    }
+}
+
+/// Where the bytes of a part are.
+#[derive(Debug)]
+pub(super) enum DataLocation {
+    /// In the file as they are, from this byte.
+    Byte(u64),
+    /// In the file, but packed.
+    Decoded(Box<dyn Decode>),
+}
+
+/// Frames that must be decoded before boxes can be read.
+pub(super) trait Decode: Debug + Send {
+    /// Frames whose bytes are packed together, counted from the part's first: they are decoded at once, and
+    /// [`Part::stored`] is how so many lie together.
+    fn together(&self) -> usize {
+        1
+    }
+
+    /// Writes the bytes of `frames` that are packed together.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()>;
+
+    /// Closes the file, since an archive may have more files than can be open. Decoding can still continue.
+    fn rest(&mut self) {}
+}
