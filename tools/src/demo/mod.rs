@@ -99,6 +99,11 @@ impl Run {
         self.seconds().iter().sum()
     }
 
+    /// Seconds without the transform.
+    fn view(&self) -> f64 {
+        self.seconds()[1..].iter().sum()
+    }
+
     /// The guaranteed bound; the conventional method needs none.
     fn bound(&self) -> f64 {
         self.converted.as_ref().map_or(0.0, |(report, _)| report.delta)
