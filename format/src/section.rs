@@ -4,6 +4,7 @@ use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::file_id::FileId;
 use crate::{Error, Result, Storage};
+use std::cell::RefCell;
 use std::fmt;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 use zstd::zstd_safe;
@@ -190,6 +191,11 @@ pub(crate) fn compress_directory(raw: &[u8]) -> Result<Vec<u8>> {
     Ok(compressor.compress(raw)?)
 }
 
+thread_local! {
+    /// One for each thread, as its tables take longer to allocate than a small part to decompress.
+    static DECOMPRESSOR: RefCell<Option<zstd::bulk::Decompressor<'static>>> = const { RefCell::new(None) };
+}
+
 /// Decompresses exactly one zstd frame, which must declare and hold exactly `raw_len` bytes. The caller limits `raw_len`.
 pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> ParseResult<Vec<u8>> {
     let whole = zstd_safe::find_frame_compressed_size(stored) == Ok(stored.len());
@@ -197,7 +203,14 @@ pub(crate) fn decompress(stored: &[u8], raw_len: u32) -> ParseResult<Vec<u8>> {
     ensure(stored.get(4).is_some_and(|descriptor| descriptor & 4 != 0), || "the zstd frame has no checksum".into())?;
     let declared = zstd_safe::get_frame_content_size(stored).ok().flatten();
     ensure(declared == Some(u64::from(raw_len)), || format!("the zstd frame does not declare {raw_len} bytes"))?;
-    let raw = zstd::bulk::decompress(stored, raw_len as usize).map_err(|e| format!("zstd: {e}"))?;
+    let raw = DECOMPRESSOR.with_borrow_mut(|slot| {
+        let decompressor = match slot {
+            Some(decompressor) => decompressor,
+            None => slot.insert(zstd::bulk::Decompressor::new()?),
+        };
+        decompressor.decompress(stored, raw_len as usize)
+    });
+    let raw = raw.map_err(|e| format!("zstd: {e}"))?;
     ensure(raw.len() == raw_len as usize, || format!("{} bytes decompressed instead of {raw_len}", raw.len()))?;
     Ok(raw)
 }

@@ -9,9 +9,10 @@ pub(crate) mod series;
 pub(crate) mod views;
 
 use memory::Memory;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use tempfile::TempDir;
+use tempfile::NamedTempFile;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
@@ -42,15 +43,15 @@ pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertCo
     ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..ConvertConfig::new(tolerance) }
 }
 
-/// A coefficient file in its own folder.
+/// A coefficient file without a folder of its own: thousands of folders take longer to create than their files to write.
 pub(crate) struct Stored {
-    folder: TempDir,
+    file: NamedTempFile,
     pub(crate) report: ConvertReport,
 }
 
 impl Stored {
     pub(crate) fn path(&self) -> PathBuf {
-        self.folder.path().join("a.wspl")
+        self.file.path().into()
     }
 
     pub(crate) fn open(&self) -> CoefficientFile {
@@ -65,9 +66,9 @@ impl Stored {
 pub(crate) fn stored(source: &mut dyn FrameSource, config: &ConvertConfig) -> Stored {
     let mut bytes = Vec::new();
     let report = convert(source, config, Path::new("a.wspl"), &mut bytes, &Silent).unwrap();
-    let stored = Stored { folder: tempfile::tempdir().unwrap(), report };
-    std::fs::write(stored.path(), bytes).unwrap();
-    stored
+    let mut file = tempfile::Builder::new().suffix(".wspl").tempfile().unwrap();
+    file.write_all(&bytes).unwrap();
+    Stored { file, report }
 }
 
 /// A coefficient file in which one block, (window, block), holds wrong samples. The metadata is consistent with them.
