@@ -77,13 +77,13 @@
 //! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
 //! | `codec` | one block: samples to codes under the error bound, and back |
 //! | `file` | the coefficient file: open, verify, recover, continue |
-//! | `view` | cameras and footprints (eq 4) |
+//! | `view` | cameras and footprints (eq 1 to 3, 14) |
 //! | `convert` | frames to a coefficient file: reader, workers and writer |
 //! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
 //! | `extract` | a coefficient file back to samples and to files of other programs |
 //! | `cli` | what the programs in `bin/` share |
 //!
-//! The bytes of a coefficient file are a package of their own, `wavesplat-format`. [`method`] explains the mathematics.
+//! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](format). [`method`] explains the mathematics.
 //!
 //! # From a file to a pixel
 //!
@@ -117,10 +117,10 @@
 //!
 //! A test reads the sources and checks these rules.
 //!
-//! - A folder uses only folders below it: `base`; then `colour`, `wavelet` and `view`; then `source`; then `codec`; then
+//! - A folder uses only earlier folders of this list: `base`; then `colour`, `wavelet` and `view`; then `source`; then `codec`; then
 //!   `file`; then `convert`, `render` and `extract`; then `cli`; then the programs.
 //! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
-//! - Each crate from outside is used in the files listed in `tests/layering.rs` only. So threads start in few places.
+//! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `base/mapped.rs`.
 //!
 //! These rules are not checked by that test:
@@ -139,6 +139,7 @@
 pub use base::error::{Error, Result};
 pub use base::grid::{Grid, Region};
 pub use base::sample::SampleType;
+pub use wavesplat_format as format;
 
 pub mod base;
 pub mod colour;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The library's modules from the lowest to the highest layer. A module may only use lower ones.
-const FLOORS: [&[&str]; 7] = [
+const LAYERS: [&[&str]; 7] = [
     &["base"],
     &["colour", "wavelet", "view"],
     &["source"],
@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 7] = [
 ];
 
 /// The files below `src/` in which each third-party crate may be used.
-const HOMES: [(&str, &[&str]); 21] = [
+const ALLOWED_FILES: [(&str, &[&str]); 21] = [
     ("memmap2::", &["base/mapped.rs"]),
     ("libc::", &["base/mapped.rs"]),
     ("crossbeam_channel::", &["convert/"]),
@@ -81,29 +81,29 @@ fn sources() -> Vec<(String, String)> {
         .collect()
 }
 
-fn room(path: &str) -> &str {
+fn folder_of(path: &str) -> &str {
     path.split('/').next().unwrap().trim_end_matches(".rs")
 }
 
-fn floor(room: &str) -> Option<usize> {
-    FLOORS.iter().position(|rooms| rooms.contains(&room))
+fn layer(folder: &str) -> Option<usize> {
+    LAYERS.iter().position(|folders| folders.contains(&folder))
 }
 
 #[test]
 fn modules_use_only_lower_layers() {
     let all = sources();
     let order = modules(&all.iter().find(|(path, _)| path == "lib.rs").expect("src/lib.rs").1);
-    let at = |room: &str| order.iter().position(|module| module == room);
+    let at = |folder: &str| order.iter().position(|module| module == folder);
     for (path, code) in &all {
-        let from = room(path);
+        let from = folder_of(path);
         if matches!(from, "lib" | "bin") {
             continue;
         }
-        assert!(!code.contains("crate::{"), "src/{path}: name rooms one by one, so that they can be read here");
-        let own = floor(from).unwrap_or_else(|| panic!("{path}: '{from}' has no floor"));
+        assert!(!code.contains("crate::{"), "src/{path}: name modules one by one, so that they can be read here");
+        let own = layer(from).unwrap_or_else(|| panic!("{path}: '{from}' is in no layer"));
         for used in code.split("crate::").skip(1) {
             let to: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            let Some(other) = floor(&to) else { continue };
+            let Some(other) = layer(&to) else { continue };
             assert!(to == from || other < own, "src/{path}: {from} may not use {to}");
             assert!(at(&to) <= at(from), "src/{path}: lib.rs lists {from} before {to}, so it may not use it");
         }
@@ -125,16 +125,23 @@ fn modules(code: &str) -> Vec<String> {
     code.lines().filter(|line| !line.starts_with(' ')).filter_map(module).collect()
 }
 
-/// The modules of a folder that a file below it names.
-fn siblings<'a>(folder: &str, below: &str, code: &'a str) -> impl Iterator<Item = &'a str> {
-    let is_direct = !below.contains('/') || below.ends_with("/mod.rs") && below.matches('/').count() == 1;
-    let prefix = if below.contains('/') { "super::super::" } else { "super::" };
-    let absolute = format!("crate::{}::", folder.replace('/', "::"));
-    let relative = move |code: &'a str| code.split(prefix).skip(usize::from(is_direct));
-    let named = |rest: &'a str| rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
-    let from_root: Vec<&str> = code.split(absolute.as_str()).skip(1).map(named).collect();
-    let from_here: Vec<&str> = if is_direct { relative(code).map(named).collect() } else { Vec::new() };
-    from_root.into_iter().chain(from_here)
+/// The modules of a folder that a file below it names. `below` is the file's path from there.
+fn siblings<'a>(folder: &str, below: &str, code: &'a str) -> Vec<&'a str> {
+    let levels = below.matches('/').count() + usize::from(!below.ends_with("mod.rs"));
+    let (absolute, relative) = (format!("crate::{}::", folder.replace('/', "::")), "super::".repeat(levels));
+    let from_root = code.split(absolute.as_str()).skip(1);
+    // A longer chain of `super` leaves the folder.
+    let leaves = |at: usize| code[..at].ends_with("super::") || code[at + relative.len()..].starts_with("super");
+    let from_here = code.match_indices(&relative).filter(|(at, _)| !leaves(*at));
+    from_root.chain(from_here.map(|(at, _)| &code[at + relative.len()..])).flat_map(named).collect()
+}
+
+/// The names that a path goes on with: one, or a list in braces.
+fn named(rest: &str) -> Vec<&str> {
+    let word = |item: &str| item.len() - item.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').len();
+    let Some(list) = rest.strip_prefix('{') else { return vec![&rest[..word(rest)]] };
+    let list = &list[..list.find(';').unwrap_or(list.len())];
+    list.split(',').map(str::trim_start).map(|item| &item[..word(item)]).collect()
 }
 
 #[test]
@@ -161,19 +168,19 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
 #[test]
 fn every_crate_is_used_only_where_it_is_listed() {
     for (path, code) in sources() {
-        for (name, homes) in HOMES {
+        for (name, allowed) in ALLOWED_FILES {
             let uses = code
                 .match_indices(name)
                 .any(|(i, _)| !code[..i].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'));
-            let at_home = homes.iter().any(|h| path.starts_with(h));
-            assert!(!uses || at_home, "src/{path} uses {name}");
+            let is_allowed = allowed.iter().any(|file| path.starts_with(file));
+            assert!(!uses || is_allowed, "src/{path} uses {name}");
         }
     }
 }
 
 /// Whether a path is of the programs or of what they share: only these know options.
 fn knows_options(path: &str) -> bool {
-    matches!(room(path), "bin" | "cli")
+    matches!(folder_of(path), "bin" | "cli")
 }
 
 #[test]

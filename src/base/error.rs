@@ -1,4 +1,4 @@
-//! The error type of the library. Its kinds differ in what the caller can do.
+//! The error type of the library. Variants are grouped by who can mend the cause.
 
 pub use super::remedy::{Note, Remedy};
 
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Why an operation ended early.
 ///
-/// The kind says who can help: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever
+/// The variant says who can mend it: the machine ([`Error::Io`]), the caller ([`Error::Setting`], [`Error::Path`]), whoever
 /// made the data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or no one
 /// ([`Error::BoundMissed`]). Messages name fields, files and values. [`Error::remedy`] says what helps, if that is
 /// known.
@@ -72,7 +72,7 @@ pub enum Error {
         /// What helps.
         remedy: Option<Remedy>,
     },
-    /// A coefficient file is damaged or from a newer version. Recover it ([`Error::remedy`]), or use that version.
+    /// A coefficient file cannot be read, is damaged, or is from a newer version. [`Error::remedy`] says what helps.
     #[error("{}: {source}", path.display())]
     CoefficientFile {
         /// The file.

@@ -1,4 +1,4 @@
-//! Errors and notes of the library in the words of the programs: options for fields, advice for remedies.
+//! Words errors and notes of the library as options of the programs.
 
 use crate::base::error::{Error, Note, Remedy};
 use crate::source::extensions;
@@ -46,7 +46,7 @@ fn option(setting: &str, command: &Command) -> String {
 /// Advice that names options of the programs.
 fn advice(remedy: &Remedy) -> Cow<'static, str> {
     let fixed = match remedy {
-        Remedy::Set(field) => return format!("--{field} changes this").into(),
+        Remedy::Set(field) => return format!("--{} changes this", name(field)).into(),
         Remedy::ChooseVariable => "--variable chooses one",
         Remedy::ChooseComponent { name, components } => {
             return format!("--variable '{name}[0]' takes the first, up to [{}]", components.saturating_sub(1)).into();

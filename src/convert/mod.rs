@@ -72,7 +72,7 @@ pub enum MissingPolicy {
 /// ```
 #[derive(Debug, Clone)]
 pub struct ConvertConfig {
-    /// The scheme, or what of it is fixed. Default: the smallest is found for every window.
+    /// Restricts the choice of scheme. Default: the smallest is found for every window.
     pub coding: SchemeConstraint,
     /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
     pub window: usize,

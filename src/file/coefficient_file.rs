@@ -167,7 +167,7 @@ impl CoefficientFile {
         self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
     }
 
-    /// The window that holds a frame.
+    /// The window that holds a frame; the last one for frames past the end.
     pub fn window_of(&self, frame: usize) -> u32 {
         self.metadata().windows.partition_point(|w| w.first_frame as usize <= frame) as u32 - 1
     }
@@ -197,7 +197,10 @@ impl CoefficientFile {
         leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
     }
 
-    /// Takes damaged blocks for blocks of missing samples from here on, once all are read to find them.
+    /// Reads every block, then treats damaged ones as missing samples.
+    ///
+    /// # Errors
+    /// The storage cannot be read.
     pub fn skip_damaged(mut self) -> Result<Self> {
         let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
         let leaves: Vec<_> = leaves.copied().collect();
@@ -229,7 +232,10 @@ impl CoefficientFile {
         self.skipped.as_ref().filter(|damage| !damage.blocks.is_empty())
     }
 
-    /// An error that tells what was left out, if anything was: for the end of what was done with the rest.
+    /// An error that names the damaged blocks that were skipped, if any were. Call it last.
+    ///
+    /// # Errors
+    /// Blocks were skipped.
     pub fn refuse_skipped(&self) -> Result<()> {
         self.skipped().and_then(Damage::words).map_or(Ok(()), |what| Err(Error::input(&self.path, what)))
     }

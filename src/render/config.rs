@@ -133,9 +133,17 @@ impl RenderConfig {
         self.allowed.is_some() && self.limited == Limit::Expected
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    /// An error unless a scene with this number of frames can be rendered with these settings. `None` means unknown.
+    pub(super) fn check(&self, scene_frames: Option<usize>) -> Result<()> {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
             return Err(Error::setting("views", "takes one view or more, with pictures of one size"));
+        }
+        let some = scene_frames.unwrap_or(usize::MAX);
+        if !self.frames.is_sorted() || self.frames.last().is_some_and(|last| *last >= some) {
+            return Err(Error::setting("frames", format!("takes numbers below {some}, ascending")));
+        }
+        if !(self.splat_error.is_finite() && self.splat_error >= 0.0) {
+            return Err(Error::setting("splat_error", "takes a number of 0 or more"));
         }
         if self.mode.is_projection() {
             return Ok(());

@@ -154,7 +154,7 @@ fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
 
 /// The setups of all views.
 fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
-    config.check()?;
+    config.check(scene.frames())?;
     if scene.channels() > 1 && !config.mode.is_projection() {
         let what = "the samples are colours already, and colours are rendered as projections only";
         return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));

@@ -209,7 +209,11 @@ pub trait FrameSource: Send {
     }
 }
 
-/// The samples of a region of some frames of a window, frame after frame, each of `ty.size()` bytes.
+/// The samples of a region of some frames of a window, frame after frame, each of `ty.size()` bytes. `ty` must be the
+/// sample type of the window's archive.
+///
+/// # Errors
+/// The source cannot be read, or changed while it was read.
 pub fn read_frames(
     window: &dyn FrameWindow,
     frames: impl ExactSizeIterator<Item = usize>,
@@ -231,6 +235,9 @@ pub(crate) fn read_frames_into(
 ) -> Result<()> {
     let frame_bytes = region.voxels() * ty.size();
     samples.resize(frame_bytes * frames.len(), 0);
+    if frame_bytes == 0 {
+        return Ok(());
+    }
     for (frame, bytes) in frames.zip(samples.chunks_exact_mut(frame_bytes)) {
         window.read_box(frame, region, bytes)?;
     }

@@ -22,7 +22,7 @@ pub(super) struct Part {
     pub(super) frames: usize,
     /// How they are stored, once they are decoded.
     pub(super) stored: Stored,
-    /// Where they are.
+    /// Where the bytes begin.
     pub(super) at: DataLocation,
 }
 
@@ -46,7 +46,7 @@ pub(super) struct Stored {
     pub(super) sample: SampleType,
     /// Whether these have their most significant byte first.
     pub(super) big_endian: bool,
-    /// Where they are.
+    /// Byte steps between voxels and frames.
     pub(super) strides: Strides,
     /// Bytes of all of them.
     pub(super) bytes: usize,

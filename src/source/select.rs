@@ -12,7 +12,7 @@ pub struct Selection {
     pub first: usize,
     /// Frames from one to the next.
     pub step: usize,
-    /// How many frames; of a stream none: until it ends.
+    /// How many frames; `None` for a stream: all frames to its end.
     pub frames: Option<usize>,
     /// The voxels.
     pub region: Region,
