@@ -1,8 +1,8 @@
-//! Index arithmetic on lattices of voxels: regions, rows, blocks. No I/O, no samples.
+//! Index arithmetic on grids of voxels: regions, rows, blocks. No I/O, no samples.
 //!
 //! Triples are in the order x, y, z; arrays have x fastest, then y, z, and time slowest.
 
-/// A lattice of voxels in the world.
+/// A regular grid of voxels in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     /// Number of voxels along x, y, z; none is 0.

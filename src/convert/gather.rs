@@ -41,10 +41,10 @@ pub(super) fn read(
     };
     let (id, range, scheme) = (done.id, None, None);
     let mut reader = WindowReader { config, plan, idle, archive, pixels, range, id, scheme, frames: 0, before: 0 };
-    done.windows[..done.before].iter().for_each(|window| reader.continue_after(window));
+    done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
     let mut busy = Duration::ZERO;
-    for index in done.before.. {
+    for index in done.first_window.. {
         let started = Instant::now();
         let known = done.windows.get(index);
         let Some(window) = reader.next(source, known.map_or(config.window, |w| w.frames as usize))? else {
@@ -58,7 +58,8 @@ pub(super) fn read(
             busy += started.elapsed();
             continue;
         }
-        if index > done.before && done.windows.get(index - 1).is_some_and(|w| (w.frames as usize) < config.window) {
+        if index > done.first_window && done.windows.get(index - 1).is_some_and(|w| (w.frames as usize) < config.window)
+        {
             return Err(reader.has_grown(done));
         }
         let job = Arc::new(reader.prepare(window.as_ref(), index)?);

@@ -168,10 +168,10 @@ pub struct ConvertReport {
 #[derive(Debug)]
 pub struct PartialFile {
     /// The file's complete windows.
-    pub unfinished: CompletePrefix,
+    pub complete: CompletePrefix,
     /// The number of the first window whose frames the source still has, from its first frame on. Windows before it are
     /// not compared with the source.
-    pub before: usize,
+    pub first_window: usize,
 }
 
 /// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
@@ -203,7 +203,7 @@ pub fn resume<W: Write>(
     let Task { config, archive, colour_transform } = &Task::new(config, source.archive());
     let plan = Plan::new(config, archive, colour_transform.as_ref())?;
     let done = WindowsDone::of(begun.as_ref(), &plan, name)?;
-    let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.before);
+    let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
     let mut recorder = Recorder::new(config, &plan, name, out, begun);
@@ -326,22 +326,27 @@ fn start(
 struct WindowsDone {
     id: Option<FileId>,
     windows: Vec<Window>,
-    /// [`PartialFile::before`]
-    before: usize,
+    /// [`PartialFile::first_window`]
+    first_window: usize,
     name: PathBuf,
 }
 
 impl WindowsDone {
     fn of(begun: Option<&PartialFile>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
-        let Some(PartialFile { unfinished, before }) = begun else { return Ok(Self::default()) };
-        let held = unfinished.metadata();
-        if let Some(what) = settings::difference(&held.start(), &plan.start, *before == 0) {
+        let Some(PartialFile { complete, first_window }) = begun else { return Ok(Self::default()) };
+        let held = complete.metadata();
+        if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
             return Err(Error::path(name, format!("was begun with another {what}")));
         }
-        if *before == 0 && held.start() != plan.start {
+        if *first_window == 0 && held.start() != plan.start {
             return Err(Error::path(name, "was begun with other settings"));
         }
-        Ok(Self { id: Some(unfinished.id()), windows: held.windows.clone(), before: *before, name: name.into() })
+        Ok(Self {
+            id: Some(complete.id()),
+            windows: held.windows.clone(),
+            first_window: *first_window,
+            name: name.into(),
+        })
     }
 }
 

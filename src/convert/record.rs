@@ -31,9 +31,9 @@ impl<'a, W: Write> Recorder<'a, W> {
         out: W,
         begun: Option<PartialFile>,
     ) -> Self {
-        let frames_before = begun.as_ref().map_or(0, |b| b.unfinished.metadata().frames);
+        let frames_before = begun.as_ref().map_or(0, |b| b.complete.metadata().frames);
         let (writer, out) = match begun {
-            Some(begun) => (Some(Writer::resume(out, begun.unfinished)), None),
+            Some(begun) => (Some(Writer::resume(out, begun.complete)), None),
             None => (None, Some(out)),
         };
         Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }

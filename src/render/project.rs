@@ -54,7 +54,7 @@ fn render_views(
     let render = |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &weighted, job, report);
     for_each_batch(scene, job, report, render, |frames, channels, report| {
         for i in 0..weighted.len() {
-            expect(&channels, i, frames.len(), &mut report.views[first_view + i].expected_error);
+            add_expected_error(&channels, i, frames.len(), &mut report.views[first_view + i].expected_error);
             let pictures: Vec<&Pictures> = channels.iter().map(|channel| &channel.pictures[i]).collect();
             Pictures::give(&pictures, (first_view + i, frames), sink)?;
         }
@@ -63,7 +63,7 @@ fn render_views(
 }
 
 /// Adds the expected mean square errors of a view, frame by frame, so that the sum does not depend on the batches.
-fn expect(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize, sum: &mut f64) {
+fn add_expected_error(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, frames: usize, sum: &mut f64) {
     let mean = channels.iter().map(|channel| channel.expected[view]).sum::<f64>() / channels.len() as f64;
     (0..frames).for_each(|_| *sum += mean);
 }

@@ -70,7 +70,7 @@ impl FileHeader {
         Self { format: "headerless", shape, spacing, origin, times, variable: None, units, missing: None, notes, parts }
     }
 
-    /// The lattice of every frame.
+    /// The grid of every frame.
     pub(super) fn grid(&self) -> Grid {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }

@@ -156,7 +156,7 @@ pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -
 pub struct Archive {
     /// Name of the format.
     pub format: &'static str,
-    /// The lattice of every frame.
+    /// The grid of every frame.
     pub grid: Grid,
     /// The type of every sample.
     pub sample: SampleType,

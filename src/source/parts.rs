@@ -78,9 +78,9 @@ pub(super) enum DataLocation {
 
 /// Frames that must be decoded before boxes can be read.
 pub(super) trait Decode: Debug + Send {
-    /// Frames whose bytes are packed together, counted from the part's first: they are decoded at once, and
-    /// [`Part::stored`] is how so many lie together.
-    fn together(&self) -> usize {
+    /// Frames that are packed together and decoded at once, counted from the part's first. [`Part::stored`] describes
+    /// this many.
+    fn frames_per_chunk(&self) -> usize {
         1
     }
 
@@ -91,5 +91,5 @@ pub(super) trait Decode: Debug + Send {
     fn decode(&mut self, path: &Path, frames: Range<usize>, out: &mut SpillBuffer) -> Result<()>;
 
     /// Closes the file, since an archive may have more files than can be open. Decoding can still continue.
-    fn rest(&mut self) {}
+    fn close_file(&mut self) {}
 }

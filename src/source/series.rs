@@ -141,7 +141,7 @@ impl Series {
                 self.push(part, (0, *start), wanted, Bytes::File(file), window);
                 return Ok(());
             }
-            DataLocation::Decoded(decoder) => decoder.together(),
+            DataLocation::Decoded(decoder) => decoder.frames_per_chunk(),
         };
         state.check_path(&path)?;
         for wanted in wanted.chunk_by(|a, b| a / together == b / together) {
@@ -190,10 +190,10 @@ impl Series {
     }
 
     /// Closes the decoders of parts that the next window does not need.
-    fn rest(&mut self, parts: Range<usize>) {
+    fn close_files(&mut self, parts: Range<usize>) {
         for part in &mut self.parts[parts] {
             if let DataLocation::Decoded(decoder) = &mut part.at {
-                decoder.rest();
+                decoder.close_file();
             }
         }
     }
@@ -235,7 +235,7 @@ impl FrameSource for Series {
                 self.add(part, &wanted, (&mut window, &mut spool))?;
             }
         }
-        self.rest(parts.start..parts.end.saturating_sub(1).max(parts.start));
+        self.close_files(parts.start..parts.end.saturating_sub(1).max(parts.start));
         Ok(Box::new(window))
     }
 }

@@ -26,37 +26,37 @@ pub(crate) struct Opened {
 impl Cli {
     /// Opens the scene to render, and its file.
     pub(crate) fn scene(&self) -> Result<Opened> {
-        let coefficients = self.method == MethodName::Coefficients;
-        if let [only] = self.inputs.as_slice()
-            && (coefficients || only.extension().is_some_and(|e| e == "wspl"))
-        {
-            if only == Path::new(STANDARD) {
-                return Err(Error::usage(
-                    "-: a coefficient file cannot come from a pipe, since it is read from its end",
-                ));
+        match self.inputs.as_slice() {
+            [only] if self.method == MethodName::Coefficients || is_coefficient_name(only) => {
+                self.coefficient_scene(only)
             }
-            self.input.refuse_for_coefficients()?;
-            self.along.check(false, self.colour.is_asked())?;
-            let file = CoefficientFile::open_with(only, self.input.access()).map_err(|e| hint_at_frames(only, e))?;
-            let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
-            let what = if coefficients { SplatSource::Coefficients } else { SplatSource::Samples };
-            let unit = setting(file.metadata(), "time-units").map(String::from);
-            let annotation = Annotation { times: file.metadata().times.clone(), unit };
-            let colours = self.along.of_file(self.colour.range, &file)?;
-            let scene = Box::new(CoefficientScene::new(file.clone(), what));
-            return Ok(Opened { scene, file: Some(file), annotation, colours });
+            _ => self.frame_scene(),
         }
-        if self.skip_damaged {
-            return Err(Error::usage("--skip-damaged: is for a coefficient file"));
+    }
+
+    /// A coefficient file, whose coefficients or decoded samples are splatted.
+    fn coefficient_scene(&self, path: &Path) -> Result<Opened> {
+        if path == Path::new(STANDARD) {
+            return Err(Error::usage("-: a coefficient file cannot come from a pipe, since it is read from its end"));
         }
-        if coefficients {
-            return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
-        }
-        if self.inputs == [PathBuf::from(STANDARD)] {
-            return Err(Error::usage(
-                "--method direct reads frames more than once, so they cannot come from standard input",
-            ));
-        }
+        self.input.refuse_for_coefficients()?;
+        self.along.check(false, self.colour.is_asked())?;
+        let file = CoefficientFile::open_with(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
+        let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
+        let what = match self.method {
+            MethodName::Coefficients => SplatSource::Coefficients,
+            MethodName::Direct => SplatSource::Samples,
+        };
+        let unit = setting(file.metadata(), "time-units").map(String::from);
+        let annotation = Annotation { times: file.metadata().times.clone(), unit };
+        let colours = self.along.of_file(self.colour.range, &file)?;
+        let scene = Box::new(CoefficientScene::new(file.clone(), what));
+        Ok(Opened { scene, file: Some(file), annotation, colours })
+    }
+
+    /// Frames of an archive.
+    fn frame_scene(&self) -> Result<Opened> {
+        self.refuse_for_frames()?;
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
         let Archive { times, units, .. } = source.archive().clone();
@@ -65,23 +65,36 @@ impl Cli {
         let colours = match self.along.colours() {
             Some(name) => {
                 let inputs = self.inputs.as_slice();
-                Some(transfer_function(
-                    name,
-                    self.colour.range,
-                    (inputs, source.as_mut()),
-                    missing_value,
-                    &self.common,
-                )?)
+                let range = self.colour.range;
+                Some(transfer_function(name, range, (inputs, source.as_mut()), missing_value, &self.common)?)
             }
             None => None,
         };
-        let before = colours.clone().filter(|_| !self.along.mode.colours_samples());
-        let scene = match before {
+        let scene = match colours.clone().filter(|_| !self.along.mode.colours_samples()) {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };
         Ok(Opened { scene: Box::new(scene), file: None, annotation, colours })
     }
+
+    /// An error if an option or the input is not for frames.
+    fn refuse_for_frames(&self) -> Result<()> {
+        if self.skip_damaged {
+            return Err(Error::usage("--skip-damaged: is for a coefficient file"));
+        }
+        if self.method == MethodName::Coefficients {
+            return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
+        }
+        if self.inputs == [PathBuf::from(STANDARD)] {
+            let what = "--method direct reads frames more than once, so they cannot come from standard input";
+            return Err(Error::usage(what));
+        }
+        Ok(())
+    }
+}
+
+fn is_coefficient_name(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "wspl")
 }
 
 const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";
@@ -89,8 +102,7 @@ const FRAMES_HINT: &str = "convert frames first, or render them with --method di
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-    let named_so = path.extension().is_some_and(|e| e == "wspl");
-    if !named_so && (foreign || path.is_dir()) {
+    if !is_coefficient_name(path) && (foreign || path.is_dir()) {
         return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
     }
     error

@@ -70,8 +70,8 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
         return Ok(());
     }
-    let (out, unfinished) = open_successor(&file, Earlier::by(args.force, args.resume))?;
-    let begun = PartialFile { unfinished, before: file.metadata().windows.len() };
+    let (out, complete) = open_successor(&file, Earlier::by(args.force, args.resume))?;
+    let begun = PartialFile { complete, first_window: file.metadata().windows.len() };
     finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 

@@ -139,7 +139,7 @@ fn put_box(
 }
 
 impl Decode for Chunks {
-    fn together(&self) -> usize {
+    fn frames_per_chunk(&self) -> usize {
         self.together
     }
 
@@ -154,7 +154,7 @@ impl Decode for Chunks {
         })
     }
 
-    fn rest(&mut self) {
+    fn close_file(&mut self) {
         self.opener.close();
     }
 }
@@ -215,7 +215,7 @@ mod tests {
             let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
             let mut chunks = Chunks::new(&variable, &counts, Vec::new(), &opener).expect("small chunks");
             let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
-            assert_eq!((chunks.together(), stored.bytes), (3, 3 * 120 * 2));
+            assert_eq!((chunks.frames_per_chunk(), stored.bytes), (3, 3 * 120 * 2));
             for first in (0..7).step_by(3) {
                 let mut held = SpillBuffer::new(stored.bytes, 1 << 20, Path::new("a")).expect("room");
                 chunks.decode(Path::new("a"), first..7.min(first + 3), &mut held).expect("reading");

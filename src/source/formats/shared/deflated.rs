@@ -129,7 +129,7 @@ impl Compression {
 }
 
 impl Decode for Deflated {
-    fn together(&self) -> usize {
+    fn frames_per_chunk(&self) -> usize {
         self.place.together
     }
 
@@ -149,7 +149,7 @@ impl Decode for Deflated {
         Ok(())
     }
 
-    fn rest(&mut self) {
+    fn close_file(&mut self) {
         self.reader = None;
     }
 }

@@ -66,7 +66,7 @@ pub(in crate::source) struct Pieces {
 }
 
 impl Decode for Pieces {
-    fn together(&self) -> usize {
+    fn frames_per_chunk(&self) -> usize {
         self.together
     }
 
