@@ -136,7 +136,7 @@ fn info_describes_frames_and_estimates_their_file() {
     assert_eq!(estimate("a.npy --estimate 0.1 --frames 0:4"), (Some(0.1), Some(4)));
     assert_eq!(estimate("--estimate 0.1 --frames 0:4 a.npy"), (Some(0.1), Some(4)));
     assert_eq!(estimate("--frames 0:4 --estimate a.npy"), (Some(0.01), Some(4)));
-    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate 1%", "no number", "type --estimate 0.01"]);
+    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate 1%", "neither a number", "type --estimate 0.01"]);
     work.write("0.1", "a file with the name of a number");
     work.wavesplat("info a.npy --estimate 0.1").fails(2, &["type --estimate=0.1", "./0.1"]);
     work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);

@@ -43,7 +43,7 @@ fn a_config_file_equals_the_command_line() {
 fn the_command_line_wins() {
     let work = work(CONFIG);
     let run = work.wavesplat("convert a.npy --config run.toml -o c.wspl --window 4 --basis multi -v --tolerance=0.01");
-    run.fails(2, &["--window", "not 4", "multi", "run.toml gives:", "frames"]);
+    run.fails(2, &["--window", "not 4", "multi", "options from run.toml:", "frames"]);
     work.wavesplat("convert a.npy --config run.toml -o c.wspl --window 4 --tolerance=0.01 -v").ok();
     work.wavesplat("convert a.npy -o d.wspl --window 4 --frames 0:10 --basis haar --bound rms --region 2:18,:,1:9")
         .ok();
@@ -80,7 +80,7 @@ fn errors_in_a_config_file_name_line_and_key() {
     let work = work("");
     let cases: [(&str, &[&str]); 12] = [
         ("\ntolerence = 0.1", &["line 2", "tolerence: no option of wavesplat"]),
-        ("missing_value = 7", &["line 1", "missing_value", "missing-value is one"]),
+        ("missing_value = 7", &["line 1", "missing_value", "write missing-value"]),
         ("[convert]\n\nview = '0,0'", &["line 3", "view: no option of convert"]),
         ("[render]\ntau = 1", &["line 1", "[render]", "no command"]),
         ("tolerance = 0.1\nforce = 'yes'", &["line 2", "force: takes true or false"]),

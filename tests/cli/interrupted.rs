@@ -79,7 +79,7 @@ fn a_conversion_of_files_is_interrupted_and_resumed_to_the_same_bytes() {
     work.write("a.npy", archive().npy());
     work.wavesplat("convert a.npy -o whole.wspl --window 2 --threads 1").ok();
     let line = "$WAVESPLAT convert a.npy -o a.wspl --window 2 --threads 1";
-    interrupted(&work, line, "a.wspl.part", true).expect("in time").fails(130, &["a.wspl.part", "is kept"]);
+    interrupted(&work, line, "a.wspl.part", true).expect("in time").fails(130, &["a.wspl.part", "are kept"]);
     work.wavesplat("convert a.npy -o a.wspl --window 2 --threads 1").fails(2, &["a.wspl.part", "--resume", "--force"]);
     work.wavesplat("convert a.npy -o a.wspl --window 2 --threads 1 --resume").ok();
     assert!(work.read("a.wspl") == work.read("whole.wspl"));
