@@ -117,6 +117,7 @@ impl InputArgs {
             offset: self.offset.unwrap_or(0),
             dims_are_remembered: false,
             variable: self.variable.clone(),
+            variable_is_remembered: false,
             axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
@@ -159,8 +160,11 @@ impl InputArgs {
         frames: Option<FrameRange>,
         common: &CommonArgs,
     ) -> Result<Box<dyn FrameSource>> {
-        let dims_are_remembered = !self.describes_layout();
-        let options = OpenOptions { dims_are_remembered, ..self.completed(of)?.options(common.stream_memory()) };
+        let options = OpenOptions {
+            dims_are_remembered: !self.describes_layout(),
+            variable_is_remembered: self.variable.is_none(),
+            ..self.completed(of)?.options(common.stream_memory())
+        };
         let source = source::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));
         narrow(source, frames, remembered(of, "region")?)

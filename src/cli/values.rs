@@ -149,7 +149,10 @@ impl FrameRange {
         let end = end.map(|e| frames.map_or(e, |all| e.min(all)));
         let count = end.map(|e| e.saturating_sub(start).div_ceil(self.step));
         if count == Some(0) {
-            let all = frames.map_or(String::new(), |n| format!(" of {n}"));
+            let all = match frames {
+                None | Some(0) => String::new(),
+                Some(n) => format!("; frames are numbered 0 to {}", n - 1),
+            };
             return Err(Error::usage(format!("--frames: there is no such frame{all}")));
         }
         Ok((start, self.step, count))

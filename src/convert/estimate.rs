@@ -9,6 +9,7 @@ use crate::base::sample::join_ranges;
 use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, open_stream};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::io::{self, Cursor};
 use std::path::Path;
 
@@ -27,7 +28,7 @@ pub struct Estimate {
     pub ratio: f64,
     /// The tolerance.
     pub tolerance: f64,
-    /// The value range that it refers to, from the first frame of each coded window and the last frame.
+    /// The value range that it refers to, from a few frames of each coded window and the last frame.
     pub range: (f64, f64),
     /// Blocks that were coded in each window.
     pub blocks: usize,
@@ -55,7 +56,8 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     let regions = spread(plan.blocks.len(), most).map(|block| whole_block(&plan, block)).collect::<Vec<_>>();
     let firsts = windows(frames, config.window);
     progress.start(Some(firsts.len() as u64));
-    let range = config.range.map_or_else(|| range(source, &archive, task.config.missing_value, &firsts), Ok)?;
+    let frames_read = FramesRead { archive: &archive, missing_value: task.config.missing_value, regions: &regions };
+    let range = config.range.map_or_else(|| frames_read.range(source, config.window, &firsts), Ok)?;
     let config = ConvertConfig { range: Some(range), block: Some(plan.blocks.edge), ..task.config };
     let (mut coded, mut samples) = (0, 0);
     for first in &firsts {
@@ -85,21 +87,46 @@ fn windows(frames: usize, window: usize) -> Vec<usize> {
     spread(if all <= WINDOWS { all } else { frames / window }, WINDOWS).map(|index| index * window).collect()
 }
 
-/// The value range of the first frame of each window and of the last frame of the archive.
-fn range(
-    source: &mut dyn FrameSource,
-    archive: &Archive,
+/// The frames that are read to find a value range.
+struct FramesRead<'a> {
+    archive: &'a Archive,
     missing_value: Option<f64>,
-    firsts: &[usize],
-) -> Result<(f64, f64)> {
-    let last = archive.frames.map(|frames| frames - 1);
-    let mut range = Scan::NOTHING.range;
-    for frame in firsts.iter().copied().chain(last) {
-        let window = source.window(frame, 1)?;
-        let scan = scan_frame(Scan::NOTHING, window.as_ref(), 0, &archive.grid, archive.sample, missing_value)?;
-        range = join_ranges(range, scan.range);
+    /// The coded blocks.
+    regions: &'a [Region],
+}
+
+impl FramesRead<'_> {
+    /// The value range of the last frame and, in each window, of the first frame and of those with the least and the
+    /// largest sample of the coded blocks.
+    fn range(&self, source: &mut dyn FrameSource, window: usize, firsts: &[usize]) -> Result<(f64, f64)> {
+        let frames = self.archive.frames.unwrap_or(0);
+        let mut range = Scan::NOTHING.range;
+        for first in firsts {
+            let window = source.window(*first, window.min(frames - first))?;
+            for frame in self.extreme_frames(window.as_ref())? {
+                range = join_ranges(range, self.scan(window.as_ref(), frame, &self.archive.grid)?);
+            }
+        }
+        let last = source.window(frames - 1, 1)?;
+        range = join_ranges(range, self.scan(last.as_ref(), 0, &self.archive.grid)?);
+        Ok(if range.0 <= range.1 { range } else { (0.0, 0.0) })
     }
-    Ok(if range.0 <= range.1 { range } else { (0.0, 0.0) })
+
+    /// The first frame of a window, and the frames with the least and the largest sample of the coded blocks.
+    fn extreme_frames(&self, window: &dyn FrameWindow) -> Result<BTreeSet<usize>> {
+        let mut stack = stacked(window, self.archive, self.regions)?;
+        let grid = stack.archive().grid;
+        let stack = stack.window(0, window.frames())?;
+        let ranges = (0..window.frames()).map(|frame| self.scan(stack.as_ref(), frame, &grid));
+        let ranges: Vec<(f64, f64)> = ranges.collect::<Result<_>>()?;
+        let least = (0..ranges.len()).min_by(|a, b| ranges[*a].0.total_cmp(&ranges[*b].0));
+        let largest = (0..ranges.len()).max_by(|a, b| ranges[*a].1.total_cmp(&ranges[*b].1));
+        Ok([0].into_iter().chain(least).chain(largest).collect())
+    }
+
+    fn scan(&self, window: &dyn FrameWindow, frame: usize, grid: &Grid) -> Result<(f64, f64)> {
+        Ok(scan_frame(Scan::NOTHING, window, frame, grid, self.archive.sample, self.missing_value)?.range)
+    }
 }
 
 /// A block, moved inwards if a far face cuts it, so that all blocks have the same size.

@@ -67,6 +67,8 @@ pub struct OpenOptions {
     pub dims_are_remembered: bool,
     /// The array of a file, or a component of one: `velocity[0]`.
     pub variable: Option<String>,
+    /// Whether `variable` is that of an earlier archive. Then files with one array without a name ignore it.
+    pub variable_is_remembered: bool,
     /// The meaning of each axis of an array, slowest first: letters of t z y x, or another letter for another axis.
     pub axes: Option<String>,
     /// World units between voxels along x, y, z, instead of those in the files.
@@ -90,6 +92,7 @@ impl Default for OpenOptions {
             offset: 0,
             dims_are_remembered: false,
             variable: None,
+            variable_is_remembered: false,
             axes: None,
             spacing: None,
             origin: None,

@@ -78,3 +78,13 @@ fn options_that_are_given_go_before_those_that_are_remembered() {
     work.wavesplat("verify a.wspl --against a.raw --dims 20x14x10x39").fails(3, &["expected 436808"]);
     work.wavesplat("verify a.wspl --against a.raw --dtype f64").fails(3, &["expected 896008"]);
 }
+
+#[test]
+fn a_remembered_variable_is_ignored_by_files_with_one_array_without_a_name() {
+    let work = Work::new();
+    let named = format!("{}/tests/golden/inputs/hdf5/axes_xyzt.h5", env!("CARGO_MANIFEST_DIR"));
+    work.wavesplat(&format!("convert {named} -o a.wspl --variable density --tolerance 0")).ok();
+    work.wavesplat("extract a.wspl -o a.npy").ok();
+    work.wavesplat("verify a.wspl --against a.npy").ok();
+    work.wavesplat("verify a.wspl --against a.npy --variable density").fails(2, &["--variable", "a.npy"]);
+}

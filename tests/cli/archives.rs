@@ -144,6 +144,28 @@ fn info_describes_frames_and_estimates_their_file() {
 }
 
 #[test]
+fn an_estimate_finds_a_peak_within_a_window() {
+    let (work, mut archive) = (Work::new(), Archive::smooth([50, 40, 30], 40));
+    let voxels = archive.frame_len();
+    archive.values[20 * voxels..21 * voxels].iter_mut().for_each(|v| *v *= 100.0);
+    work.write("a.npy", archive.npy());
+    let told = work.wavesplat("info a.npy --estimate 0.001 --json").ok().json();
+    let converted = work.wavesplat("convert a.npy -o a.wspl --tolerance 0.001 --json").ok().json();
+    let ratio = told["estimate"]["bytes"].as_f64().unwrap() / converted["output_bytes"].as_f64().unwrap();
+    assert!((0.6..1.6).contains(&ratio), "{ratio} times the true size");
+}
+
+#[test]
+fn a_coefficient_file_does_not_get_the_name_of_another_format() {
+    let work = Work::with_file("");
+    for name in ["b.nc", "b.NPY", "b.vti"] {
+        work.wavesplat(&format!("convert a.npy -o {name}")).fails(2, &[name, "named .wspl", "extract"]);
+        assert!(!work.names().contains(&name.to_string()));
+    }
+    work.wavesplat("convert a.npy -o b.coefficients").ok();
+}
+
+#[test]
 fn coefficients_go_through_a_pipe_as_they_are() {
     let work = Work::with_file("");
     work.shell("cat a.npy | $WAVESPLAT convert - -o - | cat > b.wspl").ok();

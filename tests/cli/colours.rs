@@ -113,7 +113,7 @@ fn a_sheet_has_all_pictures_in_rows() {
     }
     let large = work.render("a.wspl --size 20000x20000 --frames :4 -o b.png --format sheet");
     large.fails(2, &["4 pictures", "40000x40000", "32768", "--size"]);
-    work.render("a.wspl -o b.sheet").fails(2, &["b.sheet", "extension"]);
+    work.render("a.wspl -o b.sheet").fails(2, &["b.sheet", "no pictures are written as .sheet", ".apng"]);
     work.render("a.wspl -o b_%d.png --format sheet").fails(2, &["b_%d.png", "all frames"]);
     let room = "--size 2000x2000 --frames :9 -o b.png --format sheet --memory 200MiB";
     let asked = work.render(&format!("a.wspl {room}"));

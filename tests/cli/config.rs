@@ -82,7 +82,7 @@ fn errors_in_a_config_file_name_line_and_key() {
         ("\ntolerence = 0.1", &["line 2", "tolerence: no option of wavesplat"]),
         ("missing_value = 7", &["line 1", "missing_value", "write missing-value"]),
         ("[convert]\n\nview = '0,0'", &["line 3", "view: no option of convert"]),
-        ("[render]\ntau = 1", &["line 1", "[render]", "no command"]),
+        ("[render]\ntau = 1", &["line 1", "[render]", "is not a command"]),
         ("tolerance = 0.1\nforce = 'yes'", &["line 2", "force: takes true or false"]),
         ("tolerance = true", &["line 1", "tolerance: takes a string or a number"]),
         ("frames = [1, 2]", &["line 1", "frames: takes one value"]),

@@ -71,7 +71,7 @@ fn appending_without_later_frames_is_no_error() {
     let run = work.wavesplat("append a.wspl a.npy --frames 40:").ok();
     assert!(run.err.contains("no frames after 40 yet"), "{}", run.err);
     assert!(work.read("a.wspl") == before && work.names() == ["a.npy", "a.wspl"]);
-    work.wavesplat("append a.wspl a.npy --frames 41:").fails(2, &["--frames", "of 40"]);
-    work.wavesplat("append a.wspl a.npy --frames 40:50").fails(2, &["--frames", "of 40"]);
+    work.wavesplat("append a.wspl a.npy --frames 41:").fails(2, &["--frames", "0 to 39"]);
+    work.wavesplat("append a.wspl a.npy --frames 40:50").fails(2, &["--frames", "0 to 39"]);
     assert_eq!(small().frames, 40);
 }

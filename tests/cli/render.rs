@@ -194,7 +194,7 @@ fn errors_and_tolerances_that_make_no_sense_are_refused() {
     bad("a.wspl --error-image v.npy", &["--error-image", "different names"]);
     bad("a.wspl --error-image -", &["--error-image", "not standard output"]);
     bad("a.wspl --error-image e.png", &["e.png", "frame_%04d.png"]);
-    bad("a.wspl --error-image e", &["e: the extension names no format"]);
+    bad("a.wspl --error-image e", &["e: has no extension"]);
     bad("a.wspl --tolerance 0.0001", &["--tolerance", "e-3 of its range off"]);
     bad("a.wspl --tolerance nan", &["--tolerance", "0 to 1"]);
     bad("a.wspl --tolerance 2", &["--tolerance", "0 to 1"]);

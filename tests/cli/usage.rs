@@ -31,7 +31,7 @@ fn bad_values_of_convert_are_named() {
         ("--region 0:21,:,:", &["--region", "20x14x10"]),
         ("--region 4:4,:,:", &["--region", "20x14x10"]),
         ("--region 0:4", &["--region", "x0:x1"]),
-        ("--frames 40:50", &["--frames", "40"]),
+        ("--frames 40:50", &["--frames", "0 to 39"]),
         ("--frames 5:2", &["--frames"]),
         ("--frames x", &["--frames", "a:b"]),
         ("--memory 1KiB", &["--memory", "MiB"]),
@@ -65,7 +65,7 @@ fn bad_values_of_render_are_named() {
         ("--norm log --range=-1,1 --colormap grey", &["--norm", "above 0", "-1,1", "--range", "--norm linear"]),
         ("--annotate", &["--annotate", "npy", "--colormap"]),
         ("--annotate --format gray16", &["--annotate", "gray16", "no colours"]),
-        ("--frames 99", &["--frames", "40"]),
+        ("--frames 99", &["--frames", "0 to 39"]),
         ("--region 0:21,:,:", &["--region", "20x14x10"]),
         ("--tau -1", &["--tau", "0 or more"]),
         ("--sigma 0", &["--sigma", "above 0"]),
@@ -86,7 +86,7 @@ fn bad_values_of_render_are_named() {
 #[test]
 fn an_extension_without_a_format_is_refused_with_the_known_ones() {
     let work = Work::with_file("");
-    work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", "png npy y4m rgb24 gray16"]);
+    work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", ".xyz", ".png", ".apng", "npy y4m rgb24 gray16 exr"]);
     work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);
     work.write("in.xyz", [7; 300]);
     let remedy = "for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: .npy, .nrrd";

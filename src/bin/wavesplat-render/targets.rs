@@ -102,11 +102,15 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
     if path == Path::new(STANDARD) {
         return Ok(PictureFormat::Png);
     }
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let format = parse_format(ending).ok().filter(|format| *format != PictureFormat::Sheet);
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let format = parse_format(extension).ok().filter(|format| *format != PictureFormat::Sheet);
     format.ok_or_else(|| {
-        let what = "the extension names no format; take one of png npy y4m rgb24 gray16 apng exr";
-        Error::usage(format!("{}: {what}", path.display()))
+        let what = match extension {
+            "" => "has no extension".into(),
+            other => format!("no pictures are written as .{other}"),
+        };
+        let formats = "take .png for a picture, .apng for a moving one, or npy y4m rgb24 gray16 exr";
+        Error::usage(format!("{}: {what}; {formats}", path.display()))
     })
 }
 

@@ -168,6 +168,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let config = args.config()?;
     let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
     spare_inputs(&args.inputs, &args.output)?;
+    refuse_other_format(&args.output)?;
     let config = args.of_archive(config, source.as_mut())?;
     if args.resume && !args.force && args.output.is_file() {
         return args.check_complete(&config, source.archive());
@@ -175,6 +176,16 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     let (out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
     let begun = begun.map(|complete| PartialFile { complete, first_window: 0 });
     finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
+}
+
+/// An error if the output has the extension of a format of frames: nobody would find a coefficient file in it.
+fn refuse_other_format(output: &Path) -> Result<()> {
+    let extension = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    if extension == "wspl" || !extensions().any(|known| known == extension) {
+        return Ok(());
+    }
+    let what = format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
+    Err(Error::usage(format!("{}: {what}", output.display())))
 }
 
 /// Converts the remaining frames, and commits the output if `still` confirms that the file it replaces is unchanged.

@@ -289,7 +289,7 @@ pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &O
         (options.sample.is_some(), "sample"),
         (options.big_endian, "big_endian"),
         (options.offset > 0, "offset"),
-        (options.variable.is_some() && format == Format::Npy, "variable"),
+        (options.variable.is_some() && format == Format::Npy && !options.variable_is_remembered, "variable"),
         (options.axes.is_some() && !format.takes_axes(), "axes"),
     ];
     let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
