@@ -83,7 +83,7 @@
 //! | `extract` | a coefficient file back to samples and to files of other programs |
 //! | `cli` | what the programs in `bin/` share |
 //!
-//! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](format). [`method`] explains the mathematics.
+//! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
 //!
 //! # From a file to a pixel
 //!

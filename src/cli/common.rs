@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]
 pub struct CommonArgs {
-    /// TOML file with more options by their long names, like tolerance = 0.001; a table [convert] is for that command.
+    /// TOML file with more options by their long names, like tolerance = 0.001; a table named convert is for that command.
     /// The command line overrides the file [default: the file named by WAVESPLAT_CONFIG, for wavesplat-render by
     /// WAVESPLAT_RENDER_CONFIG]
     #[arg(long, value_name = "FILE", help_heading = "Common options")]
@@ -69,6 +69,12 @@ impl CommonArgs {
         if self.verbose {
             note(text);
         }
+    }
+
+    /// Notes how many bytes of a coefficient file were read, those read twice counted twice.
+    pub fn detail_read(&self, read: u64, bytes: u64) {
+        let twice = if read > bytes { ", some of them more than once" } else { "" };
+        self.detail(format_args!("{read} bytes of the file's {bytes} were read{twice}"));
     }
 
     /// With `--json`, prints a report to standard output, or to standard error if `data_on_stdout`.

@@ -36,7 +36,7 @@ impl Cli {
         let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
         let targets = self.targets(&config)?;
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
-        let colours = self.without_extremes(scene.as_mut(), &mut config, colours)?;
+        let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
@@ -49,7 +49,7 @@ impl Cli {
         self.note_errors(&report);
         let (file_bytes_read, file_bytes) = file.as_ref().map(|f| (f.bytes_read(), f.bytes())).unzip();
         if let (Some(read), Some(bytes)) = (file_bytes_read, file_bytes) {
-            self.common.detail(format_args!("{read} of the file's {bytes} bytes were read"));
+            self.common.detail_read(read, bytes);
         }
         let coloured = colouring.coloured();
         let reported = Reported { report: &report, picture: &provenance, coloured, file_bytes_read, file_bytes };

@@ -1,10 +1,9 @@
 //! The default range of colours, taken from small pictures.
 
-use crate::args::Cli;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};
-use wavesplat::render::{Mode, Pixel, RenderConfig, Scene, check, render};
+use wavesplat::render::{Mode, RenderConfig, Scene, check, render};
 
 /// Number of slabs of small pictures, which are only used to find a range.
 const FEW_SLABS: usize = 32;
@@ -14,7 +13,7 @@ const MOST_PIXELS: usize = 1 << 20;
 
 /// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
 /// range.
-fn without_extremes(values: &[f32]) -> (f64, f64) {
+fn robust_range(values: &[f32]) -> (f64, f64) {
     let few = values.len() / 200;
     let at = |n: usize| f64::from(values[n]);
     let (lo, hi, low, high) = (at(0), at(values.len() - 1), at(few), at(values.len() - 1 - few));
@@ -38,9 +37,28 @@ impl Default for Ranges {
 }
 
 impl Ranges {
+    /// The ranges in small pictures, if any are needed: of pictures, or of their errors.
+    pub(crate) fn small(
+        scene: &mut dyn Scene,
+        config: &RenderConfig,
+        (of_pictures, of_errors): (bool, bool),
+    ) -> Result<Self> {
+        if !of_pictures && !of_errors {
+            return Ok(Self::default());
+        }
+        check(scene, config)?; // before small pictures are rendered, so that errors name the full size
+        let mode = match config.mode {
+            Mode::Projection => Mode::Projection,
+            // The colours of a composite are those of its samples, and the largest samples along rays are enough to
+            // find where they end.
+            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
+        };
+        Self::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
+    }
+
     /// The ranges in small pictures of frames spread over the archive. They do not depend on the frames to render. If
     /// the pictures are empty, the range is (0, 1). Errors begin at 0.
-    pub(crate) fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
+    fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
         const PIXELS: f64 = 64.0;
         const FRAMES: usize = 16;
         for view in &mut small.views {
@@ -60,7 +78,7 @@ impl Ranges {
         })?;
         values.sort_unstable_by(f32::total_cmp);
         if !values.is_empty() {
-            ranges.values = without_extremes(&values);
+            ranges.values = robust_range(&values);
             ranges.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
         ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
@@ -69,7 +87,7 @@ impl Ranges {
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would
     /// take most of the colours do not count.
-    pub(crate) fn without_extremes(&self, colours: &TransferFunction) -> Result<TransferFunction> {
+    pub(crate) fn stretch(&self, colours: &TransferFunction) -> Result<TransferFunction> {
         let ((lo, hi), most) = (colours.range(), self.values.1);
         if !(0.0 < most && most < hi) {
             return Ok(colours.clone());
@@ -92,45 +110,5 @@ impl Ranges {
             return Ok((least.max(hi * DECADES), hi));
         }
         Ok(if lo < hi { map.suitable((lo, hi)) } else { (lo, hi) })
-    }
-}
-
-impl Cli {
-    /// The ranges in small pictures, if any are needed: of pictures, or of their errors.
-    pub(crate) fn small_ranges(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        (of_pictures, of_errors): (bool, bool),
-    ) -> Result<Ranges> {
-        if !of_pictures && !of_errors {
-            return Ok(Ranges::default());
-        }
-        check(scene, config)?; // before small pictures are rendered, so that errors name the full size
-        let mode = match config.mode {
-            Mode::Projection => Mode::Projection,
-            // The colours of a composite are those of its samples, and the largest samples along rays are enough to
-            // find where they end.
-            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
-        };
-        Ranges::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
-    }
-
-    /// The colours of a composite without a given range, up to the largest value of small pictures.
-    pub(crate) fn without_extremes(
-        &self,
-        scene: &mut dyn Scene,
-        config: &mut RenderConfig,
-        colours: Option<TransferFunction>,
-    ) -> Result<Option<TransferFunction>> {
-        let Some(all) = colours.as_ref().filter(|_| config.mode.pixel() == Pixel::Light) else { return Ok(colours) };
-        if !self.along.is_automatic(self.colour.range)? {
-            return Ok(colours);
-        }
-        let colours = self.small_ranges(scene, config, (true, false))?.without_extremes(all)?;
-        let (lo, hi) = colours.range();
-        self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
-        config.mode = self.along.mode(Some(&colours))?;
-        Ok(Some(colours))
     }
 }

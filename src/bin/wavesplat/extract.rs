@@ -98,7 +98,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let progress = args.common.progress("extract", "frames");
     let report = extract_to(&file, &config, &mut |samples| sink.write(samples), &progress)?;
     sink.finish()?;
-    args.common.detail(format_args!("{} of the file's {} bytes were read", report.file_bytes_read, report.file_bytes));
+    args.common.detail_read(report.file_bytes_read, report.file_bytes);
     args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
 }

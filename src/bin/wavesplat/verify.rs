@@ -55,7 +55,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
         let what =
-            format!("damaged in {count} places, the first: {first}; wavesplat recover saves the undamaged blocks");
+            format!("damaged in {}, the first: {first}; wavesplat recover saves the undamaged blocks", places(count));
         return Err(Error::input(&args.file, what));
     }
     match report.against.as_ref().and_then(missed) {
@@ -92,9 +92,13 @@ impl VerifyArgs {
     }
 }
 
+fn places(count: u64) -> String {
+    if count == 1 { "1 place".into() } else { format!("{count} places") }
+}
+
 fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     let estimate = promise.caution();
-    let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {} places", r.damaged) };
+    let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {}", places(r.damaged)) };
     let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);
     if r.unchecked > 0 {
         text += &format!("  {} more blocks could not be checked: their directory is damaged\n", r.unchecked);
