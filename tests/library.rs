@@ -10,10 +10,10 @@ use wavesplat::colour::Scale;
 use wavesplat::convert::{Basis, ConvertConfig, MissingPolicy, SchemeConstraint, convert_to_file};
 use wavesplat::extract::read_region;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, Mode, RenderConfig, render_png};
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig, check, render_png};
 use wavesplat::source::ArraySource;
 use wavesplat::view::camera::View;
-use wavesplat::{Grid, Region, SampleType};
+use wavesplat::{Error, Grid, Region, SampleType};
 use wavesplat_format::{BlockId, Storage, read_joined};
 
 const DIMS: [usize; 3] = [20, 14, 9];
@@ -117,6 +117,25 @@ fn a_region_that_is_not_there_is_an_error() {
     assert_eq!(read_region(&file, 8..10, &file.grid.whole()).unwrap(), [7.0; 48]);
     for (frames, end) in [(8..11, [4, 3, 2]), (0..1, [5, 3, 2]), (0..1, [4, 0, 2]), (0..1, [usize::MAX; 3])] {
         assert!(read_region(&file, frames, &Region { start: [0; 3], end }).is_err(), "{end:?}");
+    }
+}
+
+#[test]
+fn settings_that_a_scene_cannot_meet_are_errors() {
+    let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
+    let scene = CoefficientScene::from(stored(&mut source, &config()).open());
+    let plain = RenderConfig::new(&scene, View { size: [20, 20], ..View::new(30.0, 20.0) });
+    let of_frames = |frames| RenderConfig { frames, ..plain.clone() };
+    let of_error = |splat_error| RenderConfig { splat_error, ..plain.clone() };
+    assert!(check(&scene, &plain).is_ok());
+    for (config, named) in [
+        (of_frames(vec![5, 2]), "frames"),
+        (of_frames(vec![0, FRAMES]), "frames"),
+        (of_error(-1.0), "splat_error"),
+        (of_error(f64::NAN), "splat_error"),
+    ] {
+        let refused = check(&scene, &config).unwrap_err();
+        assert!(matches!(refused, Error::Setting { setting, .. } if setting == named), "{refused}");
     }
 }
 

@@ -71,10 +71,10 @@ impl CommonArgs {
         }
     }
 
-    /// Notes how many bytes of a coefficient file were read, those read twice counted twice.
+    /// A detail: the bytes read of a coefficient file of `bytes` bytes. Bytes that are read again count again.
     pub fn detail_read(&self, read: u64, bytes: u64) {
-        let twice = if read > bytes { ", some of them more than once" } else { "" };
-        self.detail(format_args!("{read} bytes of the file's {bytes} were read{twice}"));
+        let again = if read > bytes { ", as some were read more than once" } else { "" };
+        self.detail(format_args!("{read} bytes were read of a file of {bytes}{again}"));
     }
 
     /// With `--json`, prints a report to standard output, or to standard error if `data_on_stdout`.

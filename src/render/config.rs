@@ -138,9 +138,13 @@ impl RenderConfig {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
             return Err(Error::setting("views", "takes one view or more, with pictures of one size"));
         }
-        let some = scene_frames.unwrap_or(usize::MAX);
-        if !self.frames.is_sorted() || self.frames.last().is_some_and(|last| *last >= some) {
-            return Err(Error::setting("frames", format!("takes numbers below {some}, ascending")));
+        if !self.frames.is_sorted() {
+            return Err(Error::setting("frames", "takes ascending numbers"));
+        }
+        if let (Some(all), Some(last)) = (scene_frames, self.frames.last())
+            && *last >= all
+        {
+            return Err(Error::setting("frames", format!("takes numbers below {all}, not {last}")));
         }
         if !(self.splat_error.is_finite() && self.splat_error >= 0.0) {
             return Err(Error::setting("splat_error", "takes a number of 0 or more"));

@@ -19,9 +19,6 @@ impl Cli {
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
         let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
-        if !(splat_error.is_finite() && splat_error >= 0.0) {
-            return Err(Error::usage("--splat-error: takes a number of 0 or more"));
-        }
         let all = scene.frames().unwrap_or(0);
         Ok(RenderConfig {
             views: self.views(grid)?,

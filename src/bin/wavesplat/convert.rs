@@ -178,10 +178,10 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
 }
 
-/// An error if the output has the extension of a format of frames: nobody would find a coefficient file in it.
+/// An error if the output has the extension of a format of frames, which would mislead readers of the file.
 fn refuse_other_format(output: &Path) -> Result<()> {
     let extension = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
-    if extension == "wspl" || !extensions().any(|known| known == extension) {
+    if !extensions().any(|known| known == extension) {
         return Ok(());
     }
     let what = format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
