@@ -45,6 +45,23 @@ impl<'a> PredictionPasses<'a> {
         Self { pyramid, shape, slices, passes: pyramid.passes(shape) }
     }
 
+    /// The passes down to a level, over its nodes alone: those at multiples of `2^level` along refined axes. Their codes
+    /// are the first of the block.
+    pub(crate) fn down_to(pyramid: &'a Pyramid, shape: [usize; 4], level: u32) -> Self {
+        let of_axis = |axis: Axis| if pyramid.order.contains(&axis) { level } else { 0 };
+        let apart = [Axis::X, Axis::Y, Axis::Z, Axis::T].map(of_axis);
+        let coarsest = pyramid.passes(shape).first().map_or(0, |first| first.level);
+        let mut coarse = Self::new(pyramid, std::array::from_fn(|a| shape[a].div_ceil(1 << apart[a])));
+        coarse.passes.iter_mut().for_each(|pass| pass.level = (pass.level + level).min(coarsest));
+        coarse
+    }
+
+    /// The number of nodes along x, y, z and k.
+    pub(crate) fn nodes(&self) -> [usize; 4] {
+        let [x, y, z, k] = self.shape;
+        [x, y, z, k * self.slices]
+    }
+
     /// The number of codes in each level part.
     pub(crate) fn part_lengths(&self) -> Vec<usize> {
         let of_slice = |part| self.passes.iter().filter(|p| p.part == part).map(|p| p.codes(self.shape)).sum::<usize>();

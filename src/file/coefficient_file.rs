@@ -5,6 +5,7 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::{SampleType, join_ranges};
 use crate::codec::WindowCodec;
+use crate::codec::coarse::Lattice;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
 use crate::source::{CHANNELS, ColourTransform};
@@ -292,6 +293,18 @@ impl CoefficientFile {
             return Ok(Block::of_missing(codec, size));
         }
         Block::read(reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
+    }
+
+    /// Every n-th sample along each axis of a block, in some frames of its window: frame after frame, x fastest. NaN
+    /// stands for missing samples, and for those of lost and damaged blocks that are skipped.
+    pub(crate) fn coarse(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        (stride, frames): (usize, &[usize]),
+    ) -> Result<Vec<f32>> {
+        let size = self.blocks.region(entry.id.block as usize).dims();
+        Lattice { size, stride, frames }.decode(&self.reader, codec, entry).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.

@@ -19,6 +19,7 @@
 //! layout            the planes of a batch; plane_values: a block's values, plane by plane
 //! splat/            a view's camera and backend; blocks into bands; bands into tiles
 //! weights           the divisors of means; expectation: the effect of block errors on the pixels of a view
+//! overview          single samples of a few frames, for a first impression
 //! scene             the source of blocks: a frame batch and the blocks selected for it
 //! report            what a rendering did: counts, times and errors
 //! scenes/           a coefficient file or an archive's frames as a scene
@@ -52,6 +53,7 @@ mod plane_values;
 mod splat;
 mod weights;
 mod expectation;
+mod overview;
 mod scene;
 mod report;
 mod scenes;
@@ -71,6 +73,7 @@ pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
 pub use layout::{Layout, Order};
+pub use overview::{OverviewRequest, Thinning, stride};
 pub use pictures::render_png;
 pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
 pub use report::{Picture, RenderReport, Rendered, ViewReport};

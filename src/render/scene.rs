@@ -7,10 +7,12 @@
 use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
 use super::layout::Layout;
+use super::overview::OverviewRequest;
 use super::plane_values::{BlockPlanes, BlockSource};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::memory;
+use crate::base::progress::Progress;
 use crate::view::camera::View;
 use crate::view::footprint::Kernel;
 use crate::wavelet::Lane;
@@ -51,6 +53,15 @@ pub trait Scene {
 
     /// An upper bound of the memory of one decoded block, in bytes.
     fn block_bytes(&self) -> usize;
+
+    /// An overview: single samples of a few frames, channel after channel, frame after frame, x fastest; NaN for missing
+    /// ones. `None`, the default, if the scene only reads whole blocks.
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
+    fn overview(&mut self, _request: &OverviewRequest<'_>, _progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
+        Ok(None)
+    }
 
     /// Opens one channel of a frame batch, and selects the blocks to read.
     ///

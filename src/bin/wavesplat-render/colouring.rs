@@ -51,7 +51,7 @@ impl Cli {
         let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel, colours);
         let needed = (in_colours && fixed.is_none(), of_errors);
-        let ranges = Ranges::small(scene, config, needed)?;
+        let ranges = Ranges::small(scene, config, needed, &self.common)?;
         let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
         let (range, norm) = match pixel {
             Pixel::Value => self.colour.spread(&map, &ranges, in_colours, &self.common)?,
@@ -113,7 +113,7 @@ impl Cli {
         if !self.along.is_automatic(self.colour.range)? {
             return Ok(colours);
         }
-        let colours = Ranges::small(scene, config, (true, false))?.stretch(all)?;
+        let colours = Ranges::small(scene, config, (true, false), &self.common)?.stretch(all)?;
         let (lo, hi) = colours.range();
         self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
         config.mode = self.along.mode(Some(&colours))?;

@@ -1,15 +1,33 @@
-//! The default range of colours, taken from small pictures.
+//! The default range of colours, taken from small pictures of an overview.
 
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::progress::Silent;
+use wavesplat::base::grid::Region;
+use wavesplat::base::progress::{Progress, Silent};
+use wavesplat::base::sample::SampleType;
+use wavesplat::cli::CommonArgs;
 use wavesplat::colour::{Norm, TransferFunction};
-use wavesplat::render::{Mode, RenderConfig, Scene, check, render};
+use wavesplat::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
+use wavesplat::render::{check, render, stride};
+use wavesplat::source::ArraySource;
+use wavesplat::view::footprint::Kernel;
 
 /// Number of slabs of small pictures, which are only used to find a range.
 const FEW_SLABS: usize = 32;
 
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;
+
+/// The longer side of small pictures.
+const PIXELS: f64 = 64.0;
+
+/// The largest distance of neighbours in an overview, in pixels of small pictures.
+const PIXELS_APART: f64 = 1.0;
+
+/// The number of frames in which to look for a range, and the number of samples up to which there are more than the
+/// least.
+const LEAST_FRAMES: usize = 4;
+const MOST_FRAMES: usize = 16;
+const MOST_SAMPLES: usize = 5 << 20;
 
 /// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
 /// range.
@@ -20,6 +38,89 @@ fn robust_range(values: &[f32]) -> (f64, f64) {
     let (large, least) = (0.4 * (hi - lo), 0.05 * (hi - lo));
     let clipped = |end: f64, inner: f64| if (end - inner).abs() >= large && high - low > least { inner } else { end };
     (clipped(lo, low), clipped(hi, high))
+}
+
+/// The settings of small pictures.
+fn small(config: &RenderConfig) -> RenderConfig {
+    let mut small = config.clone();
+    for view in &mut small.views {
+        let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
+        view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+        view.scale = view.scale.map(|s| s * shrink);
+    }
+    small.certify = false;
+    small.mode = match config.mode {
+        Mode::Projection => Mode::Projection,
+        // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
+        // where they end.
+        Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
+    };
+    small
+}
+
+/// At most `count` frames, spread over the archive.
+fn spread(scene: &dyn Scene, count: usize) -> Vec<usize> {
+    let last = scene.frames().unwrap_or(1).saturating_sub(1);
+    let mut frames: Vec<usize> = (0..count).map(|i| i * last / (count - 1)).collect();
+    frames.dedup();
+    frames
+}
+
+/// The number of frames of `voxels` voxels in which to look for a range.
+fn frames_of(voxels: usize) -> usize {
+    (MOST_SAMPLES / voxels).clamp(LEAST_FRAMES, MOST_FRAMES)
+}
+
+/// The values of small pictures that are not background: of an overview if the volume is large enough for one.
+fn values(scene: &mut dyn Scene, small: &RenderConfig, progress: &dyn Progress) -> Result<Vec<f32>> {
+    let mut values = Vec::new();
+    let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, std::env::var("APART").ok().and_then(|v| v.parse().ok()).unwrap_or(PIXELS_APART))? };
+    while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < thinning.blocks.edge {
+        thinning.stride *= 2;
+    }
+    let frames = spread(scene, frames_of(voxels(&thinning)));
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let request = OverviewRequest { thinning, frames: &frames, region };
+    let overview = if thinning.stride == 1 { None } else { scene.overview(&request, progress)? };
+    let Some(overview) = overview else {
+        let frames = spread(scene, frames_of(scene.grid().dims.iter().product()));
+        pictures(scene, &RenderConfig { frames, ..small.clone() }, progress, &mut values)?;
+        return Ok(values);
+    };
+    let (grid, kernel) = (thinning.grid(scene.grid()), small.kernel);
+    let config = RenderConfig {
+        kernel: Kernel { sigma: kernel.sigma.max(std::env::var("SIG").ok().and_then(|v| v.parse().ok()).unwrap_or(0.5) * grid.largest_spacing()), ..kernel },
+        frames: (0..frames.len()).collect(),
+        region: small.region.map(|region| thinning.region(&region)),
+        allowed: None,
+        ..small.clone()
+    };
+    for samples in overview.chunks_exact(request.samples()) {
+        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        let source = ArraySource::new(grid, SampleType::F32, bytes)?;
+        pictures(&mut FrameScene::new(Box::new(source), None), &config, &Silent, &mut values)?;
+    }
+    Ok(values)
+}
+
+/// The number of voxels in a frame of an overview.
+fn voxels(thinning: &Thinning) -> usize {
+    thinning.blocks().dims.iter().product()
+}
+
+/// Renders small pictures, and adds their values to `values`.
+fn pictures(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    progress: &dyn Progress,
+    values: &mut Vec<f32>,
+) -> Result<RenderReport> {
+    let pixels = config.frames.len() * config.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
+    let step = pixels.div_ceil(MOST_PIXELS).max(1);
+    render(scene, config, progress, &mut |rendered| {
+        values.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        Ok(())
+    })
 }
 
 /// The ranges of the pictures and of their errors.
@@ -37,52 +138,38 @@ impl Default for Ranges {
 }
 
 impl Ranges {
-    /// The ranges in small pictures, if any are needed: of pictures, or of their errors.
+    /// The ranges in small pictures, if any are needed: of pictures, or of their errors. The frames of the pictures are
+    /// spread over the archive, so the ranges do not depend on the frames to render. If the pictures are empty, the
+    /// range is (0, 1). Errors begin at 0.
     pub(crate) fn small(
         scene: &mut dyn Scene,
         config: &RenderConfig,
         (of_pictures, of_errors): (bool, bool),
+        common: &CommonArgs,
     ) -> Result<Self> {
+        let mut ranges = Self::default();
         if !of_pictures && !of_errors {
-            return Ok(Self::default());
+            return Ok(ranges);
         }
         check(scene, config)?; // before small pictures are rendered, so that errors name the full size
-        let mode = match config.mode {
-            Mode::Projection => Mode::Projection,
-            // The colours of a composite are those of its samples, and the largest samples along rays are enough to
-            // find where they end.
-            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
-        };
-        Self::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
+        let small = small(config);
+        if of_pictures {
+            ranges.set_values(values(scene, &small, &common.progress("range", "steps"))?);
+        }
+        if of_errors {
+            let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
+            let report = pictures(scene, &certified, &common.progress("error range", "pictures"), &mut Vec::new())?;
+            ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
+        }
+        Ok(ranges)
     }
 
-    /// The ranges in small pictures of frames spread over the archive. They do not depend on the frames to render. If
-    /// the pictures are empty, the range is (0, 1). Errors begin at 0.
-    fn of(scene: &mut dyn Scene, mut small: RenderConfig) -> Result<Self> {
-        const PIXELS: f64 = 64.0;
-        const FRAMES: usize = 16;
-        for view in &mut small.views {
-            let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
-            view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
-            view.scale = view.scale.map(|s| s * shrink);
-        }
-        let last = scene.frames().unwrap_or(1).saturating_sub(1);
-        small.frames = (0..FRAMES).map(|i| i * last / (FRAMES - 1)).collect();
-        small.frames.dedup();
-        let mut ranges = Self::default();
-        let pixels = small.frames.len() * small.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
-        let (step, mut values) = (pixels.div_ceil(MOST_PIXELS).max(1), Vec::new());
-        let report = render(scene, &small, &Silent, &mut |rendered| {
-            values.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
-            Ok(())
-        })?;
+    fn set_values(&mut self, mut values: Vec<f32>) {
         values.sort_unstable_by(f32::total_cmp);
         if !values.is_empty() {
-            ranges.values = robust_range(&values);
-            ranges.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
+            self.values = robust_range(&values);
+            self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
-        ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
-        Ok(ranges)
     }
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would

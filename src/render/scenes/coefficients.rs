@@ -4,15 +4,18 @@
 
 use super::batch_plan::{BatchPlan, SplatSource, error_planes};
 use super::coded::CodedBlock;
+use super::overview;
 use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::progress::Progress;
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
 use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
 use crate::render::layout::Layout;
+use crate::render::overview::OverviewRequest;
 use crate::render::plane_values::BlockPlanes;
 use crate::render::scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
@@ -79,6 +82,10 @@ impl Scene for CoefficientScene {
         let missing = (0..windows.len() as u32).any(|window| self.file.has_missing(window));
         let missing = if missing { 1 + 32 + 24 } else { 0 };
         self.file.largest_block() * (4 + 5 + 8 + refined + missing)
+    }
+
+    fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
+        overview::of_file(&self.file, request, progress).map(Some)
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {

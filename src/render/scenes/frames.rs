@@ -1,11 +1,14 @@
 //! The conventional method: splats every frame of an archive separately (eq 4).
 
+use super::overview;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::progress::Progress;
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
 use crate::render::config::RenderConfig;
 use crate::render::layout::Layout;
+use crate::render::overview::OverviewRequest;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
 use crate::render::scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
@@ -80,14 +83,28 @@ impl Scene for FrameScene {
         self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)
     }
 
+    fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
+        let (sample, missing_value, channels) = (self.archive.sample, self.missing_value, self.channels());
+        progress.start(Some((channels * request.frames.len()) as u64));
+        let mut samples = vec![f32::NAN; channels * request.samples()];
+        let of_frame = request.samples() / request.frames.len();
+        let frames = (0..channels).flat_map(|channel| request.frames.iter().map(move |frame| (channel, *frame)));
+        for ((channel, frame), samples) in frames.zip(samples.chunks_exact_mut(of_frame)) {
+            let window = self.source.window(frame, 1)?;
+            let window = in_channel(window, self.colour_transform.as_ref(), channel);
+            overview::Frames { window: window.as_ref(), sample, missing_value }.thin(0, request, samples)?;
+            window.check_unchanged()?;
+            progress.advance(1);
+        }
+        progress.finish();
+        Ok(Some(samples))
+    }
+
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
         let BatchRequest { frames, channel, config, .. } = *request;
         let (first, last) = (frames[0], frames[frames.len() - 1]);
         let window = self.source.window(first, last + 1 - first)?;
-        let window: Box<dyn FrameWindow + 'a> = match &self.colour_transform {
-            Some(colour_transform) => Box::new(ColourWindow { window, colour_transform, channel }),
-            None => window,
-        };
+        let window = in_channel(window, self.colour_transform.as_ref(), channel);
         let (archive, declared) = (&self.archive, self.missing_value);
         let can_miss = archive.sample.is_float() || declared.is_some();
         let scan = |frame: &usize| {
@@ -115,6 +132,18 @@ impl Scene for FrameScene {
             selection,
             errors,
         }))
+    }
+}
+
+/// One channel of a window, if it has several.
+fn in_channel<'a>(
+    window: Box<dyn FrameWindow>,
+    colour_transform: Option<&'a ColourTransform>,
+    channel: usize,
+) -> Box<dyn FrameWindow + 'a> {
+    match colour_transform {
+        Some(colour_transform) => Box::new(ColourWindow { window, colour_transform, channel }),
+        None => window,
     }
 }
 
