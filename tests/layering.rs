@@ -32,6 +32,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 21] = [
             "render/splat/lattice_bands.rs",
             "render/plan.rs",
             "render/weigh.rs",
+            "render/scenes/overview.rs",
             "extract/mod.rs",
             "file/batch.rs",
             "file/coefficient_file.rs",

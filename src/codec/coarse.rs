@@ -14,34 +14,37 @@ use crate::wavelet;
 use std::collections::HashMap;
 use wavesplat_format::{Axis, BlockEntry, Pyramid, Reader, Result, Storage};
 
-/// The coarsest level that has all nodes in the first part. Coarser lattices leave out nodes of it.
+/// The level whose nodes are all in the first level part. Coarser lattices leave out nodes of it.
 const COARSEST: u32 = 2;
 
 /// The samples to decode of a block.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Lattice<'a> {
+#[derive(Debug, Clone)]
+pub(crate) struct Lattice {
     /// The number of voxels of the block along x, y, z.
-    pub(crate) size: [usize; 3],
+    size: [usize; 3],
     /// Distance of voxels along each axis: a power of two.
-    pub(crate) stride: usize,
+    stride: usize,
     /// Frame numbers, counted from the first frame of the window.
-    pub(crate) frames: &'a [usize],
+    frames: Vec<usize>,
+    /// The level of a pyramid that has all its nodes.
+    level: u32,
 }
 
-impl Lattice<'_> {
+impl Lattice {
+    /// Every `stride`-th voxel, a power of two, along each axis of a block of `size` voxels, in some frames of the
+    /// window, ascending. Where a pyramid refines time, frames between its coarse nodes are replaced by the last one
+    /// before; a finer level is taken if two frames fall on the same node.
+    pub(crate) fn new(codec: &WindowCodec, size: [usize; 3], (stride, frames): (usize, &[usize])) -> Self {
+        let level = stride.trailing_zeros().min(COARSEST);
+        let refines_time = codec.scheme.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
+        let apart = |level: u32| frames.windows(2).all(|pair| pair[0] >> level != pair[1] >> level);
+        let level = if refines_time && !apart(level) { level.min(1) } else { level };
+        let on_node = |frame: &usize| if refines_time { frame >> level << level } else { *frame };
+        Self { size, stride, frames: frames.iter().map(on_node).collect(), level }
+    }
+
     fn voxels(&self) -> usize {
         self.size.iter().product()
-    }
-
-    /// The level of a pyramid that has all its nodes.
-    fn level(&self) -> u32 {
-        self.stride.trailing_zeros().min(std::env::var("LEV").ok().and_then(|v| v.parse().ok()).unwrap_or(COARSEST))
-    }
-
-    /// The frame that is decoded in place of another: if a pyramid refines time, one that its coarse nodes have.
-    fn nearest(&self, codec: &WindowCodec, frame: usize) -> usize {
-        let refines_time = codec.scheme.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
-        if refines_time { frame >> self.level() << self.level() } else { frame }
     }
 
     /// The index of every voxel of the lattice in an array of `shape` whose nodes are `1 << levels[axis]` voxels apart.
@@ -59,29 +62,27 @@ impl Lattice<'_> {
         codec: &WindowCodec,
         entry: &BlockEntry,
     ) -> Result<Vec<f32>> {
-        let frames: Vec<usize> = self.frames.iter().map(|f| self.nearest(codec, *f)).collect();
         let places = self.places(self.size, [0; 3]);
         if entry.lost {
-            return Ok(vec![f32::NAN; frames.len() * places.len()]);
+            return Ok(vec![f32::NAN; self.frames.len() * places.len()]);
         }
-        let coarse = Lattice { frames: &frames, ..*self };
         let values = match &codec.scheme.pyramid {
-            Some(pyramid) => coarse.from_parts(reader, codec, (pyramid, entry))?,
-            None => coarse.from_block(reader, codec, (&places, entry))?,
+            Some(pyramid) => self.values_of_parts(reader, codec, (pyramid, entry))?,
+            None => self.values_of_block(reader, codec, (&places, entry))?,
         };
         let mut samples: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
-        coarse.put_stored(reader, codec, (&places, entry), &mut samples)?;
+        self.put_stored(reader, codec, (&places, entry), &mut samples)?;
         Ok(samples)
     }
 
     /// From all coefficients that the frames need.
-    fn from_block<S: Storage>(
+    fn values_of_block<S: Storage>(
         &self,
         reader: &Reader<S>,
         codec: &WindowCodec,
         (places, entry): (&[usize], &BlockEntry),
     ) -> Result<Vec<f64>> {
-        let wanted = wavelet::needed(&codec.synthesis, self.frames);
+        let wanted = wavelet::needed(&codec.synthesis, &self.frames);
         let block = Block::read(reader, codec, entry, self.size, &wanted)?;
         let field = block.field(codec);
         let nodes = |k: usize| places.iter().map(|at| field.at(k * block.voxels + at)).collect();
@@ -89,31 +90,31 @@ impl Lattice<'_> {
     }
 
     /// From the first level parts of a pyramid.
-    fn from_parts<S: Storage>(
+    fn values_of_parts<S: Storage>(
         &self,
         reader: &Reader<S>,
         codec: &WindowCodec,
         (pyramid, entry): (&Pyramid, &BlockEntry),
     ) -> Result<Vec<f64>> {
         let ranges = codec.part_ranges(self.size);
-        let parts = &ranges[..[4, 2, 1][self.level() as usize]];
+        let parts = &ranges[..[4, 2, 1][self.level as usize]];
         let mut codes = Buffer::of(parts.last().map_or(0, |last| last.end));
         for (part, range) in (0..).zip(parts) {
             reader.codes(entry, part, &mut codes[range.clone()])?;
         }
         Ok(match pyramid.single {
-            true => self.from_codes::<f32>(codec, pyramid, (entry.stats.step, &codes)),
-            false => self.from_codes::<f64>(codec, pyramid, (entry.stats.step, &codes)),
+            true => self.values_of_codes::<f32>(codec, pyramid, (entry.stats.step, &codes)),
+            false => self.values_of_codes::<f64>(codec, pyramid, (entry.stats.step, &codes)),
         })
     }
 
-    fn from_codes<R: Real + Pooled>(
+    fn values_of_codes<R: Real + Pooled>(
         &self,
         codec: &WindowCodec,
         pyramid: &Pyramid,
         (step, codes): (f64, &[i32]),
     ) -> Vec<f64> {
-        let level = self.level();
+        let level = self.level;
         let passes = PredictionPasses::down_to(pyramid, codec.shape(self.size), level);
         let [x, y, z, ks] = passes.nodes();
         let mut field = Buffer::<R>::of(x * y * z * ks);
@@ -159,15 +160,13 @@ impl Lattice<'_> {
             sample::load(ty, bytes, &mut value);
             if codec.is_missing(value[0]) { f32::NAN } else { value[0] as f32 }
         };
-        let outliers = reader.outliers(entry)?;
-        let stored = outliers.positions.iter().zip(outliers.samples.chunks_exact(size));
-        let exact = reader.exact(entry)?;
-        let missing = reader.missing(entry)?;
-        let indices = self.frames.iter().flat_map(|f| places.iter().map(move |at| f * self.voxels() + at));
+        let (exact, missing, outliers) = (reader.exact(entry)?, reader.missing(entry)?, reader.outliers(entry)?);
         if exact.is_none() && missing.is_none() && outliers.positions.is_empty() {
             return Ok(());
         }
+        let stored = outliers.positions.iter().zip(outliers.samples.chunks_exact(size));
         let stored: HashMap<usize, &[u8]> = stored.map(|(at, bytes)| (*at as usize, bytes)).collect();
+        let indices = self.frames.iter().flat_map(|f| places.iter().map(move |at| f * self.voxels() + at));
         for (index, out) in indices.zip(samples) {
             if let Some(exact) = &exact {
                 *out = value(&exact[index * size..(index + 1) * size]);

@@ -295,16 +295,16 @@ impl CoefficientFile {
         Block::read(reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
-    /// Every n-th sample along each axis of a block, in some frames of its window: frame after frame, x fastest. NaN
+    /// Every n-th sample along each axis of a block, in some frames of its window (n, frames), as [`Lattice::new`] says: frame after frame, x fastest. NaN
     /// stands for missing samples, and for those of lost and damaged blocks that are skipped.
     pub(crate) fn coarse(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        (stride, frames): (usize, &[usize]),
+        thinned: (usize, &[usize]),
     ) -> Result<Vec<f32>> {
         let size = self.blocks.region(entry.id.block as usize).dims();
-        Lattice { size, stride, frames }.decode(&self.reader, codec, entry).map_err(|e| self.failed(e))
+        Lattice::new(codec, size, thinned).decode(&self.reader, codec, entry).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.

@@ -23,6 +23,10 @@ const PIXELS: f64 = 64.0;
 /// The largest distance of neighbours in an overview, in pixels of small pictures.
 const PIXELS_APART: f64 = 1.0;
 
+/// The least standard deviation of the kernel of an overview, in its spacings. It is less than for pictures to look at,
+/// since a wide kernel averages extremes away.
+const SIGMA: f64 = 0.5;
+
 /// The number of frames in which to look for a range, and the number of samples up to which there are more than the
 /// least.
 const LEAST_FRAMES: usize = 4;
@@ -74,7 +78,7 @@ fn frames_of(voxels: usize) -> usize {
 /// The values of small pictures that are not background: of an overview if the volume is large enough for one.
 fn values(scene: &mut dyn Scene, small: &RenderConfig, progress: &dyn Progress) -> Result<Vec<f32>> {
     let mut values = Vec::new();
-    let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, std::env::var("APART").ok().and_then(|v| v.parse().ok()).unwrap_or(PIXELS_APART))? };
+    let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, PIXELS_APART)? };
     while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < thinning.blocks.edge {
         thinning.stride *= 2;
     }
@@ -89,7 +93,7 @@ fn values(scene: &mut dyn Scene, small: &RenderConfig, progress: &dyn Progress) 
     };
     let (grid, kernel) = (thinning.grid(scene.grid()), small.kernel);
     let config = RenderConfig {
-        kernel: Kernel { sigma: kernel.sigma.max(std::env::var("SIG").ok().and_then(|v| v.parse().ok()).unwrap_or(0.5) * grid.largest_spacing()), ..kernel },
+        kernel: Kernel { sigma: kernel.sigma.max(SIGMA * grid.largest_spacing()), ..kernel },
         frames: (0..frames.len()).collect(),
         region: small.region.map(|region| thinning.region(&region)),
         allowed: None,
