@@ -24,6 +24,7 @@ mod layering;
 mod library;
 mod left_out;
 mod literature;
+mod overview;
 mod own_scene;
 mod partial;
 mod python;

@@ -1,7 +1,7 @@
 //! Colour maps and their files, annotations in pictures, and files that hold all pictures of a run.
 
 use super::render::decode_png;
-use super::{Work, read_npy};
+use super::{Archive, Work, read_npy};
 use std::io::Cursor;
 
 const SIZE: &str = "--size 48x40";
@@ -39,6 +39,37 @@ fn unreadable_maps_are_named_with_the_expected_form() {
     render("bad.csv").fails(3, &["bad.csv", "line 2", "a number for green"]);
     render("none.csv").fails(1, &["none.csv"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "bad.csv", "cut.json", "maps.json"]);
+}
+
+/// The least and the largest value of pictures.
+fn extremes(values: &[u8]) -> [f64; 2] {
+    let values = values.chunks_exact(4).map(|v| f64::from(f32::from_le_bytes([v[0], v[1], v[2], v[3]])));
+    let present = values.filter(|v| !v.is_nan());
+    present.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)])
+}
+
+#[test]
+fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([90, 76, 80], 5).npy());
+    work.wavesplat("convert a.npy -o a.wspl --window 3").ok();
+    work.wavesplat("convert a.npy -o haar.wspl --window 3 --basis haar --space none").ok();
+    for input in ["a.wspl", "haar.wspl", "a.npy --method direct"] {
+        for mode in ["", "--quantity emission", "--mode mip --slabs 32"] {
+            work.render(&format!("{input} --size 64x64 {mode} -o all.npy --force")).ok();
+            let [lo, hi] = extremes(read_npy(&work.read("all.npy")).1);
+            let mode = mode.trim_end_matches(" --slabs 32");
+            let range = |options: &str| {
+                let options = format!("{input} {SIZE} {mode} -o a.png --force --json {options}");
+                let json = work.render(&options).ok().json();
+                [0, 1].map(|i| json["range"][i].as_f64().unwrap())
+            };
+            let found = range("--frames 2 --threads 1 --memory 60MiB");
+            let off = (found[0] - lo).abs().max((found[1] - hi).abs());
+            assert!(off <= 0.1 * (hi - lo), "{input} {mode}: {found:?} instead of {lo} to {hi}");
+            assert_eq!(range("--frames 0,4 --threads 3"), found, "{input} {mode}");
+        }
+    }
 }
 
 #[test]

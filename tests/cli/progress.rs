@@ -36,6 +36,15 @@ fn every_long_command_reports_progress() {
     counts(&work.wavesplat("append a.wspl a.npy --force --progress json").ok(), &["convert"]);
     counts(&work.render("a.wspl --size 20x20 -o c.npy --progress json").ok(), &["render"]);
     counts(&work.render("a.wspl --size 20x20 --mode mip -o d.npy --progress json").ok(), &["render"]);
+    counts(&work.render("a.wspl --size 20x20 -o e.png --progress json").ok(), &["range", "render"]);
+    let errors = "a.wspl --size 20x20 -o f.npy --error-image g.png --progress json";
+    counts(&work.render(errors).ok(), &["range of errors", "render"]);
+    work.write("large.npy", Archive::smooth([80, 80, 80], 2).npy());
+    work.wavesplat("convert large.npy -o large.wspl").ok();
+    for input in ["large.wspl", "large.npy --method direct"] {
+        let run = work.render(&format!("{input} --size 20x20 -o h.png --force --frames 1 --progress json")).ok();
+        counts(&run, &["overview", "range", "render"]);
+    }
     let colours = "convert a.npy -o c.wspl --transfer-function turbo --progress json";
     counts(&work.wavesplat(colours).ok(), &["values", "convert"]);
 }

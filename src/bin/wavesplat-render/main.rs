@@ -17,7 +17,7 @@ mod views;
 
 use args::Cli;
 use generate::Program;
-use report::{Reported, summary};
+use report::{Reported, summary, unit};
 use scene::Opened;
 use std::process::ExitCode;
 use wavesplat::base::error::Result;
@@ -41,8 +41,7 @@ impl Cli {
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
-        let unit = if config.mode.is_projection() { "pictures" } else { "rows of slabs" };
-        let progress = self.common.progress("render", unit);
+        let progress = self.common.progress("render", unit(&config.mode));
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         self.common.detail(summary(&report));

@@ -1,10 +1,11 @@
 //! The default range of colours, taken from small pictures of an overview.
 
+use crate::report::unit;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Region;
+use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::{Progress, Silent};
 use wavesplat::base::sample::SampleType;
-use wavesplat::cli::CommonArgs;
+use wavesplat::cli::{CommonArgs, TerminalProgress};
 use wavesplat::colour::{Norm, TransferFunction};
 use wavesplat::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
 use wavesplat::render::{check, render, stride};
@@ -75,36 +76,62 @@ fn frames_of(voxels: usize) -> usize {
     (MOST_SAMPLES / voxels).clamp(LEAST_FRAMES, MOST_FRAMES)
 }
 
-/// The values of small pictures that are not background: of an overview if the volume is large enough for one.
-fn values(scene: &mut dyn Scene, small: &RenderConfig, progress: &dyn Progress) -> Result<Vec<f32>> {
+/// The progress of small pictures.
+fn progress(stage: &'static str, small: &RenderConfig, common: &CommonArgs) -> TerminalProgress {
+    common.progress(stage, unit(&small.mode))
+}
+
+/// The values of small pictures of a few frames.
+fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, common: &CommonArgs) -> Result<Vec<f32>> {
+    let frames = spread(scene, frames_of(scene.grid().dims.iter().product()));
     let mut values = Vec::new();
+    pictures(scene, &RenderConfig { frames, ..small.clone() }, &progress("range", small, common), &mut values)?;
+    Ok(values)
+}
+
+/// The values of small pictures of an overview; none if the scene has none, or the volume is too small for one.
+fn values_of_overview(scene: &mut dyn Scene, small: &RenderConfig, common: &CommonArgs) -> Result<Option<Vec<f32>>> {
+    let thinning = thinning(scene, small)?;
+    let frames = spread(scene, frames_of(voxels(&thinning)));
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let request = OverviewRequest { thinning, frames: &frames, region };
+    if thinning.stride == 1 {
+        return Ok(None);
+    }
+    let Some(overview) = scene.overview(&request, &common.progress("overview", "steps"))? else { return Ok(None) };
+    let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
+    let config = of_overview(&request, &grid, small);
+    for samples in overview.chunks_exact(request.samples()) {
+        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        let source = ArraySource::new(grid, SampleType::F32, bytes)?;
+        let mut frames = FrameScene::new(Box::new(source), None);
+        match scene.channels() {
+            1 => pictures(&mut frames, &config, &progress("range", small, common), &mut values)?,
+            _ => pictures(&mut frames, &config, &Silent, &mut values)?,
+        };
+    }
+    Ok(Some(values))
+}
+
+/// How to thin a scene for small pictures.
+fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
     let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, PIXELS_APART)? };
     while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < thinning.blocks.edge {
         thinning.stride *= 2;
     }
-    let frames = spread(scene, frames_of(voxels(&thinning)));
-    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let request = OverviewRequest { thinning, frames: &frames, region };
-    let overview = if thinning.stride == 1 { None } else { scene.overview(&request, progress)? };
-    let Some(overview) = overview else {
-        let frames = spread(scene, frames_of(scene.grid().dims.iter().product()));
-        pictures(scene, &RenderConfig { frames, ..small.clone() }, progress, &mut values)?;
-        return Ok(values);
-    };
-    let (grid, kernel) = (thinning.grid(scene.grid()), small.kernel);
-    let config = RenderConfig {
-        kernel: Kernel { sigma: kernel.sigma.max(SIGMA * grid.largest_spacing()), ..kernel },
-        frames: (0..frames.len()).collect(),
-        region: small.region.map(|region| thinning.region(&region)),
+    Ok(thinning)
+}
+
+/// The settings of small pictures of an overview.
+fn of_overview(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig) -> RenderConfig {
+    let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
+    RenderConfig {
+        kernel: Kernel { sigma, ..small.kernel },
+        frames: (0..request.frames.len()).collect(),
+        region: small.region.map(|region| request.thinning.region(&region)),
         allowed: None,
         ..small.clone()
-    };
-    for samples in overview.chunks_exact(request.samples()) {
-        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-        let source = ArraySource::new(grid, SampleType::F32, bytes)?;
-        pictures(&mut FrameScene::new(Box::new(source), None), &config, &Silent, &mut values)?;
     }
-    Ok(values)
 }
 
 /// The number of voxels in a frame of an overview.
@@ -158,11 +185,13 @@ impl Ranges {
         check(scene, config)?; // before small pictures are rendered, so that errors name the full size
         let small = small(config);
         if of_pictures {
-            ranges.set_values(values(scene, &small, &common.progress("range", "steps"))?);
+            let values = values_of_overview(scene, &small, common)?;
+            ranges.set_values(values.map_or_else(|| values_of_frames(scene, &small, common), Ok)?);
         }
         if of_errors {
             let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
-            let report = pictures(scene, &certified, &common.progress("error range", "pictures"), &mut Vec::new())?;
+            let report =
+                pictures(scene, &certified, &progress("range of errors", &certified, common), &mut Vec::new())?;
             ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
         }
         Ok(ranges)

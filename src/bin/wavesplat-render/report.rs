@@ -9,8 +9,8 @@ use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli;
-use wavesplat::render::RenderReport;
 use wavesplat::render::sink::Provenance;
+use wavesplat::render::{Mode, RenderReport};
 
 /// The report of `--json`.
 #[derive(Serialize)]
@@ -24,6 +24,11 @@ pub(crate) struct Reported<'a> {
     /// Bytes read of the coefficient file, including its directory, and its size.
     pub(crate) file_bytes_read: Option<u64>,
     pub(crate) file_bytes: Option<u64>,
+}
+
+/// What the progress of pictures counts.
+pub(crate) fn unit(mode: &Mode) -> &'static str {
+    if mode.is_projection() { "pictures" } else { "rows of slabs" }
 }
 
 impl Cli {
