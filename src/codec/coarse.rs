@@ -181,3 +181,51 @@ impl Lattice {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wavesplat_format::Stencil;
+
+    /// The next of some scattered numbers below `end`.
+    fn below(end: usize, state: &mut u64) -> usize {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 33) as usize % end
+    }
+
+    fn some_pyramid(state: &mut u64) -> Pyramid {
+        let mut left = vec![Axis::X, Axis::Y, Axis::Z, Axis::T];
+        let order = (0..below(5, state)).map(|_| left.swap_remove(below(left.len(), state))).collect();
+        let stencil = [Stencil::Linear, Stencil::Cubic][below(2, state)];
+        Pyramid { order, stencil, growth: 1.5, most: [1.0, 2.0, 9.0][below(3, state)], single: false }
+    }
+
+    #[test]
+    fn the_nodes_of_a_level_are_those_of_all_passes() {
+        let state = &mut 7;
+        let mut compared = 0;
+        for case in 0..2000 {
+            let pyramid = some_pyramid(state);
+            let shape: [usize; 4] = std::array::from_fn(|_| 1 + below([17, 4][case % 2], state));
+            let codes: Vec<i32> = (0..shape.iter().product()).map(|_| below(9, state) as i32 - 4).collect();
+            let mut whole = vec![0.0; codes.len()];
+            PredictionPasses::new(&pyramid, shape).decode(0.3, &codes, &mut whole);
+            for level in 0..=COARSEST {
+                let passes = PredictionPasses::down_to(&pyramid, shape, level);
+                let [x, y, z, _] = passes.nodes();
+                let mut coarse = vec![0.0; passes.nodes().iter().product()];
+                passes.decode(0.3, &codes[..coarse.len()], &mut coarse);
+                let apart = [Axis::X, Axis::Y, Axis::Z, Axis::T]
+                    .map(|a| usize::from(pyramid.order.contains(&a)) * level as usize);
+                for (i, found) in coarse.iter().enumerate() {
+                    let node = [i % x, i / x % y, i / (x * y) % z, i / (x * y * z)];
+                    let at: [usize; 4] = std::array::from_fn(|a| node[a] << apart[a]);
+                    let expected: f64 = whole[at[0] + shape[0] * (at[1] + shape[1] * (at[2] + shape[2] * at[3]))];
+                    assert_eq!(found.to_bits(), expected.to_bits(), "{pyramid:?} {shape:?} {level} {at:?}");
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 1_000_000, "{compared}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Colour maps and their files, annotations in pictures, and files that hold all pictures of a run.
 
 use super::render::decode_png;
-use super::{Archive, Work, read_npy};
+use super::{Archive, Work, floats, read_npy};
 use std::io::Cursor;
 
 const SIZE: &str = "--size 48x40";
@@ -42,9 +42,8 @@ fn unreadable_maps_are_named_with_the_expected_form() {
 }
 
 /// The least and the largest value of pictures.
-fn extremes(values: &[u8]) -> [f64; 2] {
-    let values = values.chunks_exact(4).map(|v| f64::from(f32::from_le_bytes([v[0], v[1], v[2], v[3]])));
-    let present = values.filter(|v| !v.is_nan());
+fn extremes(values: &[f32]) -> [f64; 2] {
+    let present = values.iter().filter(|v| !v.is_nan()).map(|v| f64::from(*v));
     present.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)])
 }
 
@@ -57,7 +56,7 @@ fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
     for input in ["a.wspl", "haar.wspl", "a.npy --method direct"] {
         for mode in ["", "--quantity emission", "--mode mip --slabs 32"] {
             work.render(&format!("{input} --size 64x64 {mode} -o all.npy --force")).ok();
-            let [lo, hi] = extremes(read_npy(&work.read("all.npy")).1);
+            let [lo, hi] = extremes(&floats(&read_npy(&work.read("all.npy")).1));
             let mode = mode.trim_end_matches(" --slabs 32");
             let range = |options: &str| {
                 let options = format!("{input} {SIZE} {mode} -o a.png --force --json {options}");

@@ -14,8 +14,8 @@ pub(crate) struct ColourArgs {
     /// (FILE#NAME selects one of several maps) or .csv with value,red,green,blue [default: viridis]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Colour")]
     colormap: Option<String>,
-    /// Values of the first and the last colour [default: a file's own, or the range in small pictures of 16 frames,
-    /// without a few extreme values that would take most of the colours; symmetric about 0 with coolwarm]
+    /// Values of the first and the last colour [default: a file's own, or the range in small pictures of up to
+    /// 16 frames, without a few extreme values that would take most of the colours; symmetric about 0 with coolwarm]
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = "Colour")]
     pub(crate) range: Option<Pair>,
     /// Map values to colours linearly, or by their logarithm (down to a ten-thousandth of the largest)

@@ -98,17 +98,18 @@ fn values_of_overview(scene: &mut dyn Scene, small: &RenderConfig, common: &Comm
     if thinning.stride == 1 {
         return Ok(None);
     }
-    let Some(overview) = scene.overview(&request, &common.progress("overview", "steps"))? else { return Ok(None) };
+    let Some(mut overview) = scene.overview(&request, &common.progress("overview", "steps"))? else { return Ok(None) };
     let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
     let config = of_overview(&request, &grid, small);
-    for samples in overview.chunks_exact(request.samples()) {
-        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-        let source = ArraySource::new(grid, SampleType::F32, bytes)?;
-        let mut frames = FrameScene::new(Box::new(source), None);
+    while !overview.is_empty() {
+        let others = overview.split_off(request.samples());
+        let bytes = overview.into_iter().flat_map(f32::to_le_bytes).collect();
+        let mut frames = FrameScene::new(Box::new(ArraySource::new(grid, SampleType::F32, bytes)?), None);
         match scene.channels() {
             1 => pictures(&mut frames, &config, &progress("range", small, common), &mut values)?,
             _ => pictures(&mut frames, &config, &Silent, &mut values)?,
         };
+        overview = others;
     }
     Ok(Some(values))
 }
