@@ -51,8 +51,8 @@ fn extremes(values: &[f32]) -> [f64; 2] {
 fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([90, 76, 80], 5).npy());
-    work.wavesplat("convert a.npy -o a.wspl --window 3").ok();
-    work.wavesplat("convert a.npy -o haar.wspl --window 3 --basis haar --space none").ok();
+    work.wavesplat("convert a.npy -o a.wspl --window 4").ok();
+    work.wavesplat("convert a.npy -o haar.wspl --window 4 --basis haar --space none").ok();
     for input in ["a.wspl", "haar.wspl", "a.npy --method direct"] {
         for mode in ["", "--quantity emission", "--mode mip --slabs 32"] {
             work.render(&format!("{input} --size 64x64 {mode} -o all.npy --force")).ok();

@@ -36,8 +36,8 @@ fn every_long_command_reports_progress() {
     counts(&work.wavesplat("append a.wspl a.npy --force --progress json").ok(), &["convert"]);
     counts(&work.render("a.wspl --size 20x20 -o c.npy --progress json").ok(), &["render"]);
     counts(&work.render("a.wspl --size 20x20 --mode mip -o d.npy --progress json").ok(), &["render"]);
-    counts(&work.render("a.wspl --size 20x20 -o e.png --progress json").ok(), &["range", "render"]);
-    let errors = "a.wspl --size 20x20 -o f.npy --error-image g.png --progress json";
+    counts(&work.render("a.wspl --size 20x20 --frames 3 -o e.png --progress json").ok(), &["range", "render"]);
+    let errors = "a.wspl --size 20x20 --frames 3 -o f.npy --error-image g.png --progress json";
     counts(&work.render(errors).ok(), &["range of errors", "render"]);
     work.write("large.npy", Archive::smooth([80, 80, 80], 2).npy());
     work.wavesplat("convert large.npy -o large.wspl").ok();
