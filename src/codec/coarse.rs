@@ -213,7 +213,7 @@ mod tests {
             for level in 0..=COARSEST {
                 let passes = PredictionPasses::down_to(&pyramid, shape, level);
                 let [x, y, z, _] = passes.nodes();
-                let mut coarse = vec![0.0; passes.nodes().iter().product()];
+                let mut coarse = vec![0.0_f64; passes.nodes().iter().product()];
                 passes.decode(0.3, &codes[..coarse.len()], &mut coarse);
                 let apart = [Axis::X, Axis::Y, Axis::Z, Axis::T]
                     .map(|a| usize::from(pyramid.order.contains(&a)) * level as usize);
@@ -227,5 +227,29 @@ mod tests {
             }
         }
         assert!(compared > 1_000_000, "{compared}");
+    }
+    #[test]
+    fn some_ks_have_the_nodes_of_all_passes() {
+        let state = &mut 11;
+        let (mut compared, mut left_out) = (0, 0);
+        for case in 0..2000 {
+            let pyramid = some_pyramid(state);
+            let [x, y, z] = std::array::from_fn(|_| 1 + below([9, 4][case % 2], state));
+            let shape = [x, y, z, 1 + below(33, state)];
+            let codes: Vec<i32> = (0..shape.iter().product()).map(|_| below(9, state) as i32 - 4).collect();
+            let passes = PredictionPasses::new(&pyramid, shape);
+            let wanted: Vec<bool> = (0..shape[3]).map(|_| below(8, state) == 0).collect();
+            let (mut whole, mut some) = (vec![0.0_f64; codes.len()], vec![f64::NAN; codes.len()]);
+            assert_eq!(passes.decode(0.3, &codes, &mut whole), passes.decode_some(&wanted, 0.3, &codes, &mut some));
+            let of_k = |nodes: &[f64], k: usize| nodes[k * x * y * z..][..x * y * z].to_vec();
+            for k in 0..shape[3] {
+                let (found, expected) = (of_k(&some, k), of_k(&whole, k));
+                assert!(!wanted[k] || found == expected, "{pyramid:?} {shape:?} {wanted:?} {k}");
+                assert!(found.iter().all(|v| v.is_finite()));
+                compared += usize::from(wanted[k]);
+                left_out += usize::from(found != expected);
+            }
+        }
+        assert!(compared > 2000 && left_out > 2000, "{compared} {left_out}");
     }
 }

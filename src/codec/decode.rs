@@ -111,12 +111,12 @@ impl Block {
         Field::decode(codec, self.size, self.step, &self.codes)
     }
 
-    /// Decodes all codes of a pyramid, if that is needed at once: because one k cannot be decoded without the others,
-    /// or because some samples are overridden.
-    pub(crate) fn field_at_once(&self, codec: &WindowCodec) -> Option<Field<'static>> {
+    /// Decodes every k that `wanted` marks of a pyramid, if that is needed at once: because one k cannot be decoded
+    /// without others, or because some samples are overridden.
+    pub(crate) fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
-        at_once.then(|| Field::refined(codec, self.size, self.step, &self.codes))
+        at_once.then(|| Field::refined(codec, self.size, self.step, (&self.codes, wanted)))
     }
 
     /// Whether any sample is stored exactly, and overrides the coefficients.

@@ -78,12 +78,18 @@ impl<'a> Plane<'a> {
 }
 
 impl Field<'static> {
-    /// Decodes all codes of a block of `size` voxels that a pyramid refines.
-    pub(super) fn refined(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
+    /// Decodes the codes of a block of `size` voxels that a pyramid refines, of every k that `wanted` marks.
+    pub(super) fn refined(
+        codec: &WindowCodec,
+        size: [usize; 3],
+        step: f64,
+        (codes, wanted): (&[i32], &[bool]),
+    ) -> Self {
+        let shape = codec.shape(size);
         let (values, marked) = match &codec.scheme.pyramid {
             _ if codes.is_empty() => (Values::Zero, vec![false; codec.basis.coefficients()]),
-            Some(pyramid) if pyramid.single => refined(pyramid, codec.shape(size), step, codes, Values::Single),
-            Some(pyramid) => refined(pyramid, codec.shape(size), step, codes, Values::Double),
+            Some(pyramid) if pyramid.single => refined(pyramid, shape, step, (codes, wanted), Values::Single),
+            Some(pyramid) => refined(pyramid, shape, step, (codes, wanted), Values::Double),
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
         };
         Self { values, marked }
@@ -94,7 +100,7 @@ impl<'a> Field<'a> {
     /// Decodes all codes of a block of `size` voxels. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a [i32]) -> Self {
         if codec.scheme.pyramid.is_some() || codes.is_empty() {
-            return Field::refined(codec, size, step, codes);
+            return Field::refined(codec, size, step, (codes, &vec![true; codec.basis.coefficients()]));
         }
         Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
     }
@@ -250,10 +256,10 @@ fn refined<'a, R: Real + Pooled>(
     pyramid: &Pyramid,
     shape: [usize; 4],
     step: f64,
-    codes: &[i32],
+    (codes, wanted): (&[i32], &[bool]),
     values: fn(Buffer<R>) -> Values<'a>,
 ) -> (Values<'a>, Vec<bool>) {
     let mut field = Buffer::of(codes.len());
-    let marked = PredictionPasses::new(pyramid, shape).decode(step, codes, &mut field);
+    let marked = PredictionPasses::new(pyramid, shape).decode_some(wanted, step, codes, &mut field);
     (values(field), marked)
 }

@@ -36,13 +36,15 @@ pub(crate) struct PredictionPasses<'a> {
     /// The number of slices.
     slices: usize,
     passes: Vec<Pass>,
+    /// For each k of a slice, true.
+    every: Vec<bool>,
 }
 
 impl<'a> PredictionPasses<'a> {
     pub(crate) fn new(pyramid: &'a Pyramid, [x, y, z, k]: [usize; 4]) -> Self {
         let apart = !pyramid.order.contains(&Axis::T);
         let (shape, slices) = if apart { ([x, y, z, 1], k) } else { ([x, y, z, k], 1) };
-        Self { pyramid, shape, slices, passes: pyramid.passes(shape) }
+        Self { pyramid, shape, slices, passes: pyramid.passes(shape), every: vec![true; shape[3]] }
     }
 
     /// The passes down to a level, over its nodes alone: those at multiples of `2^level` along refined axes. Their codes
@@ -77,15 +79,41 @@ impl<'a> PredictionPasses<'a> {
     /// Decodes codes to the field; `codes` are all codes of the block, pass after pass. Returns for each k whether some
     /// node is not zero; where k is refined, true for all or none.
     pub(crate) fn decode<R: Real>(&self, step: f64, codes: &[i32], field: &mut [R]) -> Vec<bool> {
+        self.decode_some(&vec![true; self.nodes()[3]], step, codes, field)
+    }
+
+    /// As [`Self::decode`], of every k that `wanted` marks. The nodes of others have any value of a decoded block, or 0.
+    pub(crate) fn decode_some<R: Real>(&self, wanted: &[bool], step: f64, codes: &[i32], field: &mut [R]) -> Vec<bool> {
         let marked = self.marked(codes);
-        for (slice, nodes) in self.slices(field).enumerate() {
-            if marked[slice] {
-                self.decode_slice(slice, step, codes, nodes);
-            } else {
+        for ((slice, nodes), wanted) in self.slices(field).enumerate().zip(wanted.chunks_exact(self.shape[3])) {
+            let is_empty = !marked[slice] || !wanted.contains(&true);
+            if is_empty || wanted.contains(&false) {
                 nodes.fill(R::default());
+            }
+            if !is_empty {
+                self.decode_slice((slice, wanted), step, codes, nodes);
             }
         }
         marked
+    }
+
+    /// For each pass, every k of a slice whose nodes of this pass have an effect on those that `wanted` marks.
+    fn needed_in_passes(&self, wanted: &[bool]) -> Vec<Vec<bool>> {
+        let mut needed: Vec<Vec<bool>> = Vec::new();
+        for n in (0..self.passes.len()).rev() {
+            let mut of_pass = needed.last().map_or(wanted, Vec::as_slice).to_vec();
+            if let Some(later) = self.passes.get(n + 1).filter(|later| later.axis == Some(Axis::T)) {
+                let (first, distance) = later.nodes(Axis::T.index());
+                let evens = self.shape[3].div_ceil(distance);
+                for k in (first..self.shape[3]).step_by(distance).filter(|k| needed[needed.len() - 1][*k]) {
+                    let taps = taps(self.pyramid.stencil, k / distance, evens);
+                    (0..taps.count).for_each(|tap| of_pass[(taps.first + tap) * distance] = true);
+                }
+            }
+            needed.push(of_pass);
+        }
+        needed.reverse();
+        needed
     }
 
     /// For each k, whether some code is not zero; if k is refined, the same for all of them.
@@ -99,13 +127,15 @@ impl<'a> PredictionPasses<'a> {
         let some = self.of_slice(k).any(|(_, range)| !rows::all_zero(&codes[range]));
         if some {
             nodes.resize(self.slice(), R::default());
-            self.decode_slice(k, step, codes, nodes);
+            self.decode_slice((k, &self.every), step, codes, nodes);
         }
         some
     }
 
-    fn decode_slice<R: Real>(&self, slice: usize, step: f64, codes: &[i32], nodes: &mut [R]) {
-        for (refined, range) in self.of_slice(slice) {
+    fn decode_slice<R: Real>(&self, (slice, wanted): (usize, &[bool]), step: f64, codes: &[i32], nodes: &mut [R]) {
+        let needed = self.needed_in_passes(wanted);
+        for ((refined, range), needed) in self.of_slice(slice).zip(&needed) {
+            let refined = Refined { needed, ..refined };
             let step = R::of(self.pyramid.step(step, refined.pass.level));
             decode_pass(&refined, step, &codes[range], nodes);
         }
@@ -172,7 +202,8 @@ impl<'a> PredictionPasses<'a> {
             let codes = pass.codes(self.shape);
             let first = start + slice * codes;
             start += self.slices * codes;
-            (Refined { stencil: self.pyramid.stencil, shape: self.shape, pass }, first..first + codes)
+            let (stencil, shape, needed) = (self.pyramid.stencil, self.shape, &self.every);
+            (Refined { stencil, shape, pass, needed }, first..first + codes)
         })
     }
 }
@@ -182,6 +213,8 @@ struct Refined<'a> {
     stencil: Stencil,
     shape: [usize; 4],
     pass: &'a Pass,
+    /// For each k, whether its nodes are needed.
+    needed: &'a [bool],
 }
 
 /// Computes eq 32 for all nodes of a pass.
@@ -218,7 +251,7 @@ impl Refined<'_> {
         let mut scratch = Scratch::new(self.shape[0].max(count));
         let Scratch { predicted, apart, gathered } = &mut scratch;
         let predicted = &mut predicted[..count];
-        for at in Rows::new(self.pass, shape) {
+        for at in Rows::new(self.pass, shape).filter(|at| self.needed[at.index[3]]) {
             match self.pass.axis {
                 None => predicted.fill(R::default()),
                 Some(Axis::X) => self.predict_along(&field[at.start..], &mut gathered[0], predicted),

@@ -37,7 +37,7 @@ impl<'a> CodedBlock<'a> {
             let dense = Dense::Samples(block.samples(codec));
             return Self { plan, block, errors, dense, few: Vec::new() };
         }
-        let field = block.field_at_once(codec);
+        let field = block.field_at_once(codec, &plan.wanted);
         let mut few = overrides(plan, &block, field.as_ref());
         let dense = match plan.by_values {
             true => Dense::Values(values(plan, &block, field.as_ref(), &mut few)),
