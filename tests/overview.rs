@@ -229,6 +229,8 @@ fn the_stride_of_an_overview_follows_views_and_region() {
     assert_eq!(of(&zoomed), 1);
     let thin = Region { start: [0; 3], end: [256, 256, 14] };
     assert_eq!(of(&RenderConfig { region: Some(thin), ..config.clone() }), 2);
+    let slice = Region { start: [0, 0, 7], end: [256, 256, 8] };
+    assert_eq!(of(&RenderConfig { region: Some(slice), ..config.clone() }), 1);
     let mut fading = config;
     fading.kernel.tau = 1.0;
     assert_eq!(of(&fading), 1);

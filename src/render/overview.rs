@@ -78,7 +78,7 @@ impl OverviewRequest<'_> {
 }
 
 /// Distance of voxels in an overview for the views of `config`: the largest power of two at which neighbours are at most
-/// `pixels` pixels apart in every view, and the region has some voxels along each axis.
+/// `pixels` pixels apart in every view, and the region has some voxels along each axis. A flat volume may have one.
 ///
 /// # Errors
 /// Views that no camera can have.
@@ -90,7 +90,7 @@ pub fn stride(grid: &Grid, config: &RenderConfig, pixels: f64) -> Result<usize> 
         let spacing = grid.largest_spacing() * *stride as f64;
         spacing * scale <= pixels
             && spacing * config.kernel.tau <= LITTLE_FADING
-            && region.dims().iter().all(|n| *n == 1 || *n >= LEAST_VOXELS * stride)
+            && (0..3).all(|a| grid.dims[a] == 1 || region.dims()[a] >= LEAST_VOXELS * stride)
     };
     Ok([2, 4, 8, 16, 32, 64].into_iter().take_while(fits).last().unwrap_or(1))
 }

@@ -1,11 +1,11 @@
 //! Overviews of coefficient files and of frames: single samples of few frames, without decoding or reading the others.
 
-use super::super::overview::OverviewRequest;
 use crate::base::error::Result;
 use crate::base::grid::Region;
 use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, is_missing};
 use crate::file::CoefficientFile;
+use crate::render::overview::OverviewRequest;
 use crate::source::FrameWindow;
 use rayon::prelude::*;
 use wavesplat_format::BlockEntry;
@@ -90,8 +90,8 @@ impl Frames<'_> {
         let is_needed = |axis: usize, at: usize| (start[axis]..end[axis]).contains(&at);
         let planes = samples.par_chunks_exact_mut(nx * ny).zip(zs).filter(|(_, z)| is_needed(2, *z));
         planes.try_for_each(|(plane, z)| {
-            let rows = plane.chunks_exact_mut(nx).zip(&ys).filter(|(_, y)| is_needed(1, **y));
-            { rows }.try_for_each(|(row, y)| {
+            let mut rows = plane.chunks_exact_mut(nx).zip(&ys).filter(|(_, y)| is_needed(1, **y));
+            rows.try_for_each(|(row, y)| {
                 let all = self.row(frame, (*y, z), request.thinning.blocks.dims[0])?;
                 row.iter_mut().zip(&xs).for_each(|(out, x)| *out = all[*x]);
                 Ok(())
