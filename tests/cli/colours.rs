@@ -66,7 +66,7 @@ fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
             let found = range("--frames 2 --threads 1 --memory 60MiB");
             let off = (found[0] - lo).abs().max((found[1] - hi).abs());
             assert!(off <= 0.1 * (hi - lo), "{input} {mode}: {found:?} instead of {lo} to {hi}");
-            assert_eq!(range("--frames 0,4 --threads 3"), found, "{input} {mode}");
+            assert_eq!(range("--frames 4 --threads 3"), found, "{input} {mode}");
         }
     }
 }
