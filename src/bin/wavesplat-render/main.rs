@@ -41,7 +41,7 @@ impl Cli {
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
-        let unit = if config.mode.is_projection() { "pictures" } else { "rows of slabs" };
+        let unit = if config.mode.is_projection() { "pictures" } else { "slices" };
         let progress = self.common.progress("render", unit);
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;

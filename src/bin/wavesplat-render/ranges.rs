@@ -5,9 +5,6 @@ use wavesplat::base::progress::Silent;
 use wavesplat::colour::{Norm, TransferFunction};
 use wavesplat::render::{Mode, RenderConfig, Scene, check, render};
 
-/// Number of slabs of small pictures, which are only used to find a range.
-const FEW_SLABS: usize = 32;
-
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;
 
@@ -51,7 +48,7 @@ impl Ranges {
             Mode::Projection => Mode::Projection,
             // The colours of a composite are those of its samples, and the largest samples along rays are enough to
             // find where they end.
-            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
+            Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
         };
         Self::of(scene, RenderConfig { certify: of_errors, mode, ..config.clone() })
     }

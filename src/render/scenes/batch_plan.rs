@@ -47,7 +47,8 @@ impl BatchPlan {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let by_values = what != SplatSource::Samples && !config.certify && few_asked(file, &codec, window, config);
+        let few = !config.mode.is_projection() || few_asked(file, &codec, window, config);
+        let by_values = what != SplatSource::Samples && !config.certify && few;
         let counts = (kept.len(), frames.len());
         let layout = layout(file, &codec, (window, channel), (what, by_values), counts, config);
         Ok(Self { what, codec, frames, wanted, kept, by_values, layout })
@@ -91,7 +92,6 @@ fn layout(
         values: values || exact || record.outliers > 0 || missing,
         absent: missing,
         error_planes: error_planes(config, codec.parts()),
-        lengths: false,
         order: if values || is_dense { Order::Pixels } else { Order::Planes },
     }
 }

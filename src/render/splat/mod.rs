@@ -25,6 +25,5 @@ pub(super) mod accumulator;
 
 pub(super) use accumulator::{BandAccumulator, Pixels, ResolvedTile, splat};
 pub(super) use band::SplatStats;
-pub(super) use slab::Slab;
-pub(super) use tile_rect::TileRect;
+
 pub(super) use view_setup::ViewSetup;

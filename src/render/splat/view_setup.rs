@@ -45,14 +45,7 @@ impl ViewSetup {
         config: &RenderConfig,
         view: &View,
     ) -> Result<Self> {
-        let clip = config.region.unwrap_or(grid.whole());
-        if !grid.whole().contains(&clip) || clip.is_empty() {
-            let d = grid.dims;
-            return Err(Error::setting(
-                "region",
-                format!("not within the volume of {}x{}x{} voxels", d[0], d[1], d[2]),
-            ));
-        }
+        let clip = config.clip(&grid)?;
         let camera = Camera::new(view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
         let nearest = camera.nearest_of(&grid.crop(&clip));

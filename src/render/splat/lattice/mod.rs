@@ -28,7 +28,7 @@ mod tests;
 pub(super) use cells::{CellPlane, Cells, Rectangle};
 pub(super) use gather::Gather;
 pub(super) use picture::Lattice;
-pub(super) use shear::Shear;
+pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, Work};
 
 /// How values are spread over the cells of a view.

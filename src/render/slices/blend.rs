@@ -1,0 +1,205 @@
+//! Composites the slices front to back (eq 31; the operator "over" of [PorterDuff](crate::bibliography)).
+
+use super::GROUP;
+use super::filter::Sixteen;
+use super::layer::Units;
+use super::row::{Blend, Row};
+use super::table::{ENTRIES, Table};
+
+/// Emission and absorption: the light of each slice passes through the slices before it.
+pub(in crate::render) struct Composite {
+    pub(in crate::render) table: Table,
+}
+
+/// Rays with less transmittance are opaque: the rest is an eighth of a level of an 8-bit picture.
+const CLOSED: f32 = 1.0 / 2048.0;
+
+impl Blend for Composite {
+    /// Red, green and blue of the light, and the transmittance.
+    type Group = [[f32; 4]; GROUP];
+    type Cell = [f32; 4];
+
+    const EMPTY: Self::Group = [Self::NOTHING; GROUP];
+    const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+    /// The limit is the largest transmittance of a group.
+    const OPEN: f32 = 1.0;
+    const CENTRED: bool = false;
+    const NUMBERS: usize = 4;
+
+    fn units(&self, _: f64) -> Units {
+        self.table.units
+    }
+
+    fn shows(&self, range: (f32, f32)) -> bool {
+        self.table.shows(range)
+    }
+
+    fn hides(limit: f32, _: (f32, f32)) -> bool {
+        Self::is_closed(limit)
+    }
+
+    fn is_closed(limit: f32) -> bool {
+        limit < CLOSED
+    }
+
+    fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]) {
+        add(row, &self.table.entries, groups, limits);
+    }
+
+    fn cells(group: &Self::Group) -> [[f32; 4]; GROUP] {
+        *group
+    }
+
+    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
+        let mut sum = [0.0; 4];
+        for (row, weight) in cells.into_iter().zip(down) {
+            let mut of_row = [0.0; 4];
+            for (cell, weight) in row.iter().zip(across) {
+                (0..4).for_each(|i| of_row[i] += weight * cell[i]);
+            }
+            (0..4).for_each(|i| sum[i] += weight * of_row[i]);
+        }
+        let [r, g, b, through] = sum;
+        let pixel = [r, g, b, 1.0 - through].map(|number| number.clamp(0.0, 1.0));
+        out.iter_mut().zip(pixel).for_each(|(to, from)| *to = from);
+    }
+
+    fn background(out: &mut [f32]) {
+        out.fill(0.0);
+    }
+}
+
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn add(row: &Row<'_>, entries: &[[f32; 8]; ENTRIES], groups: &mut [[[f32; 4]; GROUP]], limits: &mut [f32]) {
+    for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
+        if !row.live[n] {
+            continue;
+        }
+        *limit = if row.is_whole(n) {
+            add_whole(&row.sums(n), entries, group)
+        } else {
+            let (means, lengths) = row.means(n);
+            add_part(&means, &lengths, entries, group)
+        };
+    }
+}
+
+/// For each number, the entry before it, and how far it is towards the next, from 0 to 1.
+#[inline(always)]
+fn places(numbers: &Sixteen) -> ([u32; GROUP], Sixteen) {
+    /// Adding this rounds a number to a whole one, which the last bits then hold.
+    const WHOLE: f32 = 12_582_912.0;
+    let (mut entries, mut rests) = ([0; GROUP], [0.0; GROUP]);
+    for i in 0..GROUP {
+        let number = numbers[i].clamp(0.0, (ENTRIES - 1) as f32);
+        let rounded = (number - 0.5) + WHOLE;
+        entries[i] = rounded.to_bits() & (ENTRIES as u32 - 1);
+        rests[i] = number - (rounded - WHOLE);
+    }
+    (entries, rests)
+}
+
+/// Adds a slice of full length behind a group of cells. Returns their largest transmittance.
+#[inline(always)]
+fn add_whole(means: &Sixteen, entries: &[[f32; 8]; ENTRIES], group: &mut [[f32; 4]; GROUP]) -> f32 {
+    let (places, rests) = places(means);
+    let mut most = [0.0_f32; 4];
+    for i in 0..GROUP {
+        let (entry, through) = (&entries[places[i] as usize % ENTRIES], group[i][3]);
+        for c in 0..4 {
+            group[i][c] += through * (entry[c] + rests[i] * entry[4 + c]);
+            most[c] = most[c].max(group[i][c]);
+        }
+    }
+    most[3]
+}
+
+/// The same for a slice with shorter rays.
+#[inline(always)]
+fn add_part(means: &Sixteen, lengths: &Sixteen, entries: &[[f32; 8]; ENTRIES], group: &mut [[f32; 4]; GROUP]) -> f32 {
+    let (places, rests) = places(means);
+    let mut opacities = [0.0; GROUP];
+    for i in 0..GROUP {
+        let entry = &entries[places[i] as usize % ENTRIES];
+        opacities[i] = -(entry[3] + rests[i] * entry[7]);
+    }
+    let (shares, mut most) = (shares(&opacities, lengths), [0.0_f32; 4]);
+    for i in 0..GROUP {
+        let entry = &entries[places[i] as usize % ENTRIES];
+        let through = group[i][3] * shares[i];
+        for c in 0..4 {
+            group[i][c] += through * (entry[c] + rests[i] * entry[4 + c]);
+            most[c] = most[c].max(group[i][c]);
+        }
+    }
+    most[3]
+}
+
+/// The opacities of shorter rays as shares of those of full length: (1 - (1 - opacity)^length) / opacity (eq 30).
+#[inline(always)]
+fn shares(opacities: &Sixteen, lengths: &Sixteen) -> Sixteen {
+    /// Opacities below this follow the first terms of the power series.
+    const SMALL: f32 = 1e-3;
+    let mut shares = [0.0; GROUP];
+    for i in 0..GROUP {
+        let (opacity, length) = (opacities[i], lengths[i]);
+        let series = length * (1.0 + 0.5 * (1.0 - length) * opacity);
+        let through = exp2(length * log2((1.0 - opacity).max(1e-7)));
+        let exact = (1.0 - through) / opacity.max(SMALL);
+        shares[i] = if opacity < SMALL { series } else { exact };
+    }
+    shares
+}
+
+/// The logarithm to base 2 of a number above 0, to 1e-7.
+#[inline(always)]
+fn log2(number: f32) -> f32 {
+    const HALF_ROOT: i32 = 0x3f35_04f3; // the bits of sqrt(1/2)
+    let bits = number.to_bits() as i32;
+    let exponent = (bits - HALF_ROOT) >> 23;
+    let mantissa = f32::from_bits((bits - (exponent << 23)) as u32);
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let square = s * s;
+    let series = 1.0 + square * (1.0 / 3.0 + square * (0.2 + square * (1.0 / 7.0 + square * (1.0 / 9.0))));
+    exponent as f32 + 2.0 * std::f32::consts::LOG2_E * s * series
+}
+
+/// 2 to a power of at most 0, to 1e-6.
+#[inline(always)]
+fn exp2(power: f32) -> f32 {
+    const WHOLE: f32 = 12_582_912.0;
+    let rounded = power.max(-100.0) + WHOLE;
+    let x = (power.max(-100.0) - (rounded - WHOLE)) * std::f32::consts::LN_2;
+    let series = 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0)))));
+    let exponent = (rounded.to_bits() as i32).wrapping_sub(WHOLE.to_bits() as i32) + 127;
+    f32::from_bits((exponent << 23) as u32) * series
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shorter_rays_have_the_opacity_of_their_length() {
+        for opacity in [0.0_f32, 1e-9, 1e-4, 9.9e-4, 1.1e-3, 0.1, 0.5, 0.9, 0.998, 0.999_99] {
+            let lengths: Sixteen = std::array::from_fn(|i| if i == 0 { 0.01 } else { i as f32 / 14.0 });
+            let found = shares(&[opacity; GROUP], &lengths);
+            for (share, length) in found.into_iter().zip(lengths) {
+                let exact = -f64::exp_m1(f64::ln_1p(-f64::from(opacity)) * f64::from(length));
+                let off = (f64::from(share * opacity) - exact).abs();
+                assert!(off < 2e-6, "{opacity} {length}: {share} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn places_are_between_two_entries() {
+        let numbers: Sixteen =
+            std::array::from_fn(|i| [0.0, 0.5, 1.0, 1.49, 1.5, 2.0, -3.0, 511.0, 510.9, 1e30][i % 10]);
+        let (entries, rests) = places(&numbers);
+        for ((entry, rest), number) in entries.into_iter().zip(rests).zip(numbers) {
+            assert!((0.0..=1.0).contains(&rest));
+            assert_eq!(entry as f32 + rest, number.clamp(0.0, 511.0));
+        }
+    }
+}

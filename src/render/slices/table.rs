@@ -1,0 +1,134 @@
+//! A transfer function ([Levoy](crate::bibliography)) for one distance of slices: colours times opacity, and opacity,
+//! tabulated over the values (eq 30).
+
+use super::layer::Units;
+use crate::colour::TransferFunction;
+
+/// Entries of the table. An entry and its slope take 32 bytes, so that the table fits in a first-level cache.
+pub(super) const ENTRIES: usize = 512;
+const LAST: usize = ENTRIES - 1;
+
+/// The largest opacity of a path of unit length: the rest is less than half a level of an 8-bit picture.
+const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
+
+/// Slices with less opacity are not visible; 300 of them hide 3e-4 of the light.
+pub(super) const FAINT: f32 = 1e-6;
+
+/// The light and opacity of one slice for every value.
+#[derive(Debug, Clone)]
+pub(in crate::render) struct Table {
+    pub(super) units: Units,
+    /// Red, green and blue times the opacity, and minus the opacity; then the change up to the next entry.
+    pub(super) entries: Box<[[f32; 8]; ENTRIES]>,
+    /// The number of entries before each that are visible.
+    visible: Vec<u16>,
+}
+
+/// Red, green and blue times the opacity, and minus the opacity, of a slice whose rays are `length` units long.
+fn light(transfer: &TransferFunction, length: f64, value: f64) -> [f64; 4] {
+    let extinction = -libm::log1p(-transfer.opacity(value).min(MOST_OPAQUE));
+    let opacity = -libm::expm1(-extinction * length);
+    let [r, g, b] = transfer.colour(value).unwrap_or_default();
+    [r * opacity, g * opacity, b * opacity, -opacity]
+}
+
+impl Table {
+    /// The table for slices whose rays are `length` units of opacity long.
+    pub(in crate::render) fn new(transfer: &TransferFunction, length: f64) -> Self {
+        let (colours, opacities) = (transfer.range(), transfer.opacity_range());
+        let (lo, hi) = (colours.0.min(opacities.0), colours.1.max(opacities.1));
+        let units = Units { zero: lo, per: LAST as f64 / (hi - lo) };
+        let at = |n: usize| if n >= LAST { hi } else { lo + n as f64 * (hi - lo) / LAST as f64 };
+        let values: Vec<[f32; 4]> =
+            (0..=ENTRIES).map(|n| light(transfer, length, at(n)).map(|number| number as f32)).collect();
+        let entry = |n: usize| {
+            std::array::from_fn(|i| if i < 4 { values[n][i] } else { values[n + 1][i - 4] - values[n][i - 4] })
+        };
+        let entries: Box<[[f32; 8]; ENTRIES]> = Box::new(std::array::from_fn(entry));
+        let count = |sum: &mut u16, entry: &[f32; 8]| {
+            *sum += u16::from(-entry[3] > FAINT);
+            Some(*sum)
+        };
+        let visible = std::iter::once(0).chain(entries.iter().scan(0, count)).collect();
+        Self { units, entries, visible }
+    }
+
+    /// The light and minus the opacity of a number of these units.
+    pub(super) fn at(&self, number: f32) -> [f32; 4] {
+        let at = number.clamp(0.0, LAST as f32);
+        let (n, rest) = (at as usize, at - at.floor());
+        std::array::from_fn(|i| self.entries[n][i] + rest * self.entries[n][4 + i])
+    }
+
+    /// Whether a number from `lo` to `hi` has an opacity above [`FAINT`].
+    pub(super) fn shows(&self, (lo, hi): (f32, f32)) -> bool {
+        if lo > hi {
+            return false;
+        }
+        let [first, last] = [lo, hi].map(|number| number.clamp(0.0, LAST as f32));
+        let (from, to) = (first.ceil() as usize, last.floor() as usize + 1);
+        let within = from < to && self.visible[to] > self.visible[from];
+        within || [first, last].iter().any(|number| -self.at(*number)[3] > FAINT)
+    }
+
+    /// The largest error of light and opacity of a slice that the table makes, found between its entries and at the
+    /// function's points.
+    pub(in crate::render) fn error(transfer: &TransferFunction, length: f64) -> f64 {
+        let table = Self::new(transfer, length);
+        let off = |value: f64| {
+            let (found, exact) = (table.at(table.units.of(value)), light(transfer, length, value));
+            found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
+        };
+        let between = (0..8 * LAST).map(|n| table.units.zero + (n as f64 + 0.5) / (8.0 * table.units.per));
+        between.map(off).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey() -> TransferFunction {
+        TransferFunction::open("grey").expect("a map")
+    }
+
+    #[test]
+    fn a_path_of_unit_length_has_the_requested_opacity() {
+        let table = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 1.0);
+        for (value, opacity) in [(10.0, 0.0), (12.5, 0.25), (15.0, 0.5), (19.0, 0.9), (25.0, MOST_OPAQUE), (0.0, 0.0)] {
+            let [r, .., minus] = table.at(table.units.of(value));
+            assert!((f64::from(-minus) - opacity).abs() < 1e-5, "{value}");
+            let grey = ((value - 10.0) / 10.0).clamp(0.0, 1.0);
+            assert!((f64::from(r) - grey * opacity).abs() < 1e-5, "{value}");
+        }
+        let half = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 0.5);
+        let opacity = -half.at(half.units.of(17.5))[3];
+        assert!((f64::from(opacity) - 0.5).abs() < 1e-5, "two of these have 0.75: {opacity}");
+    }
+
+    #[test]
+    fn ranges_without_opacity_are_not_visible() {
+        let table = Table::new(&grey().with_opacity(&[(0.4, 0.0), (0.5, 1.0), (0.6, 0.0)]).expect("points"), 1.0);
+        let number = |value: f64| table.units.of(value);
+        for (lo, hi, shows) in [
+            (0.0, 0.39, false),
+            (0.61, 1.0, false),
+            (-5.0, -1.0, false),
+            (0.3, 0.45, true),
+            (0.3, 0.8, true),
+            (0.5, 0.5, true),
+            (0.4123, 0.4124, true),
+            (2.0, 9.0, false),
+        ] {
+            assert_eq!(table.shows((number(lo), number(hi))), shows, "{lo} to {hi}");
+        }
+        assert!(table.shows((f32::NEG_INFINITY, f32::INFINITY)) && !table.shows((f32::INFINITY, f32::NEG_INFINITY)));
+    }
+
+    #[test]
+    fn the_error_of_the_table_is_that_of_its_steps() {
+        assert!(Table::error(&grey(), 1.0) < 1e-4);
+        let sharp = grey().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
+        assert!(Table::error(&sharp, 1.0) > 0.1);
+    }
+}
