@@ -35,9 +35,9 @@ struct Frame<B: Blend> {
 }
 
 impl<B: Blend> Frame<B> {
-    fn new(view: &SlicedView, units: Units) -> Self {
+    fn new(view: &SlicedView, most: usize, units: Units) -> Self {
         let groups = groups(view);
-        Self { units, layers: Layers::new(view), groups: vec![B::EMPTY; groups], limits: vec![B::OPEN; groups] }
+        Self { units, layers: Layers::new(view, most), groups: vec![B::EMPTY; groups], limits: vec![B::OPEN; groups] }
     }
 }
 
@@ -46,21 +46,26 @@ fn groups(view: &SlicedView) -> usize {
     view.extent[0] / GROUP * view.extent[1] * view.cells * view.cells
 }
 
+/// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
+fn most_layers(view: &SlicedView, edge: usize) -> usize {
+    (edge + 2 * view.reach[2]).min(view.count[2])
+}
+
 /// Bytes of a batch of `frames` frames without decoded blocks. Blocks have `edge` voxels a side.
 pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, edge: usize) -> usize {
-    let layers = Layers::bytes(view, (edge + 2 * view.reach[2]).min(view.count[2]));
+    let layers = Layers::bytes(view, most_layers(view, edge));
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
     let of_thread = Work::bytes(view).max(finish::bytes::<B>(view));
-    frames * (2 * layers + cells + picture) + rayon::current_num_threads() * of_thread
+    frames * (layers + cells + picture) + rayon::current_num_threads() * of_thread
 }
 
 impl<B: Blend> Batch<'_, B> {
     /// The pictures of all frames, one after another.
     pub(in crate::render) fn render(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
         let known = Known::new(self.view, self.blocks, self.batch.selection());
-        let units = self.units(&known)?;
-        let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, *units)).collect();
+        let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks.edge));
+        let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
         let mut next = 0;
         for layer in self.layers() {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);

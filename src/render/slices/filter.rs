@@ -64,12 +64,26 @@ pub(super) fn weighted<'a>(layers: impl Iterator<Item = &'a [f32]>, weights: &[f
 #[inline(always)]
 fn sixteen(values: &[f32], at: usize) -> &Sixteen {
     const NONE: &Sixteen = &[0.0; GROUP];
-    values.get(at..).and_then(|rest| rest.first_chunk()).unwrap_or(NONE)
+    values.get(at..at + GROUP).and_then(|sixteen| sixteen.try_into().ok()).unwrap_or(NONE)
+}
+
+/// The weighted sum of sixteen numbers of each row from `at` on.
+#[inline(always)]
+pub(super) fn weighted_rows(values: &[f32], stride: usize, weights: &[f32], mut at: usize) -> Sixteen {
+    let mut sum = [0.0; GROUP];
+    for weight in weights {
+        let row = sixteen(values, at);
+        for i in 0..GROUP {
+            sum[i] += weight * row[i];
+        }
+        at += stride;
+    }
+    sum
 }
 
 #[inline(always)]
 fn put(out: &mut [f32], at: usize, values: &Sixteen) {
-    if let Some(to) = out.get_mut(at..).and_then(|rest| rest.first_chunk_mut::<GROUP>()) {
-        *to = *values;
+    if let Some(to) = out.get_mut(at..at + GROUP) {
+        to.copy_from_slice(values);
     }
 }

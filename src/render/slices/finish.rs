@@ -94,8 +94,8 @@ mod tests {
     #[test]
     fn weights_reproduce_parabolas() {
         for x in [0.0_f32, 0.2, 0.5, 0.9] {
-            let found =
-                |of: fn(f32) -> f32| weights(x).iter().zip([-1.0, 0.0, 1.0, 2.0]).map(|(w, at)| w * of(at)).sum();
+            let terms = |of: fn(f32) -> f32| weights(x).into_iter().zip([-1.0, 0.0, 1.0, 2.0].map(of));
+            let found = |of: fn(f32) -> f32| terms(of).map(|(weight, value)| weight * value).sum::<f32>();
             let off = |of: fn(f32) -> f32| -> f32 { f32::abs(found(of) - of(x)) };
             assert!(off(|_| 1.0) < 1e-6 && off(|x| x) < 1e-6 && off(|x| x * x) < 1e-6);
         }

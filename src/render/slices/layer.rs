@@ -43,9 +43,11 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    pub(super) fn new(view: &SlicedView) -> Self {
+    /// At most `most` layers at a time.
+    pub(super) fn new(view: &SlicedView, most: usize) -> Self {
         let stride = view.count[0].next_multiple_of(GROUP);
-        Self { first: 0, end: 0, stride, rows: view.count[1], values: vec![], ranges: vec![], missing: vec![] }
+        let values = Vec::with_capacity(most * stride * view.count[1]);
+        Self { first: 0, end: 0, stride, rows: view.count[1], values, ranges: vec![], missing: vec![] }
     }
 
     /// Bytes of `layers` layers.

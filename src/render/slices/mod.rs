@@ -53,11 +53,14 @@ mod values;
 mod needed;
 pub(super) mod batch;
 
+#[cfg(test)]
+mod tests;
+
 pub(super) use view::SlicedView;
 
 /// Cells that are computed together; also the voxels along b of a brick.
 const GROUP: usize = 16;
 /// Voxels along c of a brick.
 const BRICK_ROWS: usize = 8;
-/// Where the density is less, nothing is visible.
-const LEAST: f64 = 0.01;
+/// Where the density is less, slices have no value in any mode.
+const LEAST: f32 = 1e-3;

@@ -1,8 +1,8 @@
 //! A row of cells in a slice: means and lengths, sixteen cells at a time, and the ways to combine the slices.
 
-use super::filter::{Sixteen, weighted};
+use super::GROUP;
+use super::filter::{Sixteen, weighted_rows};
 use super::layer::Units;
-use super::{GROUP, LEAST};
 
 /// One phase of a row of cells in a slice: sums of the kernel along a and b, to be summed along c.
 pub(in crate::render) struct Row<'a> {
@@ -18,6 +18,8 @@ pub(in crate::render) struct Row<'a> {
     pub(super) shares: &'a [f32],
     /// The kernel's density without missing samples and edges.
     pub(super) density: f32,
+    /// Where the density is less, there is nothing.
+    pub(super) least: f32,
     /// For each group, whether it is computed, and whether all its weights meet the region.
     pub(super) live: &'a [bool],
     pub(super) whole: &'a [bool],
@@ -54,7 +56,7 @@ impl Row<'_> {
         };
         for i in 0..GROUP {
             let length = present[i] * self.density;
-            let is_there = length >= LEAST as f32;
+            let is_there = length >= self.least;
             means[i] = if is_there { means[i] / present[i] } else { 0.0 };
             lengths[i] = if is_there { length } else { 0.0 };
         }
@@ -63,8 +65,7 @@ impl Row<'_> {
 
     #[inline(always)]
     fn along_c(&self, values: &[f32], group: usize) -> Sixteen {
-        let rows = (0..self.weights.len()).map(|row| values.get(row * self.stride..).unwrap_or_default());
-        weighted(rows, self.weights, group * GROUP)
+        weighted_rows(values, self.stride, self.weights, group * GROUP)
     }
 }
 
@@ -82,6 +83,8 @@ pub(in crate::render) trait Blend: Sync {
     const OPEN: f32;
     /// Whether units depend on a value near those of the frame.
     const CENTRED: bool;
+    /// Where the density is less, there is nothing.
+    const LEAST: f32;
     /// Numbers per pixel.
     const NUMBERS: usize;
 

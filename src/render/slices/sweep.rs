@@ -196,7 +196,7 @@ impl<B: Blend> Band<'_, B> {
                 let share = part.share * taps.presence(row as i64, view.count[1]);
                 for (phase, across) in part.slice.across[0].iter().enumerate() {
                     let density = part.slice.along.density * taps.density * across.density;
-                    if f64::from(share) * density < LEAST {
+                    if share * (density as f32) < LEAST {
                         continue;
                     }
                     let at = (((row - self.rows.start) * view.cells + down) * view.cells + phase) * count;
@@ -215,6 +215,7 @@ impl<B: Blend> Band<'_, B> {
                             share,
                             shares: &shares[phase],
                             density: density as f32,
+                            least: B::LEAST,
                             live: &live,
                             whole: &whole[phase],
                             slice: part.slice.number,

@@ -177,7 +177,7 @@ impl SlicedView {
     pub(super) fn slice(&self, number: usize) -> Option<Slice> {
         let position = self.position(number);
         let along = Taps::new(position, self.sigma[2]);
-        if f64::from(along.presence(0, self.count[2])) * along.density < LEAST {
+        if along.presence(0, self.count[2]) * (along.density as f32) < LEAST {
             return None;
         }
         let voxel = if self.reversed {
