@@ -25,16 +25,18 @@ pub(super) fn composite(
 ) -> Result<()> {
     let all: usize = views.iter().map(SlicedView::slices).sum();
     progress.start(Some((all * config.frames.len()) as u64));
-    for (n, view) in views.iter().enumerate() {
-        let mut sink = |frame, picture: &[f32]| sink(Rendered { views: &[], view: n, frame, picture, error: None });
+    for (number, view) in views.iter().enumerate() {
+        let mut sink =
+            |frame, picture: &[f32]| sink(Rendered { views: &[], view: number, frame, picture, error: None });
         match &config.mode {
             Mode::Composite { transfer, unit, .. } => {
                 let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
                 let blend = Composite { table: Table::new(transfer, view.step / unit) };
-                Sliced { view, blend, config, progress }.render(scene, report, &mut sink)?;
+                report.views[number].table_error = Some(blend.table.error());
+                Sliced { number, view, blend, config, progress }.render(scene, report, &mut sink)?;
             }
             Mode::Mip { .. } => {
-                Sliced { view, blend: Largest, config, progress }.render(scene, report, &mut sink)?;
+                Sliced { number, view, blend: Largest, config, progress }.render(scene, report, &mut sink)?;
             }
             Mode::Projection => {}
         }
@@ -67,6 +69,7 @@ fn block_bytes(scene: &dyn Scene, config: &RenderConfig, frames: usize) -> usize
 
 /// A view, and the way its slices combine.
 struct Sliced<'a, B> {
+    number: usize,
     view: &'a SlicedView,
     blend: B,
     config: &'a RenderConfig,
@@ -86,9 +89,9 @@ impl<B: Blend> Sliced<'_, B> {
         let blocks = scene.blocks();
         let job = Job { config: self.config, together: &together, views: &[] };
         let advance = |slices: usize| self.progress.advance(slices as u64);
-        let (view, blend, together) = (self.view, &self.blend, rayon::current_num_threads());
+        let (number, view, blend, together) = (self.number, self.view, &self.blend, rayon::current_num_threads());
         let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {
-            Batch { view, blend, blocks, batch, together, advance: &advance }.render(report)
+            Batch { number, view, blend, blocks, batch, together, advance: &advance }.render(report)
         };
         for_each_batch(scene, job, report, render, |frames, channels, _| {
             let pictures = &channels[0].pictures;

@@ -71,6 +71,23 @@ impl Mode {
         matches!(self, Self::Projection)
     }
 
+    /// Whether opacities or colours change fast with the value, so that rays need more slices: by more than a third of
+    /// their whole change within an eighth of the range.
+    pub(super) fn is_sharp(&self) -> bool {
+        const PARTS: usize = 64;
+        let Self::Composite { transfer, .. } = self else { return false };
+        let (lo, hi) =
+            (transfer.range().0.min(transfer.opacity_range().0), transfer.range().1.max(transfer.opacity_range().1));
+        let at = |n: usize| lo + (hi - lo) * n as f64 / PARTS as f64;
+        let opacities: Vec<f64> = (0..=PARTS).map(|n| transfer.opacity(at(n))).collect();
+        let change = |opacities: &[f64]| {
+            let ends = opacities.iter().fold((1.0_f64, 0.0_f64), |(lo, hi), a| (lo.min(*a), hi.max(*a)));
+            ends.1 - ends.0
+        };
+        let steps = opacities.windows(PARTS / 8 + 1).map(change);
+        steps.fold(0.0, f64::max) > change(&opacities) / 3.0
+    }
+
     /// The number of slices per voxel that the caller set.
     pub(super) fn slices(&self) -> Option<usize> {
         match self {

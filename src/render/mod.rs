@@ -73,7 +73,7 @@ pub use expectation::Expectation;
 pub use layout::{Layout, Order};
 pub use pictures::render_png;
 pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
-pub use report::{Picture, RenderReport, Rendered, ViewReport};
+pub use report::{Picture, Probed, RenderReport, Rendered, ViewReport};
 pub use scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
 };

@@ -74,6 +74,18 @@ pub struct RenderReport {
     pub seconds: f64,
 }
 
+/// The errors of some pixels of a view's first frame, against the field of the samples sampled finely along their rays.
+/// They are an estimate of the errors of all pixels, without those of the samples.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Probed {
+    /// Number of pixels.
+    pub rays: usize,
+    /// Root mean square of the largest difference of each pixel's numbers, in the unit of the pictures.
+    pub rms: f64,
+    /// The largest of all differences.
+    pub largest: f64,
+}
+
 /// How a view was splatted.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ViewReport {
@@ -93,6 +105,10 @@ pub struct ViewReport {
     pub slices: Option<usize>,
     /// Cells of a slice per voxel across the ray; `None` for projections.
     pub cells: Option<usize>,
+    /// The largest error that tabulating the transfer function makes in the light of one slice, if there is one.
+    pub table_error: Option<f64>,
+    /// The errors of some pixels; `None` for projections, and if no ray of these meets the volume.
+    pub probed: Option<Probed>,
     /// The stated error of the splat method, measured like the requested splat error.
     pub stated_splat_error: f64,
     /// Estimated root mean square error over the pixels that are not background, in the unit of the pictures, without

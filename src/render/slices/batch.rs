@@ -2,6 +2,7 @@
 
 use super::layer::{Layers, Units};
 use super::needed::{Known, Need};
+use super::probe::Probe;
 use super::row::Blend;
 use super::sweep::{Band, Work};
 use super::values::samples;
@@ -16,6 +17,8 @@ use std::time::Instant;
 
 /// A batch of frames, seen from one view.
 pub(in crate::render) struct Batch<'a, B: Blend> {
+    /// The number of the view.
+    pub(in crate::render) number: usize,
     pub(in crate::render) view: &'a SlicedView,
     pub(in crate::render) blend: &'a B,
     pub(in crate::render) blocks: BlockGrid,
@@ -66,6 +69,7 @@ impl<B: Blend> Batch<'_, B> {
         let known = Known::new(self.view, self.blocks, self.batch.selection());
         let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks.edge));
         let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
+        let mut probe = report.views[self.number].probed.is_none().then(|| Probe::new(self.view, self.blend));
         let mut next = 0;
         for layer in self.layers() {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
@@ -77,11 +81,15 @@ impl<B: Blend> Batch<'_, B> {
             next = ready.end;
             let slices: Vec<Slice> = ready.clone().filter_map(|number| self.view.slice(number)).collect();
             frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            if let (Some(probe), Some(frame)) = (&mut probe, frames.first()) {
+                probe.add(self.blend, &frame.units, &frame.layers, met);
+            }
             lap(&mut clock, &mut report.splat_seconds);
             (self.advance)(ready.len() * units.len());
         }
         let mut clock = Instant::now();
         let pictures = self.finish(&frames);
+        report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
         lap(&mut clock, &mut report.inverse_seconds);
         Ok(pictures)
     }

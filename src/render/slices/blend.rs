@@ -68,6 +68,24 @@ impl Blend for Composite {
     fn background(out: &mut [f32]) {
         out.fill(0.0);
     }
+
+    type Exact = ([f64; 4], bool);
+
+    fn exact(&self) -> Self::Exact {
+        ([0.0, 0.0, 0.0, 1.0], false)
+    }
+
+    fn step(&self, (light, met): &mut Self::Exact, value: f64, density: f64, share: f64) {
+        let (through, slice) = (light[3], self.table.exact(value, density * share));
+        light.iter_mut().zip(slice).for_each(|(sum, number)| *sum += through * number);
+        *met = true;
+    }
+
+    fn off((light, met): &Self::Exact, pixel: &[f32]) -> Option<f64> {
+        let exact = [light[0], light[1], light[2], 1.0 - light[3]];
+        let off = pixel.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs());
+        met.then(|| off.fold(0.0, f64::max))
+    }
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]

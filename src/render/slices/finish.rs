@@ -47,8 +47,10 @@ fn cells<B: Blend>(view: &SlicedView, groups: &[B::Group]) -> Cells<B::Cell> {
     let rows = all.par_chunks_exact_mut(width.max(1)).skip(RIM);
     rows.zip(groups.par_chunks_exact(of_row.max(1))).for_each(|(row, groups)| {
         for (phase, groups) in groups.chunks_exact(of_row / view.cells).enumerate() {
-            let of_phase = row[RIM + phase..].iter_mut().step_by(view.cells);
-            of_phase.zip(groups.iter().flat_map(B::cells)).for_each(|(to, from)| *to = from);
+            let of_groups = row[RIM + phase..].chunks_mut(GROUP * view.cells);
+            for (cells, group) in of_groups.zip(groups) {
+                cells.iter_mut().step_by(view.cells).zip(B::cells(group)).for_each(|(to, from)| *to = from);
+            }
         }
     });
     Cells { width, all }
@@ -60,14 +62,13 @@ type Around<'a, C> = ([&'a [C; 4]; 4], [[f32; 4]; 2]);
 impl<C> Cells<C> {
     /// The cells around a point, and their weights; `None` beyond the rim.
     fn around(&self, at: [f64; 2]) -> Option<Around<'_, C>> {
-        let first = at.map(|at| at.floor() - 1.0);
-        let inside = first.iter().all(|first| *first >= 0.0) && first[0] as usize + 4 <= self.width;
-        let [column, row] = first.map(|first| first as usize);
-        let rows = (row + 4) * self.width <= self.all.len();
+        let [column, row] = at.map(|at| (at.max(1.0) as usize) - 1);
+        let inside = at.iter().all(|at| *at >= 1.0) && column + 4 <= self.width;
+        let rows = row.saturating_add(4).saturating_mul(self.width) <= self.all.len();
         let of_row =
             |n: usize| self.all[(row + n) * self.width + column..].first_chunk().unwrap_or_else(|| self.none());
-        let weights = |i: usize| weights((at[i] - at[i].floor()) as f32);
-        (inside && rows).then(|| (std::array::from_fn(of_row), [weights(0), weights(1)]))
+        let weights = |i: usize, first: usize| weights((at[i] - (first + 1) as f64) as f32);
+        (inside && rows).then(|| (std::array::from_fn(of_row), [weights(0, column), weights(1, row)]))
     }
 
     /// The first four cells, which are empty.

@@ -81,6 +81,22 @@ impl Blend for Largest {
     fn background(out: &mut [f32]) {
         out.fill(f32::NAN);
     }
+
+    type Exact = f64;
+
+    fn exact(&self) -> f64 {
+        f64::NAN
+    }
+
+    fn step(&self, largest: &mut f64, value: f64, density: f64, _: f64) {
+        if density >= f64::from(Self::LEAST) {
+            *largest = largest.max(value);
+        }
+    }
+
+    fn off(largest: &f64, pixel: &[f32]) -> Option<f64> {
+        Some((f64::from(pixel[0]) - largest).abs()).filter(|off| !off.is_nan())
+    }
 }
 
 /// Four cells of a row.

@@ -49,6 +49,7 @@ pub(super) mod blend;
 pub(super) mod mip;
 mod sweep;
 mod finish;
+mod probe;
 mod values;
 mod needed;
 pub(super) mod batch;

@@ -109,6 +109,18 @@ pub(in crate::render) trait Blend: Sync {
     /// The numbers of a pixel, from the 4 x 4 cells around it and the weights of their columns and rows.
     fn pixel(units: &Units, cells: [&[Self::Cell; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]);
 
+    /// An exact ray.
+    type Exact;
+
+    /// An exact ray before its first step.
+    fn exact(&self) -> Self::Exact;
+
+    /// Adds a value behind the earlier ones: its density, over a share of the distance of two slices.
+    fn step(&self, ray: &mut Self::Exact, value: f64, density: f64, share: f64);
+
+    /// The difference of a pixel from an exact ray; `None` if one of them has no value.
+    fn off(ray: &Self::Exact, pixel: &[f32]) -> Option<f64>;
+
     /// The numbers of a pixel that no ray meets.
     fn background(out: &mut [f32]);
 }

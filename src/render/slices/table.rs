@@ -17,6 +17,9 @@ pub(super) const FAINT: f32 = 1e-6;
 /// The light and opacity of one slice for every value.
 #[derive(Debug, Clone)]
 pub(in crate::render) struct Table {
+    transfer: TransferFunction,
+    /// Length of a ray between two slices, in units of opacity.
+    length: f64,
     pub(super) units: Units,
     /// Red, green and blue times the opacity, and minus the opacity; then the change up to the next entry.
     pub(super) entries: Box<[[f32; 8]; ENTRIES]>,
@@ -50,13 +53,14 @@ impl Table {
             Some(*sum)
         };
         let visible = std::iter::once(0).chain(entries.iter().scan(0, count)).collect();
-        Self { units, entries, visible }
+        Self { transfer: transfer.clone(), length, units, entries, visible }
     }
 
     /// The light and minus the opacity of a number of these units.
     pub(super) fn at(&self, number: f32) -> [f32; 4] {
         let at = number.clamp(0.0, LAST as f32);
-        let (n, rest) = (at as usize, at - at.floor());
+        let n = at as usize;
+        let rest = at - n as f32;
         std::array::from_fn(|i| self.entries[n][i] + rest * self.entries[n][4 + i])
     }
 
@@ -66,21 +70,25 @@ impl Table {
             return false;
         }
         let [first, last] = [lo, hi].map(|number| number.clamp(0.0, LAST as f32));
-        let (from, to) = (first.ceil() as usize, last.floor() as usize + 1);
+        let from = first as usize + usize::from(first > (first as usize) as f32);
+        let to = last as usize + 1;
         let within = from < to && self.visible[to] > self.visible[from];
         within || [first, last].iter().any(|number| -self.at(*number)[3] > FAINT)
     }
 
-    /// The largest error of light and opacity of a slice that the table makes, found between its entries and at the
-    /// function's points.
-    pub(in crate::render) fn error(transfer: &TransferFunction, length: f64) -> f64 {
-        let table = Self::new(transfer, length);
+    /// The exact light and minus the opacity of a value, for a share of a slice.
+    pub(super) fn exact(&self, value: f64, share: f64) -> [f64; 4] {
+        light(&self.transfer, self.length * share, value)
+    }
+
+    /// The largest error of a slice's light and opacity that the table makes, found at eight values per entry.
+    pub(in crate::render) fn error(&self) -> f64 {
         let off = |value: f64| {
-            let (found, exact) = (table.at(table.units.of(value)), light(transfer, length, value));
+            let (found, exact) = (self.at(self.units.of(value)), self.exact(value, 1.0));
             found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
         };
-        let between = (0..8 * LAST).map(|n| table.units.zero + (n as f64 + 0.5) / (8.0 * table.units.per));
-        between.map(off).fold(0.0, f64::max)
+        let values = (0..8 * LAST).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
+        values.map(off).fold(0.0, f64::max)
     }
 }
 
@@ -127,8 +135,8 @@ mod tests {
 
     #[test]
     fn the_error_of_the_table_is_that_of_its_steps() {
-        assert!(Table::error(&grey(), 1.0) < 1e-4);
+        assert!(Table::new(&grey(), 1.0).error() < 1e-4);
         let sharp = grey().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
-        assert!(Table::error(&sharp, 1.0) > 0.1);
+        assert!(Table::new(&sharp, 1.0).error() > 0.1);
     }
 }

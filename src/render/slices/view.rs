@@ -80,11 +80,12 @@ impl SlicedView {
         if let Some(wrong) = config.mode.slices().filter(|n| !(1..=MOST).contains(n)) {
             return Err(Error::setting("slices", format!("takes 1 to {MOST} per voxel, not {wrong}")));
         }
-        let default = |sigma: f64| ((1.0 / FINE / sigma).ceil().clamp(1.0, 8.0)) as usize;
+        let default = |sigma: f64| (1.0 / FINE / sigma - 1e-6).ceil().clamp(1.0, 8.0) as usize;
         let pixels = shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
         let across = if pixels < FEW_PIXELS { 1 } else { default(sigma[0].min(sigma[1])) };
         let cells = config.mode.slices().unwrap_or(across);
-        let fineness = config.mode.slices().unwrap_or(default(sigma[2]));
+        let sharp = if config.mode.is_sharp() { 2 } else { 1 };
+        let fineness = config.mode.slices().unwrap_or(sharp * default(2.0 * sigma[2]));
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let step = grid.spacing[shear.axes[2]] / (fineness as f64 * deeper.abs());
         let mut cut = Self {
@@ -175,22 +176,35 @@ impl SlicedView {
 
     /// A slice; `None` if the ray is too short in all of it.
     pub(super) fn slice(&self, number: usize) -> Option<Slice> {
-        let position = self.position(number);
-        let along = Taps::new(position, self.sigma[2]);
+        let along = Taps::new(self.position(number), self.sigma[2]);
         if along.presence(0, self.count[2]) * (along.density as f32) < LEAST {
             return None;
         }
+        let cell = |i: usize, phase: usize| self.corner[i] as f64 + phase as f64 / self.cells as f64;
+        let across = [0, 1].map(|i| (0..self.cells).map(|phase| self.taps(number, i, cell(i, phase))).collect());
+        Some(Slice { number: number as u32, along, across })
+    }
+
+    /// The weights along b or c of a cell's position in a slice.
+    fn taps(&self, number: usize, i: usize, cell: f64) -> Taps {
+        let position = self.position(number);
         let voxel = if self.reversed {
             (self.start[2] + self.count[2] - 1) as f64 - position
         } else {
             self.start[2] as f64 + position
         };
-        let phase = |i: usize, phase: usize| {
-            let cell = self.corner[i] as f64 + phase as f64 / self.cells as f64;
-            Taps::new(cell - self.shear.slopes[i] * voxel - self.start[i] as f64, self.sigma[i])
-        };
-        let across = [0, 1].map(|i| (0..self.cells).map(|n| phase(i, n)).collect());
-        Some(Slice { number: number as u32, along, across })
+        Taps::new(cell - self.shear.slopes[i] * voxel - self.start[i] as f64, self.sigma[i])
+    }
+
+    /// The weights along b, c and a where the ray of a cell crosses a slice.
+    pub(super) fn taps_at(&self, number: usize, cell: [f64; 2]) -> [Taps; 3] {
+        let [b, c] = [0, 1].map(|i| self.taps(number, i, cell[i]));
+        [b, c, Taps::new(self.position(number), self.sigma[2])]
+    }
+
+    /// The same view with a number of slices per voxel, and how many slices of this view make one of those.
+    pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
+        (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)
     }
 
     /// The place of voxel layer `at` (an index along the grid's axis a), counted along the ray.
