@@ -71,11 +71,11 @@ impl Mode {
         matches!(self, Self::Projection)
     }
 
-    /// Whether opacities or colours change fast with the value, so that rays need more slices: by more than a third of
-    /// their whole change within an eighth of the range.
+    /// Whether rays need more slices: for the largest value, and for opacities that change fast with the value, by more
+    /// than a third of their whole change within an eighth of the range.
     pub(super) fn is_sharp(&self) -> bool {
         const PARTS: usize = 64;
-        let Self::Composite { transfer, .. } = self else { return false };
+        let Self::Composite { transfer, .. } = self else { return true };
         let (lo, hi) =
             (transfer.range().0.min(transfer.opacity_range().0), transfer.range().1.max(transfer.opacity_range().1));
         let at = |n: usize| lo + (hi - lo) * n as f64 / PARTS as f64;

@@ -131,8 +131,14 @@ fn of_views(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str
         ("scale", of(&|view| view.scale.to_string())),
         ("center", of(&|view| joined(&view.center))),
         ("slices", of(&|view| view.slices.map_or_else(String::new, |slices| slices.to_string()))),
+        ("cells", of(&|view| view.cells.map_or_else(String::new, |cells| cells.to_string()))),
         ("splat_method", of(&|view| view.method.into())),
-        ("stated_splat_error", of(&|view| view.stated_splat_error.to_string())),
+        (
+            "stated_splat_error",
+            of(&|view| {
+                Some(view.stated_splat_error).filter(|e| !e.is_nan()).map_or_else(String::new, |e| e.to_string())
+            }),
+        ),
     ]
 }
 

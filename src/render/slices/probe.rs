@@ -74,6 +74,9 @@ impl<B: Blend> Probe<B> {
 fn field(layers: &Layers, [b, c, a]: &[Taps; 3], count: [usize; 3]) -> (f64, f64) {
     let ((column, across), (row, down)) = (b.within(0, count[0]), c.within(0, count[1]));
     let (slice, along) = a.within(0, count[2]);
+    if across.is_empty() || down.is_empty() || along.is_empty() {
+        return (0.0, 0.0);
+    }
     let (mut weights, mut sum) = (0.0, 0.0);
     for (slice, along) in (slice..).zip(&a.weights[along]) {
         for (row, down) in (row..).zip(&c.weights[down.clone()]) {

@@ -5,7 +5,7 @@ use crate::base::grid::{Grid, Region};
 use crate::base::progress::Silent;
 use crate::base::sample::{SampleType, store};
 use crate::colour::TransferFunction;
-use crate::render::{FrameScene, Mode, RenderConfig, Rendered, render};
+use crate::render::{FrameScene, Mode, RenderConfig, RenderReport, Rendered, render};
 use crate::source::ArraySource;
 use crate::view::camera::{Camera, View};
 
@@ -67,6 +67,10 @@ impl Case {
     }
 
     fn picture(&self, mode: Mode) -> Vec<f32> {
+        self.rendered(mode).0
+    }
+
+    fn rendered(&self, mode: Mode) -> (Vec<f32>, RenderReport) {
         let mut scene = self.scene();
         let config = self.config(&scene, mode);
         let mut found = Vec::new();
@@ -74,8 +78,8 @@ impl Case {
             found.extend_from_slice(rendered.picture);
             Ok(())
         };
-        render(&mut scene, &config, &Silent, &mut take).expect("a picture");
-        found
+        let report = render(&mut scene, &config, &Silent, &mut take).expect("a picture");
+        (found, report)
     }
 
     /// For each pixel, the density and the mean at every step along its ray, front to back.
@@ -238,5 +242,47 @@ fn the_largest_value_is_that_of_brute_force() {
         println!("{name}: rms {rms:.1e}, largest {most:.1e}, sure {sure} of {shown}");
         assert!(rms < 2e-3 && most < 2e-2, "{name}: rms {rms:e}, largest {most:e}");
         assert!(sure > shown / 3 && shown < found.len() && wrong.count() == 0, "{name}: {sure} of {shown}");
+    }
+}
+
+#[test]
+fn probed_rays_tell_the_errors_of_the_picture() {
+    let mut case = case([18, 15, 13], view(30.0, 25.0, 20.0));
+    case.view.size = [90, 80];
+    let expected = case.light();
+    for slices in [1, 2, 4] {
+        let (found, report) = case.rendered(composite(Some(slices)));
+        let probed = report.views[0].probed.expect("rays that meet the volume");
+        let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
+        let of_pixel = off.chunks_exact(4).map(|pixel| pixel.iter().copied().fold(0.0, f64::max));
+        let shown = of_pixel.zip(expected.chunks_exact(4)).filter(|(_, light)| light[3] > 0.0).map(|(off, _)| off);
+        let (rms, largest) = errors(&shown.collect::<Vec<_>>());
+        println!("{slices}: {probed:?} of {rms:e}, {largest:e}");
+        assert!(probed.rays > 10 && probed.rms > rms / 4.0 && probed.rms < 4.0 * rms && probed.largest < 2.0 * largest);
+    }
+    let table = report_of_a_step();
+    assert!(table > 1e-3, "{table}");
+}
+
+/// The stated error of a table of a sudden step.
+fn report_of_a_step() -> f64 {
+    let case = case([5, 4, 3], view(30.0, 25.0, 0.0));
+    let step = transfer().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
+    let (_, report) = case.rendered(Mode::Composite { transfer: step, unit: None, slices: None });
+    report.views[0].table_error.expect("a table")
+}
+
+/// The same bits for any number of threads.
+#[test]
+fn threads_change_no_bit_of_a_composite() {
+    let mut case = case([40, 47, 13], view(75.0, 15.0, 20.0));
+    case.values[1000..1100].fill(f64::NAN);
+    for mode in [composite(None), Mode::Mip { slices: None }] {
+        let by = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let bits: Vec<u32> = pool.install(|| case.picture(mode.clone())).into_iter().map(f32::to_bits).collect();
+            bits
+        };
+        assert!(by(1) == by(2) && by(1) == by(5));
     }
 }
