@@ -164,7 +164,7 @@ fn views() -> Vec<View> {
 fn composites_are_those_of_brute_force_along_every_axis() {
     for view in views() {
         let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
-        case([18, 15, 13], view).check(&name, (4e-4, 4e-3));
+        case([18, 15, 13], view).check(&name, (5e-4, 6e-3));
     }
 }
 
@@ -173,7 +173,7 @@ fn composites_of_long_voxels_are_those_of_brute_force() {
     for view in views() {
         let mut case = case([14, 15, 11], view);
         (case.grid.spacing, case.sigma) = ([1.0, 0.6, 1.4], 0.75 * 1.4);
-        case.check(&format!("{} {} {}", view.azimuth, view.elevation, view.roll), (3e-4, 4e-3));
+        case.check(&format!("{} {} {}", view.azimuth, view.elevation, view.roll), (5e-4, 6e-3));
     }
 }
 
@@ -240,7 +240,7 @@ fn the_largest_value_is_that_of_brute_force() {
             .filter(|(f, (l, h))| (f.is_nan() && !h.is_nan()) || (!f.is_nan() && l.is_nan()));
         let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
         println!("{name}: rms {rms:.1e}, largest {most:.1e}, sure {sure} of {shown}");
-        assert!(rms < 2e-3 && most < 2e-2, "{name}: rms {rms:e}, largest {most:e}");
+        assert!(rms < 3e-3 && most < 3e-2, "{name}: rms {rms:e}, largest {most:e}");
         assert!(sure > shown / 3 && shown < found.len() && wrong.count() == 0, "{name}: {sure} of {shown}");
     }
 }
