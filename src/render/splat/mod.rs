@@ -12,7 +12,6 @@
 //! These modules know neither the meaning of planes nor the source of blocks.
 
 pub(super) mod tile_rect;
-pub(super) mod slab;
 pub(super) mod lattice;
 pub(super) mod backend;
 pub(super) mod view_setup;

@@ -18,7 +18,6 @@ mod cells;
 mod gather;
 mod kernel;
 mod picture;
-mod shares;
 mod shear;
 mod spline;
 mod spread;
