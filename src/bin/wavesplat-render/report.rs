@@ -74,5 +74,13 @@ pub(crate) fn summary(r: &RenderReport) -> String {
         r.seconds,
         r.coefficients,
         r.left_out.coefficients
-    )
+    ) + &probed(r)
+}
+
+/// The errors of probed rays, view by view; empty for projections.
+fn probed(report: &RenderReport) -> String {
+    let probed = report.views.iter().filter_map(|view| view.probed);
+    probed
+        .map(|p| format!("; {} probed rays are off by {:.1e} (rms), {:.1e} (largest)", p.rays, p.rms, p.largest))
+        .collect()
 }

@@ -18,8 +18,8 @@
 //!
 //! A maximum intensity projection takes the largest g of all slices.
 //!
-//! The rays do not go through pixels. They go through the cells of the view's sheared lattice ([Lacroute], eq 35),
-//! where all voxels of a slice are at the same distances from the cells. So the kernel is three short filters, one
+//! The rays do not go through pixels. They go through the cells of the view's sheared lattice ([Lacroute](crate::bibliography), eq
+//! 35), where all voxels of a slice are at the same distances from the cells. So the kernel is three short filters, one
 //! along each axis, with the same weights for a whole row; and the pixels are interpolated from the finished cells,
 //! once for each frame. The data go this way:
 //!
@@ -35,8 +35,6 @@
 //!
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
-//!
-//! [Lacroute]: crate::bibliography
 
 mod taps;
 pub(super) mod view;
