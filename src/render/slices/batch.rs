@@ -1,10 +1,11 @@
 //! Renders a batch of frames from one view: reads layers of blocks front to back, and adds the slices between them.
 
-use super::layer::{Layers, Units};
+use super::layer::Layers;
 use super::needed::{Known, Need};
 use super::probe::Probe;
 use super::row::Blend;
 use super::sweep::{Band, Work};
+use super::units::Units;
 use super::values::samples;
 use super::view::{Slice, SlicedView};
 use super::{GROUP, finish};
@@ -59,8 +60,14 @@ pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, edge:
     let layers = Layers::bytes(view, most_layers(view, edge));
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
-    let of_thread = Work::bytes(view).max(finish::bytes::<B>(view));
-    frames * (layers + cells + picture) + rayon::current_num_threads() * of_thread
+    let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view));
+    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view))
+}
+
+/// Rows of each band.
+fn rows_of_band(view: &SlicedView) -> usize {
+    let bands = rayon::current_num_threads().min(view.extent[1] / LEAST_ROWS).max(1);
+    view.extent[1].div_ceil(bands)
 }
 
 impl<B: Blend> Batch<'_, B> {
@@ -87,6 +94,7 @@ impl<B: Blend> Batch<'_, B> {
             lap(&mut clock, &mut report.splat_seconds);
             (self.advance)(ready.len() * units.len());
         }
+        (self.advance)((self.view.slices() - next) * units.len());
         let mut clock = Instant::now();
         let pictures = self.finish(&frames);
         report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
@@ -188,12 +196,11 @@ impl<B: Blend> Batch<'_, B> {
     /// Adds slices to all cells of a frame, in bands of rows.
     fn add(&self, slices: &[Slice], frame: &mut Frame<B>) {
         let view = self.view;
-        let bands = rayon::current_num_threads().min(view.extent[1] / LEAST_ROWS).max(1);
-        let (rows, of_row) = (view.extent[1].div_ceil(bands), view.cells * view.cells * view.extent[0] / GROUP);
+        let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
         let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
         chunks.enumerate().for_each(|(n, (groups, limits))| {
-            let rows = n * rows..((n + 1) * rows).min(view.extent[1]);
-            let mut band = Band { view, blend: self.blend, rows, groups, limits, work: Work::new(view) };
+            let (work, rows) = (Work::new(view, rows), n * rows..((n + 1) * rows).min(view.extent[1]));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, work };
             slices.iter().for_each(|slice| band.add(slice, &frame.layers));
         });
     }

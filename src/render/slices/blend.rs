@@ -2,9 +2,9 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::layer::Units;
 use super::row::{Blend, Row};
 use super::table::{ENTRIES, Table};
+use super::units::Units;
 
 /// Emission and absorption: the light of each slice passes through the slices before it.
 pub(in crate::render) struct Composite {
@@ -21,7 +21,7 @@ impl Blend for Composite {
 
     const EMPTY: Self::Group = [Self::NOTHING; GROUP];
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
-    /// The limit is the sum of the transmittances of a group.
+    /// The limit is at least the largest transmittance of a group.
     const OPEN: f32 = GROUP as f32;
     const LEAST: f32 = super::LEAST;
     const CENTRED: bool = false;
@@ -121,8 +121,7 @@ fn places(numbers: &Sixteen) -> ([u32; GROUP], Sixteen) {
 // The loops over cells below sum up what they compute, in order. So compilers keep the four numbers of a cell together,
 // and do not gather entries number by number, which takes several times as long.
 
-/// Adds a slice of full length behind a group of cells. Returns their limit: the sum of their transmittances, which is
-/// at least the largest.
+/// Adds a slice of full length behind a group of cells. Returns their limit.
 #[inline(always)]
 fn add_whole(means: &Sixteen, entries: &[[f32; 8]; ENTRIES], group: &mut [[f32; 4]; GROUP]) -> f32 {
     let (places, rests) = places(means);
@@ -134,7 +133,7 @@ fn add_whole(means: &Sixteen, entries: &[[f32; 8]; ENTRIES], group: &mut [[f32; 
             sum[c] += group[i][c];
         }
     }
-    sum[3]
+    limit(group, sum[3])
 }
 
 /// The same for a slice with shorter rays. `before` is the limit.
@@ -169,7 +168,13 @@ fn add_part(
             sum[c] += group[i][c];
         }
     }
-    sum[3]
+    limit(group, sum[3])
+}
+
+/// The largest transmittance of a group; or, if some cell is open for sure, their sum.
+#[inline(always)]
+fn limit(group: &[[f32; 4]; GROUP], sum: f32) -> f32 {
+    if sum < GROUP as f32 * CLOSED { group.iter().map(|cell| cell[3]).fold(0.0, f32::max) } else { sum }
 }
 
 /// The opacities of shorter rays as shares of those of full length: (1 - (1 - opacity)^length) / opacity (eq 30).

@@ -2,8 +2,8 @@
 //! [Catmull](crate::bibliography) and Rom.
 
 use super::GROUP;
-use super::layer::Units;
 use super::row::Blend;
+use super::units::Units;
 use super::view::SlicedView;
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! The voxels of one frame around the slices in work: a few layers across the principal axis.
 //!
-//! Samples are in the units of the table or of the largest value ([`Units`]). NaN is missing. Rows run along b and are
+//! Samples are in the units of the table or of the largest value ([`super::units::Units`]). NaN is missing. Rows run along b and are
 //! padded with zeros to whole bricks.
 
 use super::bricks::{self, Ranges};
@@ -8,25 +8,6 @@ use super::taps::along;
 use super::view::SlicedView;
 use super::{BRICK_ROWS, GROUP};
 use crate::base::grid::Region;
-
-/// A linear map from values to 32-bit numbers: `(value - zero) * per`.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::render) struct Units {
-    pub(in crate::render) zero: f64,
-    pub(in crate::render) per: f64,
-}
-
-impl Units {
-    pub(in crate::render) fn of(&self, value: f64) -> f32 {
-        /// Sums of 32-bit numbers up to this do not overflow.
-        const MOST: f64 = 5e37;
-        ((value - self.zero) * self.per).clamp(-MOST, MOST) as f32
-    }
-
-    pub(in crate::render) fn value(&self, number: f32) -> f64 {
-        f64::from(number) / self.per + self.zero
-    }
-}
 
 /// Some voxel layers of one frame, counted along the ray.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::layer::Units;
 use super::row::{Blend, Row};
+use super::units::Units;
 
 /// The maximum along the ray.
 pub(in crate::render) struct Largest;

@@ -36,13 +36,14 @@
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
 
+mod units;
+pub(super) mod table;
 mod taps;
 pub(super) mod view;
 mod bricks;
 pub(super) mod layer;
 mod filter;
 pub(super) mod row;
-pub(super) mod table;
 pub(super) mod blend;
 pub(super) mod mip;
 mod sweep;

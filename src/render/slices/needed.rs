@@ -1,7 +1,7 @@
 //! The blocks that a batch must read: those near which a value may be visible.
 
-use super::layer::Units;
 use super::row::Blend;
+use super::units::Units;
 use super::view::SlicedView;
 use crate::base::grid::BlockGrid;
 use crate::render::scene::Selection;

@@ -5,9 +5,10 @@
 //! They do not include the errors of samples, and of the kernel's cut.
 
 use super::LEAST;
-use super::layer::{Layers, Units};
+use super::layer::Layers;
 use super::row::Blend;
 use super::taps::Taps;
+use super::units::Units;
 use super::view::SlicedView;
 use crate::render::report::Probed;
 

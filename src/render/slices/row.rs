@@ -2,7 +2,7 @@
 
 use super::GROUP;
 use super::filter::{Sixteen, weighted_rows};
-use super::layer::Units;
+use super::units::Units;
 
 /// One phase of a row of cells in a slice: sums of the kernel along a and b, to be summed along c.
 pub(in crate::render) struct Row<'a> {

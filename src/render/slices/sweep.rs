@@ -48,11 +48,17 @@ pub(super) struct Work {
 }
 
 impl Work {
-    pub(super) fn new(view: &SlicedView) -> Self {
-        let rim = 2 * view.reach[0] + GROUP;
-        let along_a = Sums::of(view.count[1] * Self::width(view, rim));
-        let along_b = (0..view.cells).map(|_| Sums::of(view.count[1] * view.extent[0])).collect();
+    /// For a band of `rows` rows.
+    pub(super) fn new(view: &SlicedView, rows: usize) -> Self {
+        let (rim, rows) = (2 * view.reach[0] + GROUP, Self::rows(view, rows));
+        let along_a = Sums::of(rows * Self::width(view, rim));
+        let along_b = (0..view.cells).map(|_| Sums::of(rows * view.extent[0])).collect();
         Self { rim, along_a, along_b }
+    }
+
+    /// The most rows of voxels, in whole bricks, that a band of `rows` rows needs.
+    fn rows(view: &SlicedView, rows: usize) -> usize {
+        (rows + 2 * view.reach[1] + 1 + 2 * BRICK_ROWS).min(view.count[1].next_multiple_of(BRICK_ROWS))
     }
 
     fn width(view: &SlicedView, rim: usize) -> usize {
@@ -60,9 +66,9 @@ impl Work {
     }
 
     /// Bytes, if samples are missing.
-    pub(super) fn bytes(view: &SlicedView) -> usize {
+    pub(super) fn bytes(view: &SlicedView, rows: usize) -> usize {
         let row = Self::width(view, 2 * view.reach[0] + GROUP) + view.cells * view.extent[0];
-        2 * size_of::<f32>() * view.count[1] * row
+        2 * size_of::<f32>() * Self::rows(view, rows) * row
     }
 }
 
@@ -75,11 +81,18 @@ struct Part<'a> {
     /// The sum of these weights.
     share: f32,
     has_missing: bool,
-    /// The rows of bricks that the band needs.
+    /// The rows of bricks that the band needs. Sums begin with the first of them.
     bricks: Range<usize>,
     /// The ranges of bricks, and of bricks with the rows of bricks that the kernel reaches.
     ranges: Ranges,
     wide: Ranges,
+}
+
+impl Part<'_> {
+    /// The first row of voxels of the sums.
+    fn start(&self) -> usize {
+        self.bricks.start * BRICK_ROWS
+    }
 }
 
 impl<B: Blend> Band<'_, B> {
@@ -134,7 +147,7 @@ impl<B: Blend> Band<'_, B> {
                 }
                 let (first, rows) = rows_of(row, layers.rows);
                 let from = Strip { at: first * layers.stride + column * GROUP, stride: layers.stride };
-                let to = Strip { at: first * stride + rim + column * GROUP, stride };
+                let to = Strip { at: (first - part.start()) * stride + rim + column * GROUP, stride };
                 if part.has_missing {
                     let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
                     let out = (to, sums.values.as_mut_slice(), sums.present.as_mut_slice());
@@ -165,6 +178,7 @@ impl<B: Blend> Band<'_, B> {
                     continue;
                 }
                 let (first, rows) = rows_of(row, view.count[1]);
+                let first = first - part.start();
                 let strip = Strip { at: first * from + at as usize, stride: from };
                 let out = Strip { at: first * to + group * GROUP, stride: to };
                 mix(&values, &taps.weights, strip, rows, (out, &mut sums.values));
@@ -205,7 +219,7 @@ impl<B: Blend> Band<'_, B> {
                         continue;
                     }
                     let sums = &self.work.along_b[phase];
-                    let from = first * view.extent[0];
+                    let from = (first - part.start()) * view.extent[0];
                     self.blend.add(
                         &Row {
                             values: &sums.values[from..],

@@ -1,7 +1,7 @@
 //! A transfer function ([Levoy](crate::bibliography)) for one distance of slices: colours times opacity, and opacity,
 //! tabulated over the values (eq 30).
 
-use super::layer::Units;
+use super::units::Units;
 use crate::colour::TransferFunction;
 
 /// Entries of the table. An entry and its slope take 32 bytes, so that the table fits in a first-level cache.
@@ -35,13 +35,52 @@ fn light(transfer: &TransferFunction, length: f64, value: f64) -> [f64; 4] {
     [r * opacity, g * opacity, b * opacity, -opacity]
 }
 
+/// The values of the first and the last colour or opacity.
+fn range(transfer: &TransferFunction) -> (f64, f64) {
+    let (colours, opacities) = (transfer.range(), transfer.opacity_range());
+    (colours.0.min(opacities.0), colours.1.max(opacities.1))
+}
+
+/// The number of steps from the first to the last entry, such that the points of the opacities lie on entries as nearly
+/// as possible. So values that are transparent remain so: there are many of them along a ray.
+fn steps(transfer: &TransferFunction, (lo, hi): (f64, f64)) -> usize {
+    let points = transfer.opacity_points();
+    let slope = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
+    let bend = |points: &[(f64, f64)]| (slope(&points[1..]) - slope(&points[..2])).abs();
+    let before = std::iter::once((lo - 1.0, points[0].1));
+    let after = std::iter::once((hi + 1.0, points[points.len() - 1].1));
+    let all: Vec<(f64, f64)> = before.chain(points.iter().copied()).chain(after).collect();
+    let off = |steps: usize| {
+        let error = |points: &[(f64, f64)]| {
+            let at = (points[1].0 - lo) / (hi - lo) * steps as f64;
+            let rest = at - at.floor();
+            rest * (1.0 - rest) * bend(points).min(1e300)
+        };
+        all.windows(3).map(error).sum::<f64>()
+    };
+    (ENTRIES / 2..=LAST).rev().min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(LAST)
+}
+
+/// The largest change, within an eighth of the range of values, of the opacity of a path of `length` units.
+pub(super) fn change(transfer: &TransferFunction, length: f64) -> f64 {
+    const PARTS: usize = 64;
+    let (lo, hi) = range(transfer);
+    let opacity = |n: usize| -light(transfer, length, lo + (hi - lo) * n as f64 / PARTS as f64)[3];
+    let opacities: Vec<f64> = (0..=PARTS).map(opacity).collect();
+    let change = |opacities: &[f64]| {
+        let ends = opacities.iter().fold((1.0_f64, 0.0_f64), |(lo, hi), a| (lo.min(*a), hi.max(*a)));
+        ends.1 - ends.0
+    };
+    opacities.windows(PARTS / 8 + 1).map(change).fold(0.0, f64::max)
+}
+
 impl Table {
     /// The table for slices whose rays are `length` units of opacity long.
     pub(in crate::render) fn new(transfer: &TransferFunction, length: f64) -> Self {
-        let (colours, opacities) = (transfer.range(), transfer.opacity_range());
-        let (lo, hi) = (colours.0.min(opacities.0), colours.1.max(opacities.1));
-        let units = Units { zero: lo, per: LAST as f64 / (hi - lo) };
-        let at = |n: usize| if n >= LAST { hi } else { lo + n as f64 * (hi - lo) / LAST as f64 };
+        let (lo, hi) = range(transfer);
+        let last = steps(transfer, (lo, hi));
+        let units = Units { zero: lo, per: last as f64 / (hi - lo) };
+        let at = |n: usize| if n >= last { hi } else { lo + n as f64 * (hi - lo) / last as f64 };
         let values: Vec<[f32; 4]> =
             (0..=ENTRIES).map(|n| light(transfer, length, at(n)).map(|number| number as f32)).collect();
         let entry = |n: usize| {
@@ -87,7 +126,7 @@ impl Table {
             let (found, exact) = (self.at(self.units.of(value)), self.exact(value, 1.0));
             found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
         };
-        let values = (0..8 * LAST).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
+        let values = (0..8 * ENTRIES).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
         values.map(off).fold(0.0, f64::max)
     }
 }
@@ -131,6 +170,16 @@ mod tests {
             assert_eq!(table.shows((number(lo), number(hi))), shows, "{lo} to {hi}");
         }
         assert!(table.shows((f32::NEG_INFINITY, f32::INFINITY)) && !table.shows((f32::INFINITY, f32::NEG_INFINITY)));
+    }
+
+    #[test]
+    fn transparent_values_remain_so() {
+        for points in [vec![(0.2, 0.0), (0.6, 0.3), (0.9, 0.9)], vec![(0.123, 0.0), (0.456, 1.0), (0.789, 0.0)]] {
+            let table =
+                Table::new(&grey().with_opacity(&points).expect("points").over((-1.0, 4.0)).expect("a range"), 1.0);
+            let value = |share: f64| table.units.of(-1.0 + 5.0 * share);
+            assert!(!table.shows((value(0.0), value(points[0].0))), "{points:?}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The samples of a block in every frame of a batch, from its planes.
 
-use super::layer::Units;
+use super::units::Units;
 use crate::base::error::Result;
 use crate::render::layout::Layout;
 use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};

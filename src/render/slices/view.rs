@@ -10,11 +10,12 @@
 //!
 //! alpha and beta are the slopes of eq 35, so a ray crosses all slices at one (u, v), which is a point of the picture.
 
+use super::table::change;
 use super::taps::{Taps, along, reach};
 use super::{GROUP, LEAST};
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
-use crate::render::config::RenderConfig;
+use crate::render::config::{Mode, RenderConfig};
 use crate::render::splat::lattice::Shear;
 use crate::view::camera::{Camera, View};
 use std::ops::Range;
@@ -60,9 +61,11 @@ pub(super) struct Slice {
 /// The largest number of slices per voxel.
 const MOST: usize = 64;
 /// Pixels per voxel from which on several cells per voxel show.
-const FEW_PIXELS: f64 = 1.25;
+const FEW_PIXELS: f64 = 0.8;
 /// The default distance of slices and cells in standard deviations of the kernel.
 const FINE: f64 = 2.0 / 3.0;
+/// With one slice a voxel, opacities may change by this within an eighth of the range of values.
+const SMOOTH: f64 = 0.1;
 /// Cells around the picture that interpolation needs.
 const RIM: f64 = 2.0;
 
@@ -84,10 +87,11 @@ impl SlicedView {
         let pixels = shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
         let across = if pixels < FEW_PIXELS { 1 } else { default(sigma[0].min(sigma[1])) };
         let cells = config.mode.slices().unwrap_or(across);
-        let sharp = if config.mode.is_sharp() { 2 } else { 1 };
-        let fineness = config.mode.slices().unwrap_or(sharp * default(2.0 * sigma[2]));
         let deeper = camera.step(shear.axes[2], 1.0)[2];
-        let step = grid.spacing[shear.axes[2]] / (fineness as f64 * deeper.abs());
+        let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
+        let slices = default(2.0 * sigma[2]) * more_slices(&config.mode, voxel, grid);
+        let fineness = config.mode.slices().unwrap_or(slices);
+        let step = voxel / fineness as f64;
         let mut cut = Self {
             camera,
             shear,
@@ -227,6 +231,18 @@ impl SlicedView {
         };
         let [columns, rows] = [within(0, self.extent[0]), within(1, self.extent[1])];
         [columns.start / GROUP..columns.end.div_ceil(GROUP), rows]
+    }
+}
+
+/// How many times as many slices as for smooth opacities a mode needs. `voxel` is the length of a ray along which it
+/// crosses a voxel.
+fn more_slices(mode: &Mode, voxel: f64, grid: &Grid) -> usize {
+    match mode {
+        Mode::Composite { transfer, unit, .. } => {
+            let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());
+            (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 4.0) as usize
+        }
+        _ => 2,
     }
 }
 
