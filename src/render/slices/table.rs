@@ -11,6 +11,9 @@ const LAST: usize = ENTRIES - 1;
 /// The largest opacity of a path of unit length: the rest is less than half a level of an 8-bit picture.
 const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
 
+/// Shares of a step that count as nothing.
+const NEAR: f64 = 1e-3;
+
 /// Slices with less opacity are not visible; 300 of them hide 3e-4 of the light.
 pub(super) const FAINT: f32 = 1e-6;
 
@@ -42,7 +45,7 @@ fn range(transfer: &TransferFunction) -> (f64, f64) {
 }
 
 /// The number of steps from the first to the last entry, such that the points of the opacities lie on entries as nearly
-/// as possible. So values that are transparent remain so: there are many of them along a ray.
+/// as possible. Where one does not, the whole step is transparent if any of it is: a ray may meet many such values.
 fn steps(transfer: &TransferFunction, (lo, hi): (f64, f64)) -> usize {
     let points = transfer.opacity_points();
     let slope = |pair: &[(f64, f64)]| (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0);
@@ -80,11 +83,14 @@ impl Table {
         let (lo, hi) = range(transfer);
         let last = steps(transfer, (lo, hi));
         let units = Units { zero: lo, per: last as f64 / (hi - lo) };
-        let at = |n: usize| if n >= last { hi } else { lo + n as f64 * (hi - lo) / last as f64 };
-        let values: Vec<[f32; 4]> =
-            (0..=ENTRIES).map(|n| light(transfer, length, at(n)).map(|number| number as f32)).collect();
+        let value = |at: f64| light(transfer, length, lo + (at / units.per).min(hi - lo)).map(|number| number as f32);
+        let ends: Vec<[f32; 4]> = (0..=ENTRIES).map(|n| if n < last { value(n as f64) } else { value(1e9) }).collect();
         let entry = |n: usize| {
-            std::array::from_fn(|i| if i < 4 { values[n][i] } else { values[n + 1][i - 4] - values[n][i - 4] })
+            let near = [value(n as f64 + NEAR), value((n + 1) as f64 - NEAR)];
+            // Where a value next to a transparent end is transparent, the opacities have a point inside.
+            let is_edge = (ends[n][3] == 0.0) != (ends[n + 1][3] == 0.0) && near.iter().any(|light| light[3] == 0.0);
+            let (from, to) = if is_edge { ([0.0; 4], [0.0; 4]) } else { (ends[n], ends[n + 1]) };
+            std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] - from[i - 4] })
         };
         let entries: Box<[[f32; 8]; ENTRIES]> = Box::new(std::array::from_fn(entry));
         let count = |sum: &mut u16, entry: &[f32; 8]| {
