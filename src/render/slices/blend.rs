@@ -11,8 +11,8 @@ pub(in crate::render) struct Composite {
     pub(in crate::render) table: Table,
 }
 
-/// Rays with less transmittance are opaque: the rest is an eighth of a level of an 8-bit picture.
-const CLOSED: f32 = 1.0 / 2048.0;
+/// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
+const CLOSED: f32 = 1.0 / 8192.0;
 
 impl Blend for Composite {
     /// Red, green and blue of the light, and the transmittance.
