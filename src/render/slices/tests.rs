@@ -243,7 +243,7 @@ fn the_largest_value_is_that_of_brute_force() {
         let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
         println!("{name}: rms {rms:.1e}, largest {most:.1e}, sure {sure} of {shown}");
         assert!(rms < 6e-3 && most < 5e-2, "{name}: rms {rms:e}, largest {most:e}");
-        assert!(sure > shown / 3 && shown < found.len() && wrong.count() == 0, "{name}: {sure} of {shown}");
+        assert!(sure > shown / 3 && shown > found.len() / 4 && wrong.count() == 0, "{name}: {sure} of {shown}");
     }
 }
 
