@@ -88,8 +88,8 @@
 //! # From a file to a pixel
 //!
 //! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.
-//! 2. `render` (`render/mod.rs`) makes a `ViewSetup` of each view, and calls `project` or, for modes with slabs,
-//!    `composite`. Both loop over batches of frames with `for_each_batch` (`render/driver.rs`).
+//! 2. `render` (`render/mod.rs`) makes a `ViewSetup` of each view, and calls `project`; or, for modes with slices, a
+//!    `SlicedView`, and calls `composite`. Both loop over batches of frames with `for_each_batch` (`render/driver.rs`).
 //! 3. `Scene::open` (`render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
 //! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/batch.rs`), decodes
 //!    it (`codec/decode.rs`) and gives the values of its planes (`render/scenes/coded.rs`).

@@ -1,9 +1,9 @@
-//! Colour and opacity along the ray, and largest values: compared with brute force, and as slabs become thinner.
+//! Colour and opacity along the ray, and largest values: compared with brute force, and with finer slices.
 
 use crate::common::views::{archive, field, of_reference, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored};
 use crate::images::under_less_memory;
-use crate::reference::ray::{Cut, Rays};
+use crate::reference::ray::Rays;
 use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
@@ -40,8 +40,8 @@ fn medium(value: f64) -> [f64; 4] {
     [channel(0), channel(1), channel(2), -(1.0 - linear(&OPACITIES)).ln() / UNIT]
 }
 
-fn composite(slabs: Option<usize>) -> Mode {
-    Mode::Composite { transfer: transfer(), unit: Some(UNIT), slabs }
+fn composite(slices: Option<usize>) -> Mode {
+    Mode::Composite { transfer: transfer(), unit: Some(UNIT), slices }
 }
 
 fn seen(view: View, grid: &Grid, mode: Mode) -> RenderConfig {
@@ -56,30 +56,39 @@ fn views() -> [View; 3] {
     ]
 }
 
-/// The largest difference of any component of any pixel in all frames from `expected(slabs of the frame, pixel)`.
+/// The steps of the reference along a ray.
+const STEPS: usize = 100;
+
+/// The largest difference of any component of any pixel in all frames from brute force. Pixels for which this has no
+/// number are ignored.
 fn largest_difference(
     found: &[f32],
-    (grid, config, slabs): (&Grid, &RenderConfig, usize),
+    (grid, config): (&Grid, &RenderConfig),
     samples: &[f64],
-    expected: impl Fn((&Rays<'_>, &Cut), [usize; 2]) -> Vec<f64>,
+    expected: impl Fn(&Rays<'_>, [usize; 2]) -> Vec<Option<f64>>,
 ) -> f64 {
     let scale = Camera::new(&config.views[0], grid).unwrap().scale;
     let (lattice, view) = of_reference(grid, config, scale);
     let [width, height] = config.views[0].size;
-    let mut largest = 0.0_f64;
+    let (mut largest, mut count) = (0.0_f64, 0);
     let of_frame = found.len() / FRAMES;
     for (values, picture) in samples.chunks_exact(grid.whole().voxels()).zip(found.chunks_exact(of_frame)) {
         let rays = Rays { lattice: &lattice, view: &view, values };
-        let cut = rays.cut(slabs);
         for (pixel, numbers) in picture.chunks_exact(of_frame / (width * height)).enumerate() {
-            for (found, expected) in numbers.iter().zip(expected((&rays, &cut), [pixel % width, pixel / width])) {
-                let off = (f64::from(*found) - expected).abs();
+            for (found, expected) in numbers.iter().zip(expected(&rays, [pixel % width, pixel / width])) {
+                let Some(expected) = expected else { continue };
                 assert_eq!(found.is_nan(), expected.is_nan(), "pixel {pixel}: {found} for {expected}");
-                largest = largest.max(if found.is_nan() { 0.0 } else { off });
+                largest = largest.max(if found.is_nan() { 0.0 } else { (f64::from(*found) - expected).abs() });
+                count += usize::from(!found.is_nan());
             }
         }
     }
+    assert!(count > found.len() / 8, "{count} of {}", found.len());
     largest
+}
+
+fn integral(rays: &Rays<'_>, pixel: [usize; 2]) -> Vec<Option<f64>> {
+    rays.integral(pixel, STEPS, &medium).map(Some).to_vec()
 }
 
 /// All samples are stored exactly, so that only splatting is approximate. Blocks are small, so that there are many.
@@ -102,82 +111,76 @@ fn with_holes(mut samples: Vec<f64>) -> Vec<f64> {
     samples
 }
 
-/// Ignores what no 8-bit picture shows: contributions behind a point where less than 1/2048 of the light passes.
 #[test]
-fn slabs_are_blended_as_by_brute_force() {
+fn composites_are_those_of_brute_force() {
     for (n, view) in views().into_iter().enumerate() {
         let samples = field(&GRID, FRAMES, n as u64);
         let samples = if n == 1 { with_holes(samples) } else { samples };
         let file = exact(&samples, Basis::Haar);
-        for slabs in [[1, 40], [7, 40], [1, 7]][n] {
-            let config = seen(view, &GRID, composite(Some(slabs)));
-            let expected = |(rays, cut): (&Rays<'_>, &Cut), pixel| rays.composite(pixel, cut, &medium).to_vec();
-            for (splat_error, most) in [(0.0, 6e-4), (1e-3, 5e-3)] {
-                let config = RenderConfig { splat_error, ..config.clone() };
-                let mut scenes: [Box<dyn Scene>; 2] =
-                    [Box::new(scene(&file)), Box::new(direct(&archive(GRID, SampleType::F64, &samples), None))];
-                for scene in &mut scenes {
-                    let (found, report) = pictures(scene.as_mut(), &config);
-                    let off = largest_difference(&found, (&GRID, &config, slabs), &samples, expected);
-                    assert!(off < most, "view {n}, {slabs} slabs by {}: {off:e}", report.views[0].method);
-                    assert_eq!(report.views[0].slabs, Some(slabs));
-                }
+        for (slices, most) in [(None, 8e-2), (Some(4), 2e-2)] {
+            let config = seen(view, &GRID, composite(slices));
+            let mut scenes: [Box<dyn Scene>; 2] =
+                [Box::new(scene(&file)), Box::new(direct(&archive(GRID, SampleType::F64, &samples), None))];
+            for scene in &mut scenes {
+                let (found, report) = pictures(scene.as_mut(), &config);
+                let off = largest_difference(&found, (&GRID, &config), &samples, integral);
+                println!("view {n}, {slices:?}: {off:e}, {:?}", report.views[0].probed);
+                assert!(off < most, "view {n}, {slices:?} slices: {off:e}");
+                assert!(report.views[0].probed.is_some_and(|probed| probed.largest < most), "{report:?}");
             }
         }
     }
 }
 
-/// The README states how the error falls with the thickness.
 #[test]
-fn thinner_slabs_come_nearer_to_the_integral_along_the_ray() {
+fn finer_slices_come_nearer_to_the_integral_along_the_ray() {
     let grid = Grid { dims: [9, 8, 7], ..GRID };
     let samples = field(&grid, FRAMES, 5);
     let memory = archive(grid, SampleType::F64, &samples);
-    for view in [view(30.0, 25.0, [14, 12]), view(0.0, 90.0, [12, 12])] {
-        let error = |slabs: usize| {
-            let config = seen(view, &grid, composite(Some(slabs)));
+    for view in [view(30.0, 25.0, [34, 32]), view(0.0, 90.0, [32, 32])] {
+        let error = |slices: usize| {
+            let config = seen(view, &grid, composite(Some(slices)));
             let (found, _) = pictures(&mut direct(&memory, None), &config);
-            let integral = |(rays, _): (&Rays<'_>, &Cut), pixel| rays.integral(pixel, 400, &medium).to_vec();
-            largest_difference(&found, (&grid, &config, slabs), &samples, integral)
+            largest_difference(&found, (&grid, &config), &samples, integral)
         };
-        let errors = [4, 8, 16, 32, 64, 128].map(error);
-        assert!(errors.windows(2).all(|pair| pair[1] < 0.8 * pair[0]), "{errors:?}");
-        assert!(errors[2] < errors[0] / 8.0 && errors[5] < errors[0] / 64.0 && errors[5] < 2e-3, "{errors:?}");
+        let errors = [1, 2, 4].map(error);
+        assert!(errors.windows(2).all(|pair| pair[1] < 0.5 * pair[0]) && errors[2] < 2e-2, "{errors:?}");
     }
 }
 
+/// Pixels whose largest value hardly any sample supports are ignored: they depend on where the kernel is cut.
 #[test]
-fn the_largest_value_is_that_of_the_slabs() {
+fn the_largest_value_is_that_of_brute_force() {
     for (n, view) in views().into_iter().enumerate() {
         let samples = field(&GRID, FRAMES, n as u64);
-        let samples = if n == 1 { with_holes(samples) } else { samples };
-        for (splat_error, most) in [(0.0, 1e-4), (1e-3, 2e-2)] {
-            let config = RenderConfig { splat_error, ..seen(view, &GRID, Mode::Mip { slabs: Some(20) }) };
-            let file = exact(&samples, SchemeConstraint::AUTO);
-            let (found, _) = pictures(&mut scene(&file), &config);
-            let off = largest_difference(&found, (&GRID, &config, 20), &samples, |(rays, cut), pixel| {
-                vec![rays.slabs(pixel, cut).into_iter().map(|slab| slab.1).fold(f64::NAN, f64::max)]
-            });
-            assert!(off < most, "view {n} within {splat_error:e}: {off:e}");
-        }
+        let config = seen(view, &GRID, Mode::Mip { slices: Some(4) });
+        let file = exact(&samples, SchemeConstraint::AUTO);
+        let (found, _) = pictures(&mut scene(&file), &config);
+        let off = largest_difference(&found, (&GRID, &config), &samples, |rays, pixel| {
+            let [low, high] = [0.003, 0.03].map(|least| rays.largest(pixel, STEPS, least));
+            vec![Some(low).filter(|low| (low - high).abs() < 1e-3)]
+        });
+        assert!(off < 0.2, "view {n}: {off:e}");
     }
 }
 
-/// The error of a mean is at most that of its samples, and so is the error of the largest of several means.
+/// The error of a mean is at most that of its samples, and so is the error of the largest of several means. A parabola
+/// through three of them, and four by four cells around a pixel, may each have a little more.
 #[test]
 fn the_bound_holds_for_the_largest_value() {
     let samples = field(&GRID, FRAMES, 9);
     let whole = exact(&samples, Basis::Haar);
+    const MORE: f64 = 1.25 * 1.25 * 1.25; // sums of absolute weights
     for (tolerance, basis) in [(0.05, Basis::Haar), (0.01, Basis::Samples), (0.02, Basis::Learned)] {
         let config = ConvertConfig { block: Some(6), ..settings(basis, 4, tolerance) };
         let lossy = stored(&mut archive(GRID, SampleType::F64, &samples), &config);
         let delta = lossy.report.delta;
-        let config = seen(view(30.0, 25.0, [30, 26]), &GRID, Mode::Mip { slabs: None });
+        let config = seen(view(30.0, 25.0, [30, 26]), &GRID, Mode::Mip { slices: None });
         let (expected, _) = pictures(&mut scene(&whole), &config);
         let (found, _) = pictures(&mut CoefficientScene::new(lossy.open(), SplatSource::Coefficients), &config);
         for (found, expected) in found.iter().zip(&expected) {
             let off = f64::from((found - expected).abs());
-            assert!(found.is_nan() && expected.is_nan() || off <= delta * (1.0 + 1e-6), "{found} for {expected}");
+            assert!(found.is_nan() && expected.is_nan() || off <= MORE * delta, "{found} for {expected}");
         }
     }
 }
@@ -186,7 +189,7 @@ fn the_bound_holds_for_the_largest_value() {
 fn scene_with_a_wall(grid: &Grid) -> Vec<f64> {
     let value = |[x, y, z]: [usize; 3], t: usize| match y {
         y if y > grid.dims[1] - 25 => 0.0,
-        y if y > grid.dims[1] - 31 => 4.0 + 0.1 * ((x + z + t) as f64).sin(),
+        y if y > grid.dims[1] - 35 => 4.0 + 0.1 * ((x + z + t) as f64).sin(),
         _ => 2.0 + (0.3 * (x + y + z + t) as f64).sin(),
     };
     (0..FRAMES).flat_map(|t| grid.whole().iter().map(move |v| value(v, t)).collect::<Vec<_>>()).collect()
@@ -206,8 +209,8 @@ fn transparent_and_hidden_blocks_are_not_read() {
     assert_eq!(found.len(), whole.len());
     let off = found.iter().zip(&whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(off < 1e-5, "{off:e}");
-    assert!(report.tiles_clear > report.tiles / 10 && of_all.tiles_clear < report.tiles_clear, "{report:?}");
-    assert!(report.tiles_opaque > 0);
+    assert!(report.blocks_transparent > report.blocks / 10 && of_all.blocks_transparent == 0, "{report:?}");
+    assert!(report.blocks_hidden > 0);
     assert!(report.blocks_read < report.blocks / 2, "{report:?}");
 }
 
@@ -217,9 +220,9 @@ fn memory_changes_no_bit_of_a_composite() {
     let files = [exact(&samples, Basis::Haar), exact(&samples, SchemeConstraint::AUTO)];
     let part = Region { start: [6, 5, 5], end: [13, 9, 10] };
     for (splat_error, mode, region) in [
-        (0.0, composite(Some(8)), Some(part)),
+        (0.0, composite(Some(3)), Some(part)),
         (1e-3, composite(None), None),
-        (1e-3, Mode::Mip { slabs: None }, Some(part)),
+        (1e-3, Mode::Mip { slices: None }, Some(part)),
     ] {
         let config = RenderConfig { splat_error, region, ..seen(view(30.0, 25.0, [100, 90]), &GRID, mode) };
         files.iter().for_each(|file| assert!(under_less_memory(&mut scene(file), &config) >= 3));
@@ -241,8 +244,8 @@ fn options_without_meaning_along_a_ray_are_refused() {
         (with(&|c| c.kernel.tau = 0.1), "tau"),
         (with(&|c| c.certify = true), "certify"),
         (with(&|c| c.quantity = Quantity::Emission), "quantity"),
-        (with(&|c| c.mode = composite(Some(0))), "slabs"),
-        (with(&|c| c.mode = composite(Some(100_000))), "slabs"),
+        (with(&|c| c.mode = composite(Some(0))), "slices"),
+        (with(&|c| c.mode = composite(Some(100_000))), "slices"),
     ] {
         let error = wavesplat::render::check(&scene, &wrong).unwrap_err();
         assert!(matches!(&error, Error::Setting { setting, .. } if *setting == what), "{error}");

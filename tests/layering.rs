@@ -26,6 +26,8 @@ const ALLOWED_FILES: [(&str, &[&str]); 21] = [
             "convert/choose.rs",
             "convert/sampled.rs",
             "source/scan.rs",
+            "render/composite.rs",
+            "render/slices/",
             "render/splat/accumulator.rs",
             "render/splat/band.rs",
             "render/splat/footprints.rs",

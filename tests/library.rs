@@ -180,7 +180,7 @@ fn pictures_of_a_remote_file_are_the_same_and_take_few_requests() {
     let (mut local, mut far) = (CoefficientScene::from(stored.open()), CoefficientScene::from(file));
     let view = View { size: [60, 50], ..View::new(30.0, 20.0) };
     let plain = RenderConfig::new(&far, view);
-    for mode in [Mode::Projection, Mode::Mip { slabs: None }] {
+    for mode in [Mode::Projection, Mode::Mip { slices: None }] {
         let config = RenderConfig { mode, ..plain.clone() };
         let before = remote.counts();
         let ((near, _), (far, report)) = (pictures(&mut local, &config), pictures(&mut far, &config));

@@ -129,7 +129,7 @@ fn a_scene_from_outside_renders_as_its_samples_do() {
         plain.clone(),
         RenderConfig { splat_error: 0.0, ..plain.clone() },
         RenderConfig { region, frames: vec![1, 2], ..plain.clone() },
-        RenderConfig { mode: Mode::Mip { slabs: None }, ..plain.clone() },
+        RenderConfig { mode: Mode::Mip { slices: None }, ..plain.clone() },
     ] {
         let (own, known) = (pictures(&mut formula, &config), pictures(&mut frames, &config));
         assert!(own.iter().any(|v| *v > 0.0) && own.len() == config.frames.len() * 70 * 60);

@@ -100,7 +100,7 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
             "sidecar",
             "sigma",
             "size",
-            "slabs",
+            "slices",
             "splat-error",
             "tau",
             "view",

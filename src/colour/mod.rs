@@ -157,6 +157,11 @@ impl TransferFunction {
         if value.is_nan() { 0.0 } else { between(&self.opacity, value, |a, b, t| a + (b - a) * t) }
     }
 
+    /// The points (value, opacity), ascending by value.
+    pub(crate) fn opacity_points(&self) -> &[(f64, f64)] {
+        &self.opacity
+    }
+
     /// The values of the first and the last opacity.
     pub(crate) fn opacity_range(&self) -> (f64, f64) {
         (self.opacity[0].0, self.opacity[self.opacity.len() - 1].0)

@@ -1,7 +1,7 @@
 //! The settings of a rendering.
 
 use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::grid::Region;
+use crate::base::grid::{Grid, Region};
 use crate::colour::TransferFunction;
 use crate::view::camera::View;
 use crate::view::footprint::{Kernel, Method};
@@ -49,13 +49,14 @@ pub enum Mode {
         transfer: TransferFunction,
         /// Length of the path that has the transfer function's opacity, in world units; by default the largest spacing.
         unit: Option<f64>,
-        /// Number of slabs that the volume is cut into; by default each is about as thick as the largest spacing.
-        slabs: Option<usize>,
+        /// Slices per voxel along the ray, and cells of a slice per voxel across it; by default as many as the kernel and
+        /// the scale of the view need.
+        slices: Option<usize>,
     },
     /// The maximum along the ray.
     Mip {
-        /// Number of slabs, as in [`Self::Composite`].
-        slabs: Option<usize>,
+        /// Slices and cells per voxel, as in [`Self::Composite`].
+        slices: Option<usize>,
     },
 }
 
@@ -70,11 +71,11 @@ impl Mode {
         matches!(self, Self::Projection)
     }
 
-    /// The number of slabs that the caller set.
-    pub(super) fn slabs(&self) -> Option<usize> {
+    /// The number of slices per voxel that the caller set.
+    pub(super) fn slices(&self) -> Option<usize> {
         match self {
             Self::Projection => None,
-            Self::Composite { slabs, .. } | Self::Mip { slabs } => *slabs,
+            Self::Composite { slices, .. } | Self::Mip { slices } => *slices,
         }
     }
 }
@@ -97,7 +98,7 @@ pub struct RenderConfig {
     /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
     /// brightest point of the picture plane. For a mean it is relative to the value range at pixels with that point's
     /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default:
-    /// [`default_splat_error`].
+    /// [`default_splat_error`]. Composites and largest values are not splatted.
     pub splat_error: f64,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
     /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all
@@ -126,6 +127,16 @@ impl RenderConfig {
     /// Width and height of the pictures.
     pub(super) fn size(&self) -> [usize; 2] {
         self.views[0].size
+    }
+
+    /// The voxels of a grid to render.
+    pub(super) fn clip(&self, grid: &Grid) -> Result<Region> {
+        let clip = self.region.unwrap_or(grid.whole());
+        if !grid.whole().contains(&clip) || clip.is_empty() {
+            let [x, y, z] = grid.dims;
+            return Err(Error::setting("region", format!("not within the volume of {x}x{y}x{z} voxels")));
+        }
+        Ok(clip)
     }
 
     /// Whether the selection of blocks depends on the view.

@@ -1,17 +1,20 @@
-//! The loop over frame batches, shared by projections and the modes with slabs.
+//! The loop over frame batches, shared by projections and the modes with slices.
 
 use super::config::RenderConfig;
 use super::expectation::Expectation;
-use super::plan::{self, Budget};
+use super::plan;
 use super::report::RenderReport;
 use super::scene::{BatchOutcome, BatchRequest, FrameBatch, Scene};
 use crate::base::error::Result;
 
-/// The settings and the budget of a rendering.
+/// How many of some frames to render together.
+pub(super) type Together<'a> = dyn Fn(&dyn Scene, usize) -> usize + 'a;
+
+/// The settings of a rendering, and how much of it fits in memory.
 #[derive(Clone, Copy)]
 pub(super) struct Job<'a> {
     pub(super) config: &'a RenderConfig,
-    pub(super) budget: &'a Budget<'a>,
+    pub(super) together: &'a Together<'a>,
     /// The views in which to estimate errors; empty unless pictures are projections.
     pub(super) views: &'a [Expectation<'a>],
 }
@@ -31,11 +34,11 @@ pub(super) fn for_each_batch<P>(
     mut render: impl FnMut(&dyn FrameBatch, &mut RenderReport) -> Result<P>,
     mut give: impl FnMut(&[usize], Vec<RenderedBatch<P>>, &mut RenderReport) -> Result<()>,
 ) -> Result<()> {
-    let Job { config, budget, views } = job;
+    let Job { config, together, views } = job;
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
         let most = plan::in_batch(scene, *first, rest);
-        let (frames, later) = rest.split_at(budget.frames(scene, config, most));
+        let (frames, later) = rest.split_at(together(scene, most));
         let channels = 0..scene.channels();
         let request = |channel| BatchRequest { frames, channel, config, views };
         let channels = channels.map(|channel| render_channel(scene, &request(channel), report, &mut render));

@@ -1,7 +1,7 @@
 //! The planes of a frame batch: the sums that a view keeps for each pixel, and their order.
 
 /// The planes of a frame batch, one after another: coefficients, values of single frames, weights of samples missing in
-/// single frames, weights of samples missing in all frames, errors, and lengths.
+/// single frames, weights of samples missing in all frames, and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Number of coefficient planes.
@@ -14,8 +14,6 @@ pub struct Layout {
     pub absent: bool,
     /// Number of error planes; 0 unless pictures are certified.
     pub error_planes: usize,
-    /// Whether the last plane holds the weights of all voxels: the lengths of the rays.
-    pub lengths: bool,
     /// How tiles store the planes.
     pub order: Order,
 }
@@ -24,7 +22,7 @@ impl Layout {
     /// The layout with one plane of values for each of `frames` frames, and no other planes.
     pub fn of_values(frames: usize) -> Self {
         let (coefficients, error_planes, order) = (0, 0, Order::Pixels);
-        Self { coefficients, frames, values: true, absent: false, error_planes, lengths: false, order }
+        Self { coefficients, frames, values: true, absent: false, error_planes, order }
     }
 
     /// The index of a frame's plane of values.
@@ -62,7 +60,7 @@ impl Layout {
 
     /// Number of planes.
     pub fn planes(&self) -> usize {
-        self.first_error() + self.error_planes + usize::from(self.lengths)
+        self.first_error() + self.error_planes
     }
 }
 
@@ -81,15 +79,8 @@ mod tests {
 
     #[test]
     fn planes_follow_one_another() {
-        let layout = Layout {
-            coefficients: 5,
-            frames: 3,
-            values: true,
-            absent: true,
-            error_planes: 2,
-            lengths: false,
-            order: Order::Planes,
-        };
+        let layout =
+            Layout { coefficients: 5, frames: 3, values: true, absent: true, error_planes: 2, order: Order::Planes };
         assert_eq!((layout.value(0), layout.absent(0), layout.absent_in_all()), (5, 8, 11));
         assert_eq!((layout.first_error(), layout.planes()), (12, 14));
         let plain = Layout { values: false, absent: false, error_planes: 0, ..layout };

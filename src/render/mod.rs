@@ -23,12 +23,12 @@
 //! scene             the source of blocks: a frame batch and the blocks selected for it
 //! report            what a rendering did: counts, times and errors
 //! scenes/           a coefficient file or an archive's frames as a scene
-//! slabs/            composites and maximum intensity projections: the volume in slabs
+//! slices/           composites and maximum intensity projections: the field along rays, slice by slice
 //! plan              how much fits in memory
 //! certificate       the error bound of a pixel; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
-//! project           the pictures of a batch as projections; composite: slab by slab
+//! project           the pictures of a batch as projections; composite: slice by slice
 //! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!
@@ -44,8 +44,8 @@
 //!
 //! Tiles splat the voxels directly (`splat::footprints`) if footprints are less work than the lattice, if the lattice
 //! is not precise enough, or if pictures are certified. All planes of a view are splatted in the same way, weights and
-//! missing samples included, so that means stay means. Composites and maximum intensity projections go slab by slab
-//! (`composite`).
+//! missing samples included, so that means stay means. Composites and maximum intensity projections are not splatted:
+//! `slices` samples the field along rays.
 
 mod config;
 mod layout;
@@ -57,7 +57,7 @@ mod overview;
 mod scene;
 mod report;
 mod scenes;
-mod slabs;
+mod slices;
 mod plan;
 mod certificate;
 mod weigh;
@@ -76,7 +76,7 @@ pub use layout::{Layout, Order};
 pub use overview::{OverviewRequest, Thinning, stride};
 pub use pictures::render_png;
 pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
-pub use report::{Picture, RenderReport, Rendered, ViewReport};
+pub use report::{Picture, Probed, RenderReport, Rendered, ViewReport};
 pub use scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
 };
@@ -86,6 +86,7 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
+use slices::SlicedView;
 use splat::ViewSetup;
 use splat::reference_weights::without_dim_voxels;
 use std::time::{Duration, Instant};
@@ -101,10 +102,10 @@ pub fn render(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
-    let setups = setups(scene, config)?;
-    Budget::check(config, least(scene, config, &setups)?)?;
+    let setups = Setups::new(scene, config)?;
+    Budget::check(config, setups.least(scene, config))?;
     let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
-    report.views = reports(&setups, config);
+    report.views = setups.reports(config);
     let views = report.views.clone();
     let mut sink_time = Duration::ZERO;
     let mut sink = |rendered: Rendered<'_>| {
@@ -113,10 +114,9 @@ pub fn render(
         sink_time += writing.elapsed();
         Ok(())
     };
-    if config.mode.is_projection() {
-        project::project(scene, config, &setups, progress, &mut report, &mut sink)?;
-    } else {
-        composite::composite(scene, config, &setups, progress, &mut report, &mut sink)?;
+    match &setups {
+        Setups::Splatted(setups) => project::project(scene, config, setups, progress, &mut report, &mut sink)?,
+        Setups::Sliced(views) => composite::composite(scene, config, views, progress, &mut report, &mut sink)?,
     }
     progress.finish();
     report.sum_up_expected_errors();
@@ -137,32 +137,52 @@ pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
 /// # Errors
 /// The errors that [`check`] returns, but for too little memory.
 pub fn least_memory(scene: &dyn Scene, config: &RenderConfig) -> Result<usize> {
-    least(scene, config, &setups(scene, config)?)
-}
-
-/// The least memory for views with these setups.
-fn least(scene: &dyn Scene, config: &RenderConfig, setups: &[ViewSetup]) -> Result<usize> {
-    if config.mode.is_projection() {
-        return Ok(Budget::least(config, scene, setups));
-    }
-    let of_slab = |setup| Ok(Budget::least(config, scene, &slabs::cut(setup, config)?.setups[..1]));
-    setups.iter().try_fold(0, |most: usize, setup| Ok(most.max(of_slab(setup)?)))
-}
-
-/// The report of each view, before anything is splatted.
-fn reports(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
-    let slabs = |setup| (!config.mode.is_projection()).then(|| slabs::count(setup, config));
-    config.views.iter().zip(setups).map(|(view, setup)| ViewReport::new(view, setup, slabs(setup))).collect()
+    Ok(Setups::new(scene, config)?.least(scene, config))
 }
 
 /// The setups of all views.
-fn setups(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
-    config.check(scene.frames())?;
-    if scene.channels() > 1 && !config.mode.is_projection() {
-        let what = "the samples are colours already, and colours are rendered as projections only";
-        return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
+enum Setups {
+    /// Of projections.
+    Splatted(Vec<ViewSetup>),
+    /// Of composites and maximum intensity projections.
+    Sliced(Vec<SlicedView>),
+}
+
+impl Setups {
+    fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<Self> {
+        config.check(scene.frames())?;
+        let (grid, views) = (scene.grid(), config.views.iter());
+        if config.mode.is_projection() {
+            let volume = (*grid, scene.blocks());
+            let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
+            return views.map(setup).collect::<Result<_>>().map(Self::Splatted);
+        }
+        if scene.channels() > 1 {
+            let what = "the samples are colours already, and colours are rendered as projections only";
+            return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
+        }
+        views.map(|view| SlicedView::new(grid, config, view)).collect::<Result<_>>().map(Self::Sliced)
     }
-    let volume = (*scene.grid(), scene.blocks());
-    let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
-    config.views.iter().map(setup).collect()
+
+    /// The least memory with which any view can be rendered alone.
+    fn least(&self, scene: &dyn Scene, config: &RenderConfig) -> usize {
+        match self {
+            Self::Splatted(setups) => Budget::least(config, scene, setups),
+            Self::Sliced(views) => composite::least(scene, config, views),
+        }
+    }
+
+    /// The report of each view, before anything is rendered.
+    fn reports(&self, config: &RenderConfig) -> Vec<ViewReport> {
+        let views = config.views.iter();
+        match self {
+            Self::Splatted(setups) => views.zip(setups).map(|(view, setup)| ViewReport::new(view, setup)).collect(),
+            Self::Sliced(all) => {
+                let of = |(view, sliced): (&View, &SlicedView)| {
+                    ViewReport::of_slices(view, &sliced.camera, sliced.slices(), sliced.cells)
+                };
+                views.zip(all).map(of).collect()
+            }
+        }
+    }
 }

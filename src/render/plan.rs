@@ -3,10 +3,9 @@
 //! The number of views and frames rendered together, the rows of a band and the blocks decoded together do not change
 //! any pixel.
 
-use super::config::{Mode, RenderConfig};
+use super::config::RenderConfig;
 use super::layout::Layout;
 use super::scene::Scene;
-use super::slabs;
 use super::splat::ViewSetup;
 use super::splat::footprints::Splats;
 use super::splat::sparse_terms::SparseTerms;
@@ -38,7 +37,7 @@ const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 impl<'a> Budget<'a> {
     /// The least memory in bytes with which each view can be rendered alone.
     pub(super) fn least(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
-        let planes = most_planes(scene, 1, config);
+        let planes = scene.most_planes(1, config);
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
             fixed(config, setups) + Budget::new(config, scene, setups).bytes(1, planes, TILE)
@@ -60,16 +59,12 @@ impl<'a> Budget<'a> {
         ))
     }
 
-    /// The budget for pictures from these views, or for these slabs of one view.
+    /// The budget for pictures from these views.
     fn new(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let channels = scene.channels();
-        let of_a_view = match config.mode {
-            Mode::Projection => channels * (1 + usize::from(config.certify)),
-            _ => config.mode.pixel().numbers(),
-        };
-        let views = if config.mode.is_projection() { setups.len() } else { 1 };
+        let of_a_view = channels * (1 + usize::from(config.certify));
         let together = if channels > 1 { of_a_view * size_of::<f32>() } else { 0 };
-        let (size, pixel_bytes) = (config.size(), views * of_a_view * size_of::<f32>());
+        let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view * size_of::<f32>());
         let available = config.memory.saturating_sub(fixed(config, setups));
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
         Self { setups, available, size, pixel_bytes, together, block, block_bytes }
@@ -82,18 +77,11 @@ impl<'a> Budget<'a> {
         Self::of_first(config, scene, &setups[..most], config.size()[1])
     }
 
-    /// The budget for as many slabs of a view as fit together, at most a block's depth: longer runs would splat more
-    /// values that turn out to be hidden.
-    pub(super) fn of_slabs(config: &RenderConfig, scene: &dyn Scene, slabs: &'a [ViewSetup]) -> Self {
-        let deep = slabs::of_block(slabs, &scene.blocks().region(0)).0.min(slabs.len());
-        Self::of_first(config, scene, &slabs[..deep], config.size()[1].min(FEW_ROWS * TILE))
-    }
-
     /// The budget for as many of the first views as fit together with `rows` rows of all pictures.
     fn of_first(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup], rows: usize) -> Self {
         let alone = Self::new(config, scene, &setups[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
-        let planes = most_planes(scene, frames, config);
+        let planes = scene.most_planes(frames, config);
         let fits = |budget: &Self| budget.bytes(frames, planes, rows) <= budget.available;
         let several = |count: usize| Some(Self::new(config, scene, &setups[..count])).filter(fits);
         let (mut best, mut least, mut most) = (alone, 1, setups.len());
@@ -107,7 +95,7 @@ impl<'a> Budget<'a> {
         best
     }
 
-    /// The views, or the slabs of one view.
+    /// The views.
     pub(super) fn setups(&self) -> &'a [ViewSetup] {
         self.setups
     }
@@ -126,8 +114,7 @@ impl<'a> Budget<'a> {
     fn block_bytes(&self, planes: usize) -> usize {
         let footprints = self.setups.iter().filter(|setup| !setup.backend.is_lattice()).count();
         let terms = if footprints > 0 { SparseTerms::most_bytes(planes) } else { 0 };
-        let shares = slabs::of_block(self.setups, &self.block).1;
-        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES + shares)
+        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES)
     }
 
     /// Bytes of a batch's finished pictures.
@@ -138,9 +125,7 @@ impl<'a> Budget<'a> {
     /// Bytes of bands of `rows` rows with all planes, and of the scratch of all threads.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
         let band = |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows);
-        let sliced = self.setups.iter().any(|setup| setup.slab.is_some());
-        let gathered = if sliced { planes.max(slabs::TOGETHER) } else { planes };
-        let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, gathered)).max().unwrap_or(0);
+        let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes)).max().unwrap_or(0);
         let numbers = planes * self.setups.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
         numbers * size_of::<f64>()
     }
@@ -148,7 +133,7 @@ impl<'a> Budget<'a> {
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let rows = self.size[1].min(FEW_ROWS * TILE);
-        let fits = |f: &usize| self.bytes(*f, most_planes(scene, *f, config), rows) <= self.available;
+        let fits = |f: &usize| self.bytes(*f, scene.most_planes(*f, config), rows) <= self.available;
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
@@ -179,16 +164,7 @@ const FEW_ROWS: usize = 4;
 /// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
-    let more = match (&config.mode, setups.first()) {
-        (Mode::Projection, _) => setups.len() * width * height * WEIGHT_BYTES,
-        (_, setup) => setup.map_or(0, |setup| slabs::bytes(setup, config)),
-    };
-    memory::FIXED + more
-}
-
-/// An upper bound of the number of planes for `frames` frames of a batch.
-fn most_planes(scene: &dyn Scene, frames: usize, config: &RenderConfig) -> usize {
-    scene.most_planes(frames, config) + usize::from(!config.mode.is_projection())
+    memory::FIXED + setups.len() * width * height * WEIGHT_BYTES
 }
 
 /// The largest number of requested frames in one batch.

@@ -50,8 +50,10 @@ fn render_views(
     let weighted = budget.setups().iter().map(|setup| weigh(setup, config, budget)).collect::<Result<Vec<_>>>()?;
     let expectations: Vec<_> = weighted.iter().map(|view| Expectation::new(view, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
-    let job = Job { config, budget, views: &expectations };
-    let render = |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &weighted, job, report);
+    let together = |scene: &dyn Scene, most: usize| budget.frames(scene, config, most);
+    let job = Job { config, together: &together, views: &expectations };
+    let render =
+        |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &weighted, (config, budget), report);
     for_each_batch(scene, job, report, render, |frames, channels, report| {
         for i in 0..weighted.len() {
             add_expected_error(&channels, i, frames.len(), &mut report.views[first_view + i].expected_error);
@@ -72,7 +74,7 @@ fn add_expected_error(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, fr
 fn render_batch(
     batch: &dyn FrameBatch,
     weighted: &[WeightedView<'_>],
-    Job { config, budget, .. }: Job<'_>,
+    (config, budget): (&RenderConfig, &Budget<'_>),
     report: &mut RenderReport,
 ) -> Result<Vec<Pictures>> {
     let layout = batch.layout();

@@ -2,7 +2,7 @@
 
 use super::scene::{LeftOut, Selection};
 use super::splat::{SplatStats, ViewSetup};
-use crate::view::camera::View;
+use crate::view::camera::{Camera, View};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -44,12 +44,10 @@ pub struct RenderReport {
     pub blocks_outside: u64,
     /// Blocks left out because they are so deep that their contribution is within the splat error.
     pub blocks_dimmed: u64,
-    /// Tiles of all slabs of all frame batches.
-    pub tiles: u64,
-    /// Tiles that are transparent for any value in the ranges of their blocks.
-    pub tiles_clear: u64,
-    /// Tiles of pictures that became opaque in all frames of a batch, so that the slabs behind were skipped.
-    pub tiles_opaque: u64,
+    /// Blocks left out of composites because no value near them is visible.
+    pub blocks_transparent: u64,
+    /// Blocks left out of composites because opaque values hide them in all frames of a batch, or no pixel sees them.
+    pub blocks_hidden: u64,
     /// The parts that a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
     /// The parts that were not read because only unrequested frames need them.
@@ -76,8 +74,20 @@ pub struct RenderReport {
     pub seconds: f64,
 }
 
+/// The errors of some pixels of a view's first frame, against the field of the samples sampled finely along their rays.
+/// They are an estimate of the errors of all pixels, without those of the samples.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Probed {
+    /// Number of pixels.
+    pub rays: usize,
+    /// Root mean square of the largest difference of each pixel's numbers, in the unit of the pictures.
+    pub rms: f64,
+    /// The largest of all differences.
+    pub largest: f64,
+}
+
 /// How a view was splatted.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ViewReport {
     /// Requested azimuth in degrees.
     pub azimuth: f64,
@@ -91,8 +101,14 @@ pub struct ViewReport {
     pub center: [f64; 3],
     /// Name of the splat method.
     pub method: &'static str,
-    /// Number of slabs that the volume is cut into; `None` for projections.
-    pub slabs: Option<usize>,
+    /// Number of slices that a ray crosses; `None` for projections.
+    pub slices: Option<usize>,
+    /// Cells of a slice per voxel across the ray; `None` for projections.
+    pub cells: Option<usize>,
+    /// The largest error that tabulating the transfer function makes in the light of one slice, if there is one.
+    pub table_error: Option<f64>,
+    /// The errors of some pixels; `None` for projections, and if no ray of these meets the volume.
+    pub probed: Option<Probed>,
     /// The stated error of the splat method, measured like the requested splat error.
     pub stated_splat_error: f64,
     /// Estimated root mean square error over the pixels that are not background, in the unit of the pictures, without
@@ -129,13 +145,22 @@ impl RenderReport {
 }
 
 impl ViewReport {
-    /// The report of a view before anything is splatted. `slabs` is `None` for projections.
-    pub(super) fn new(view: &View, setup: &ViewSetup, slabs: Option<usize>) -> Self {
-        let &View { azimuth, elevation, roll, .. } = view;
-        let (scale, center) = (setup.camera.scale, setup.camera.beside(0.0));
+    /// The report of a projection before anything is splatted.
+    pub(super) fn new(view: &View, setup: &ViewSetup) -> Self {
         let (method, stated_splat_error) = (setup.method.name, setup.stated_error);
-        let expected_error = if slabs.is_some() { f64::NAN } else { 0.0 };
-        Self { azimuth, elevation, roll, scale, center, method, slabs, stated_splat_error, expected_error }
+        Self { method, stated_splat_error, ..Self::of(view, &setup.camera) }
+    }
+
+    /// The report of a composite or of largest values.
+    pub(super) fn of_slices(view: &View, camera: &Camera, slices: usize, cells: usize) -> Self {
+        let (slices, cells, none) = (Some(slices), Some(cells), f64::NAN);
+        let of_camera = Self::of(view, camera);
+        Self { method: "slices", slices, cells, stated_splat_error: none, expected_error: none, ..of_camera }
+    }
+
+    fn of(view: &View, camera: &Camera) -> Self {
+        let &View { azimuth, elevation, roll, .. } = view;
+        Self { azimuth, elevation, roll, scale: camera.scale, center: camera.beside(0.0), ..Self::default() }
     }
 }
 

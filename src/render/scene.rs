@@ -178,7 +178,7 @@ pub enum BatchOutcome {
 pub struct Selection {
     /// Blocks that touch the region and add to a plane, ascending.
     pub blocks: Vec<usize>,
-    /// For modes with slabs: every block that touches the region, with a range that holds its samples as splatted. The
+    /// For modes with slices: every block that touches the region, with a range that holds its samples as splatted. The
     /// range is inverted if all samples are missing. Empty for projections.
     pub ranges: Vec<(usize, (f64, f64))>,
     /// Number of blocks that hold nothing in the region.

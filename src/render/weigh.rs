@@ -52,15 +52,8 @@ fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off
 
 /// The sums of weights of all pixels, as splatted by the setup.
 fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<Vec<f64>> {
-    let layout = Layout {
-        coefficients: 1,
-        frames: 1,
-        values: false,
-        absent: false,
-        error_planes: 0,
-        lengths: false,
-        order: Order::Planes,
-    };
+    let layout =
+        Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
     let mut out = vec![0.0; setup.pixels()];
     for rows in budget.bands(&layout) {
         let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();

@@ -116,11 +116,6 @@ impl Camera {
         std::array::from_fn(|axis| self.center[axis] + length * self.right[axis])
     }
 
-    /// The depths of the nearest and of the farthest corner of `grid`, in world units.
-    pub(crate) fn depths_of(&self, grid: &Grid) -> [f64; 2] {
-        [self.nearest_of(grid), corners(grid).map(|p| self.project(p)[2]).fold(f64::NEG_INFINITY, f64::max)]
-    }
-
     /// The depth of the nearest corner of `grid`, which may be a part of the camera's grid.
     pub(crate) fn nearest_of(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)

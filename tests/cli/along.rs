@@ -31,7 +31,7 @@ fn a_composite_is_light_and_opacity_in_an_array_and_colours_in_a_picture() {
     }
     assert!(png("--threads 3") == png("--threads 1"));
     assert!(png("--opacity 0:0,1:0").iter().all(|v| *v == 0), "nothing is opaque");
-    assert!(png("--range 0,100") != dark && png("--opacity-unit 5") != dark && png("--slabs 3") != dark);
+    assert!(png("--range 0,100") != dark && png("--opacity-unit 5") != dark && png("--slices 1") != dark);
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn frames_and_their_file_have_the_same_composite() {
 fn the_largest_value_takes_a_colour_map() {
     let work = Work::with_file("");
     let json = work.render(&format!("a.wspl --mode mip {SIZE} -o m_%d.png --colormap grey --json")).ok().json();
-    assert!(json["views"][0]["slabs"].as_u64().unwrap() > 3 && json["expected_error"].is_null());
+    assert!(json["views"][0]["slices"].as_u64().unwrap() > 3 && json["expected_error"].is_null());
     work.render(&format!("a.wspl --mode mip {SIZE} -o m.npy")).ok();
     work.render(&format!("a.wspl {SIZE} -o mean.npy")).ok();
     let [(header, largest), (_, mean)] = ["m.npy", "mean.npy"].map(|name| singles(&work, name));
@@ -66,7 +66,7 @@ fn options_without_meaning_for_a_mode_are_refused() {
     for (args, words) in [
         ("a.wspl --opacity 0:0,1:1", &["--opacity", "--mode composite"][..]),
         ("a.wspl --opacity-unit 1", &["--opacity-unit", "--mode composite"]),
-        ("a.wspl --slabs 5", &["--slabs", "--mode composite"]),
+        ("a.wspl --slices 5", &["--slices", "--mode composite"]),
         ("a.wspl --transfer-function turbo", &["--transfer-function", "--mode composite", "--colormap"]),
         ("a.wspl --mode mip --transfer-function turbo", &["--transfer-function", "--colormap"]),
         ("a.wspl --mode composite --colormap turbo", &["--colormap", "--transfer-function"]),
@@ -74,7 +74,7 @@ fn options_without_meaning_for_a_mode_are_refused() {
         ("a.wspl --mode composite --tau 1", &["--tau"]),
         ("a.wspl --mode composite --quantity emission", &["--quantity"]),
         ("a.wspl --mode composite --error-image e.npy", &["--error-image"]),
-        ("a.wspl --mode composite --slabs 0", &["--slabs", "1 to"]),
+        ("a.wspl --mode composite --slices 0", &["--slices", "1 to"]),
         ("a.wspl --mode composite --opacity-unit 0", &["--opacity-unit", "above 0"]),
         ("a.wspl --mode composite --opacity 0:0", &["--opacity", "two or more"]),
         ("a.wspl --mode composite --opacity 1:0,0:1", &["--opacity", "ascend"]),

@@ -123,8 +123,9 @@ fn a_file_of_pictures_names_times_views_and_frames() {
     assert_eq!((turn["wavesplat:frames"].as_str(), turn["wavesplat:roll"].as_str()), ("3", "0"));
     let moving = said("--frames :4 --format apng -o p.png");
     assert_eq!(moving["wavesplat:frames"], "0:4");
-    let composite = said("--frames 1 --mode composite --opacity 0:0,1:0.5 --slabs 4 -o p.png");
-    assert_eq!((composite["wavesplat:slabs"].as_str(), composite["wavesplat:opacity"].as_str()), ("4", "0:0,1:0.5"));
+    let composite = said("--frames 1 --mode composite --opacity 0:0,1:0.5 --slices 2 -o p.png");
+    assert_eq!((composite["wavesplat:cells"].as_str(), composite["wavesplat:opacity"].as_str()), ("2", "0:0,1:0.5"));
+    assert!(composite["wavesplat:slices"].parse::<usize>().unwrap() > 20);
     assert_eq!(composite["wavesplat:transfer_function"], "viridis from 0 to 1");
     assert!(!composite.contains_key("wavesplat:colormap") && !composite.contains_key("wavesplat:quantity"));
 }

@@ -24,9 +24,9 @@ pub(crate) struct AlongArgs {
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
-    /// Number of slabs that divide the volume by depth [default: each as thick as the largest spacing]
+    /// Slices per voxel along the ray, and cells per voxel across it [default: by the kernel and the scale, mostly 2]
     #[arg(long, value_name = "N", help_heading = "Along the ray")]
-    slabs: Option<usize>,
+    slices: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -56,8 +56,8 @@ impl ModeName {
         }
     }
 
-    /// Whether the volume is cut into slabs.
-    fn has_slabs(self) -> bool {
+    /// Whether rays are sampled slice by slice.
+    fn has_slices(self) -> bool {
         match self {
             Self::Composite | Self::Mip => true,
             Self::Projection => false,
@@ -97,7 +97,7 @@ impl AlongArgs {
         };
         let refused = needs(self.opacity.is_some(), "--opacity", ModeName::colours_samples)
             .or_else(|| needs(self.opacity_unit.is_some(), "--opacity-unit", ModeName::colours_samples))
-            .or_else(|| needs(self.slabs.is_some(), "--slabs", ModeName::has_slabs))
+            .or_else(|| needs(self.slices.is_some(), "--slices", ModeName::has_slices))
             .or_else(colours)
             .or_else(|| self.transfer_function.as_ref().and_then(|_| self.mode.refuse_colours(is_direct)));
         if let Some(what) = refused {
@@ -129,7 +129,7 @@ impl AlongArgs {
 
     /// The mode with these colours, which a composite needs.
     pub(crate) fn mode(&self, colours: Option<&TransferFunction>) -> Result<Mode> {
-        let slabs = self.slabs;
+        let slices = self.slices;
         Ok(match self.mode {
             ModeName::Projection => Mode::Projection,
             ModeName::Composite => {
@@ -137,9 +137,9 @@ impl AlongArgs {
                 let points = self.opacity.as_ref().map(|points| transfer.with_opacity(&points.0));
                 let transfer = points.unwrap_or_else(|| Ok(transfer.clone()));
                 let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
-                Mode::Composite { transfer, unit: self.opacity_unit, slabs }
+                Mode::Composite { transfer, unit: self.opacity_unit, slices }
             }
-            ModeName::Mip => Mode::Mip { slabs },
+            ModeName::Mip => Mode::Mip { slices },
         })
     }
 }

@@ -12,9 +12,6 @@ use wavesplat::render::{check, render, stride};
 use wavesplat::source::ArraySource;
 use wavesplat::view::footprint::Kernel;
 
-/// Number of slabs of small pictures, which are only used to find a range.
-const FEW_SLABS: usize = 32;
-
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;
 
@@ -58,7 +55,7 @@ fn small(config: &RenderConfig) -> RenderConfig {
         Mode::Projection => Mode::Projection,
         // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
         // where they end.
-        Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slabs: Some(FEW_SLABS) },
+        Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
     };
     small
 }

@@ -28,7 +28,7 @@ pub(crate) struct Reported<'a> {
 
 /// What the progress of pictures counts.
 pub(crate) fn unit(mode: &Mode) -> &'static str {
-    if mode.is_projection() { "pictures" } else { "rows of slabs" }
+    if mode.is_projection() { "pictures" } else { "slices" }
 }
 
 impl Cli {
@@ -79,5 +79,13 @@ pub(crate) fn summary(r: &RenderReport) -> String {
         r.seconds,
         r.coefficients,
         r.left_out.coefficients
-    )
+    ) + &probed(r)
+}
+
+/// The errors of probed rays, view by view; empty for projections.
+fn probed(report: &RenderReport) -> String {
+    let probed = report.views.iter().filter_map(|view| view.probed);
+    probed
+        .map(|p| format!("; {} probed rays are off by {:.1e} (rms), {:.1e} (largest)", p.rays, p.rms, p.largest))
+        .collect()
 }

@@ -30,6 +30,8 @@ pub(super) struct BatchPlan {
     pub(super) kept: Vec<usize>,
     /// Whether planes hold the values of each frame instead of coefficients.
     pub(super) by_values: bool,
+    /// Whether values of the requested frames are less work one by one than all frames at once.
+    pub(super) few: bool,
     pub(super) layout: Layout,
 }
 
@@ -47,10 +49,11 @@ impl BatchPlan {
         let codec = file.codec(window)?;
         let wanted = needed(&codec.synthesis, &frames);
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
-        let by_values = what != SplatSource::Samples && !config.certify && few_asked(file, &codec, window, config);
+        let few = few_asked(file, &codec, window, config);
+        let by_values = what != SplatSource::Samples && !config.certify && (few || !config.mode.is_projection());
         let counts = (kept.len(), frames.len());
         let layout = layout(file, &codec, (window, channel), (what, by_values), counts, config);
-        Ok(Self { what, codec, frames, wanted, kept, by_values, layout })
+        Ok(Self { what, codec, frames, wanted, kept, by_values, few, layout })
     }
 }
 
@@ -91,7 +94,6 @@ fn layout(
         values: values || exact || record.outliers > 0 || missing,
         absent: missing,
         error_planes: error_planes(config, codec.parts()),
-        lengths: false,
         order: if values || is_dense { Order::Pixels } else { Order::Planes },
     }
 }

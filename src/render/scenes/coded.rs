@@ -99,9 +99,16 @@ impl BlockPlanes for CodedBlock<'_> {
 
     fn held(&self) -> [u64; 2] {
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let coefficients = self.block.codes.iter().filter(|code| coded && **code != 0).count();
-        [coefficients as u64, self.block.bytes_read]
+        let codes = if coded { &self.block.codes[..] } else { &[] };
+        [count_nonzero(codes), self.block.bytes_read]
     }
+}
+
+/// The number of codes that are not zero.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn count_nonzero(codes: &[i32]) -> u64 {
+    let of_run = |run: &[i32]| u64::from(run.iter().map(|code| u32::from(*code != 0)).sum::<u32>());
+    codes.chunks(1 << 16).map(of_run).sum()
 }
 
 /// The coefficients of one k of a block.
@@ -125,6 +132,19 @@ fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut 
         return Vec::new();
     }
     let mut values = vec![0.0; plan.frames.len() * block.voxels];
+    if plan.few {
+        add_coefficients(plan, block, field, &mut values);
+    } else if !block.codes.is_empty() {
+        put_runs(plan, block, &mut values);
+    }
+    for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
+        few.drain(..).for_each(|(voxel, value)| values[voxel as usize] += value);
+    }
+    values
+}
+
+/// Adds the coefficients of each k to the values of a plan's frames.
+fn add_coefficients(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, values: &mut [f64]) {
     let scratch = &mut Scratch::default();
     for k in &plan.kept {
         let coefficients = coefficients(plan, block, field, *k, scratch);
@@ -132,10 +152,23 @@ fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut 
             coefficients.add_to(plan.codec.synthesis[*k][*frame], values);
         }
     }
-    for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
-        few.drain(..).for_each(|(voxel, value)| values[voxel as usize] += value);
-    }
-    values
+}
+
+/// Stores the values of a plan's frames by the inverse transform of all frames.
+fn put_runs(plan: &BatchPlan, block: &Block, values: &mut [f64]) {
+    let mut places = vec![None; plan.codec.frames()];
+    plan.frames.iter().enumerate().for_each(|(i, frame)| places[*frame] = Some(i));
+    block.for_each_run(&plan.codec, |first, mut run| {
+        let mut first = first;
+        while !run.is_empty() {
+            let (frame, voxel) = (first / block.voxels, first % block.voxels);
+            let (of_frame, rest) = run.split_at(run.len().min(block.voxels - voxel));
+            if let Some(place) = places[frame] {
+                values[place * block.voxels + voxel..][..of_frame.len()].copy_from_slice(of_frame);
+            }
+            (first, run) = (first + of_frame.len(), rest);
+        }
+    });
 }
 
 /// For each plane of a plan, the values that correct the coefficients at single voxels; empty if there are none.

@@ -70,6 +70,9 @@ impl Scene for CoefficientScene {
     }
 
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize {
+        if !config.mode.is_projection() {
+            return 2 * frames + 1; // values, not coefficients
+        }
         let windows = &self.file.metadata().windows;
         let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, w.parts())).max();
         most.unwrap_or(0) + 2 * frames + 1

@@ -130,9 +130,15 @@ fn of_views(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str
         ("roll", of(&|view| view.roll.to_string())),
         ("scale", of(&|view| view.scale.to_string())),
         ("center", of(&|view| joined(&view.center))),
-        ("slabs", of(&|view| view.slabs.map_or_else(String::new, |slabs| slabs.to_string()))),
+        ("slices", of(&|view| view.slices.map_or_else(String::new, |slices| slices.to_string()))),
+        ("cells", of(&|view| view.cells.map_or_else(String::new, |cells| cells.to_string()))),
         ("splat_method", of(&|view| view.method.into())),
-        ("stated_splat_error", of(&|view| view.stated_splat_error.to_string())),
+        (
+            "stated_splat_error",
+            of(&|view| {
+                Some(view.stated_splat_error).filter(|e| !e.is_nan()).map_or_else(String::new, |e| e.to_string())
+            }),
+        ),
     ]
 }
 

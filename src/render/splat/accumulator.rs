@@ -46,33 +46,14 @@ impl<'a> BandAccumulator<'a> {
         pictures: &mut [T],
         finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
     ) {
-        Self::finish_layers(std::slice::from_ref(self), 1, pictures, |_, _| true, finish);
-    }
-
-    /// The same for layers, one behind another, with the same rows and backend. For every tile, calls `finish` with the
-    /// `wanted` layers among the first `together` layers, then among the next, and so on.
-    pub(in crate::render) fn finish_layers<T: Send>(
-        layers: &[Self],
-        together: usize,
-        pictures: &mut [T],
-        wanted: impl Fn(usize, &TileRect) -> bool + Sync,
-        finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
-    ) {
-        let Some(Self { band, .. }) = layers.first() else { return };
-        let (width, side) = (band.setup.camera.size[0], band.setup.backend.tile());
+        let (width, side) = (self.band.setup.camera.size[0], self.band.setup.backend.tile());
         let columns = width.div_ceil(side);
-        let rects = TileRect::cover(width, band.rows.clone(), side);
-        let bands = layers[0].by_rows_of_tiles(pictures, side);
+        let rects = TileRect::cover(width, self.band.rows.clone(), side);
+        let bands = self.by_rows_of_tiles(pictures, side);
         rects.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (rects, planes))| {
             let mut pixels = Pixels { planes, width, top: rects[0].y.start };
             for (i, rect) in rects.iter().enumerate() {
-                for first in (0..layers.len()).step_by(together) {
-                    let some = first..layers.len().min(first + together);
-                    let some: Vec<&Self> = some.filter(|n| wanted(*n, rect)).map(|n| &layers[n]).collect();
-                    if !some.is_empty() {
-                        finish(ResolvedTile::new(&some, rect, n * columns + i), &mut pixels);
-                    }
-                }
+                finish(ResolvedTile::new(self, rect, n * columns + i), &mut pixels);
             }
         });
     }
@@ -90,56 +71,40 @@ impl<'a> BandAccumulator<'a> {
     }
 }
 
-/// A tile after its last block, with one or more layers.
+/// A tile after its last block.
 pub(in crate::render) struct ResolvedTile<'a> {
     pub(in crate::render) rect: &'a TileRect,
-    pub(in crate::render) layers: usize,
-    /// Planes of each layer.
     planes: usize,
     sums: TileSums<'a>,
 }
 
 enum TileSums<'a> {
-    Tiles(Vec<&'a Tile>),
+    Tile(&'a Tile),
     Gather(Gather<'a>),
 }
 
 impl<'a> ResolvedTile<'a> {
-    /// Tile `number` of layers with the same rows and backend.
-    fn new(layers: &[&'a BandAccumulator<'a>], rect: &'a TileRect, number: usize) -> Self {
-        let (mut tiles, mut cells) = (Vec::new(), Vec::new());
-        for layer in layers {
-            match &layer.sums {
-                BandSums::Tiles(of_band) => tiles.push(&of_band[number]),
-                BandSums::Cells(lattice, of_band) => cells.push((*lattice, of_band)),
-            }
-        }
-        let planes = layers[0].planes;
-        let sums = match cells.first() {
-            Some((lattice, _)) => {
-                let cells: Vec<&Cells> = cells.iter().map(|(_, cells)| *cells).collect();
-                TileSums::Gather(Gather::new(lattice, (&cells, planes), rect))
-            }
-            None => TileSums::Tiles(tiles),
+    /// Tile `number` of a band.
+    fn new(band: &'a BandAccumulator<'a>, rect: &'a TileRect, number: usize) -> Self {
+        let sums = match &band.sums {
+            BandSums::Tiles(tiles) => TileSums::Tile(&tiles[number]),
+            BandSums::Cells(lattice, cells) => TileSums::Gather(Gather::new(lattice, (&[cells], band.planes), rect)),
         };
-        Self { rect, layers: layers.len(), planes, sums }
+        Self { rect, planes: band.planes, sums }
     }
 
-    /// The planes that may have sums, counted through all layers.
+    /// The planes that may have sums.
     pub(in crate::render) fn used(&self) -> Vec<usize> {
         match &self.sums {
-            TileSums::Tiles(_) => (0..self.layers * self.planes).collect(),
+            TileSums::Tile(_) => (0..self.planes).collect(),
             TileSums::Gather(gather) => gather.used().to_vec(),
         }
     }
 
-    /// Loads the planes of all layers at `count` pixels from `first` on into the first lanes of `planes`.
+    /// Loads the planes at `count` pixels from `first` on into the first lanes of `planes`.
     pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
-            TileSums::Tiles(tiles) => {
-                let of_layers = planes.chunks_exact_mut(self.planes.max(1)); // without planes there is nothing to load
-                tiles.iter().zip(of_layers).for_each(|(tile, planes)| tile.load(first, count, planes));
-            }
+            TileSums::Tile(tile) => tile.load(first, count, planes),
             TileSums::Gather(gather) => gather.load(first, count, planes),
         }
     }
@@ -148,7 +113,7 @@ impl<'a> ResolvedTile<'a> {
     pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
         let mut planes = [Lane::default()];
         match &mut self.sums {
-            TileSums::Tiles(tiles) => tiles[0].load(first, count, &mut planes),
+            TileSums::Tile(tile) => tile.load(first, count, &mut planes),
             TileSums::Gather(gather) => planes[0] = gather.load_one(first, count),
         }
         planes[0]

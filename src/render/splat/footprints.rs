@@ -183,7 +183,7 @@ struct Splat {
     index: usize,
     x: f64,
     y: f64,
-    /// exp(-tau z) f(0, 0), times the share in the slab if there is one.
+    /// exp(-tau z) f(0, 0).
     weight: f64,
 }
 
@@ -200,10 +200,7 @@ impl Splats {
             let index = region.index(v);
             if !terms.of_voxel(index).0.is_empty() {
                 let [x, y, z] = camera.project(grid.position(v));
-                let share = setup.slab.map_or(1.0, |slab| slab.share(z));
-                if share > 0.0 {
-                    voxels.push(Splat { index, x, y, weight: share * footprint.at_depth(z) });
-                }
+                voxels.push(Splat { index, x, y, weight: footprint.at_depth(z) });
             }
         }
         let size = camera.size;

@@ -45,7 +45,7 @@ impl<'a, 'c> LatticeBands<'a, 'c> {
     /// The location of a block in a band; `None` if it does not reach the band.
     fn locate(&self, band: usize, block: usize) -> Option<Placed> {
         let setup = self.bands[band].setup;
-        let (region, clip) = (setup.blocks.region(block), (&setup.clip, setup.slab.as_ref()));
+        let (region, clip) = (setup.blocks.region(block), &setup.clip);
         self.bands[band].sees(block).then(|| self.lattices[band].placed(&region, clip, &self.rectangles[band]))
     }
 }

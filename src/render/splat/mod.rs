@@ -12,7 +12,6 @@
 //! These modules know neither the meaning of planes nor the source of blocks.
 
 pub(super) mod tile_rect;
-pub(super) mod slab;
 pub(super) mod lattice;
 pub(super) mod backend;
 pub(super) mod view_setup;
@@ -25,6 +24,5 @@ pub(super) mod accumulator;
 
 pub(super) use accumulator::{BandAccumulator, Pixels, ResolvedTile, splat};
 pub(super) use band::SplatStats;
-pub(super) use slab::Slab;
-pub(super) use tile_rect::TileRect;
+
 pub(super) use view_setup::ViewSetup;

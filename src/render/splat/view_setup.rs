@@ -1,7 +1,6 @@
 //! The setup of a view, shared by all frames: camera, kernel, backend and the voxels to splat.
 
 use super::backend::{SplatBackend, footprint_method};
-use super::slab::Slab;
 use super::tile_rect::overlap;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
@@ -31,8 +30,6 @@ pub(in crate::render) struct ViewSetup {
     pub(in crate::render) stated_error: f64,
     /// Voxels deeper than this may be left out.
     pub(in crate::render) deepest: f64,
-    /// The slab to splat; `None` for the whole volume.
-    pub(in crate::render) slab: Option<Slab>,
 }
 
 impl ViewSetup {
@@ -45,14 +42,7 @@ impl ViewSetup {
         config: &RenderConfig,
         view: &View,
     ) -> Result<Self> {
-        let clip = config.region.unwrap_or(grid.whole());
-        if !grid.whole().contains(&clip) || clip.is_empty() {
-            let d = grid.dims;
-            return Err(Error::setting(
-                "region",
-                format!("not within the volume of {}x{}x{} voxels", d[0], d[1], d[2]),
-            ));
-        }
+        let clip = config.clip(&grid)?;
         let camera = Camera::new(view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
         let nearest = camera.nearest_of(&grid.crop(&clip));
@@ -62,7 +52,7 @@ impl ViewSetup {
         }
         let (backend, method) = SplatBackend::choose(config, (&grid, &clip), &camera, &footprint);
         let (tau, stated_error, deepest) = (config.kernel.tau, method.stated_error, f64::INFINITY);
-        Ok(Self { camera, footprint, tau, grid, blocks, clip, backend, method, stated_error, deepest, slab: None })
+        Ok(Self { camera, footprint, tau, grid, blocks, clip, backend, method, stated_error, deepest })
     }
 
     pub(in crate::render) fn pixels(&self) -> usize {
@@ -76,14 +66,7 @@ impl ViewSetup {
 
     /// Whether a block must be splatted into these rows of the picture.
     pub(in crate::render) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
-        self.is_in_slab(block) && self.reaches(block, rows) && !self.is_too_deep(block)
-    }
-
-    /// Whether any kernel of a block reaches the slab; always true without a slab.
-    pub(in crate::render) fn is_in_slab(&self, block: usize) -> bool {
-        let region = || self.blocks.region(block).intersect(&self.clip);
-        let reached = |slab: Slab| !region().is_empty() && slab.is_reached(&region(), &self.grid, &self.camera);
-        self.slab.is_none_or(reached)
+        self.reaches(block, rows) && !self.is_too_deep(block)
     }
 
     /// Whether any voxel of a block can reach these rows of the picture.

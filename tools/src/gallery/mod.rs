@@ -155,7 +155,7 @@ impl Gallery {
 
     /// Chooses settings that suit the samples, by the largest ones that rays meet.
     fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<SampleStyle> {
-        let mip = RenderConfig { mode: Mode::Mip { slabs: None }, ..base.clone() };
+        let mip = RenderConfig { mode: Mode::Mip { slices: None }, ..base.clone() };
         let (largest, _) = pictures(scene, &mip)?;
         Ok(SampleStyle::new(file.metadata().range(), &largest, scene.grid()))
     }

@@ -71,7 +71,7 @@ impl SampleStyle {
 
     /// All that one conversion of the samples gives.
     pub(super) fn tiles(&self) -> Result<Vec<Tile>> {
-        let mip = Mode::Mip { slabs: None };
+        let mip = Mode::Mip { slices: None };
         Ok(vec![
             Tile::of_values(Mode::Projection, "--colormap", self.either("viridis", "coolwarm"))?,
             self.other_colours()?,
@@ -103,7 +103,7 @@ impl SampleStyle {
         let transfer = transfer.with_opacity(&points.0).map_err(Error::usage)?;
         let unit = share * self.thickness;
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
-        let mode = Mode::Composite { transfer, unit: Some(unit), slabs: None };
+        let mode = Mode::Composite { transfer, unit: Some(unit), slices: None };
         let map = TransferFunction::open(name)?;
         Ok(Tile { label: options, mode, map, norm: Norm::Linear })
     }

@@ -18,7 +18,6 @@ mod cells;
 mod gather;
 mod kernel;
 mod picture;
-mod shares;
 mod shear;
 mod spline;
 mod spread;
@@ -28,7 +27,7 @@ mod tests;
 pub(super) use cells::{CellPlane, Cells, Rectangle};
 pub(super) use gather::Gather;
 pub(super) use picture::Lattice;
-pub(super) use shear::Shear;
+pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, Work};
 
 /// How values are spread over the cells of a view.

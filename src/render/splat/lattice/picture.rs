@@ -7,7 +7,6 @@ use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Placed, Spreading};
 use crate::base::grid::{Grid, Region};
-use crate::render::splat::slab::Slab;
 use crate::render::splat::tile_rect::{TILE, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
@@ -148,14 +147,8 @@ impl Lattice {
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// The location in cells of a block's voxels, limited to a region and, if given, a slab. `extent` gives the cells
-    /// of the planes.
-    pub(in crate::render) fn placed(
-        &self,
-        region: &Region,
-        clip: (&Region, Option<&Slab>),
-        extent: &Rectangle,
-    ) -> Placed {
+    /// The location in cells of a block's voxels, limited to a region. `extent` gives the cells of the planes.
+    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, extent: &Rectangle) -> Placed {
         Placed::new(&self.spreading, region, clip, extent)
     }
 

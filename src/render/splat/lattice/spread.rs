@@ -5,13 +5,10 @@
 
 use super::Spreading;
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
-use super::shares::Shares;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::render::plane_values::PlaneValues;
-use crate::render::splat::slab::Slab;
-use crate::render::splat::tile_rect::intersect;
 use std::ops::Range;
 
 /// The location of a block's voxels in cells, the same for all planes.
@@ -31,8 +28,6 @@ pub(in crate::render) struct Placed {
     steps: [usize; 3],
     /// exp(-tau z) from the first voxel along b and c.
     fading: [Vec<f64>; 2],
-    /// The shares in the slab, if there is one.
-    shares: Option<Shares>,
 }
 
 /// A slice of a block, perpendicular to the principal axis.
@@ -62,14 +57,8 @@ pub(in crate::render) struct Work {
 }
 
 impl Placed {
-    /// Locates the block at `region`, limited to the voxels in `clip` and, if given, to a slab. `extent` gives the
-    /// cells of the planes.
-    pub(super) fn new(
-        spreading: &Spreading,
-        region: &Region,
-        (clip, slab): (&Region, Option<&Slab>),
-        extent: &Rectangle,
-    ) -> Self {
+    /// Locates the block at `region`, limited to the voxels in `clip`. `extent` gives the cells of the planes.
+    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, extent: &Rectangle) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
@@ -79,11 +68,7 @@ impl Placed {
             (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
         });
         let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], extent);
-        let mut slices: Vec<Slice> = (0..count[2]).map(slice).collect();
-        let shares = slab.map(|slab| Shares::new(slab, shear, clip.start, count));
-        if let Some(shares) = &shares {
-            slices.iter_mut().enumerate().for_each(|(k, slice)| slice.keep(shares.reached(k)));
-        }
+        let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
             spreading: *spreading,
             rectangle: rectangle_of(&slices, spreading, [count[0], count[1]]),
@@ -92,7 +77,6 @@ impl Placed {
             first: region.index(clip.start),
             steps: shear.axes.map(stride),
             fading,
-            shares,
             region: *region,
             clip,
         }
@@ -129,8 +113,7 @@ impl Placed {
         if !(0..3).all(|a| (self.clip.start[a]..self.clip.end[a]).contains(&voxel[a])) {
             return;
         }
-        let share = self.shares.as_ref().map_or(1.0, |shares| shares.of_depth(shear.depth(voxel)));
-        let value = value * share * libm::exp(-tau * shear.depth(voxel));
+        let value = value * libm::exp(-tau * shear.depth(voxel));
         let [(u, along), (v, across)] = shear.position(voxel).map(|position| spread(*degree, position));
         for (v, across) in (v..).zip(&across[..=*degree]) {
             let Some(row) = plane.rectangle.row(v) else { continue };
@@ -153,11 +136,6 @@ impl Slice {
         let cell = [u.0, v.0];
         let voxels = [0, 1].map(|i| extent.voxels_reaching(i, cell[i], spreading.degree, count[i]));
         Self { cell, along: u.1, across: v.1.map(|w| w * fading), voxels }
-    }
-
-    /// Keeps only the voxels in these ranges along b and c.
-    fn keep(&mut self, [b, c]: &[Range<usize>; 2]) {
-        self.voxels = [intersect(&self.voxels[0], b), intersect(&self.voxels[1], c)];
     }
 }
 
@@ -205,7 +183,7 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
                 continue;
             }
             let values = &values[placed.first + k * placed.steps[2]..];
-            let (live, voxels) = (fade_rows(placed, (k, values), &rows, work), &slice.voxels[0]);
+            let (live, voxels) = (fade_rows(placed, values, &rows, work), &slice.voxels[0]);
             let live = live.start.max(voxels.start / LINE)..live.end.min(voxels.end.div_ceil(LINE));
             if !live.is_empty() {
                 add_rows::<Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
@@ -231,21 +209,13 @@ impl Work {
 
 /// Computes rows of a slice times their fading. Returns the range of cache lines that hold nonzero values.
 #[inline(always)]
-fn fade_rows<R: Real>(
-    placed: &Placed,
-    (k, values): (usize, &[R]),
-    rows: &Range<usize>,
-    work: &mut Work,
-) -> Range<usize> {
+fn fade_rows<R: Real>(placed: &Placed, values: &[R], rows: &Range<usize>, work: &mut Work) -> Range<usize> {
     let ([width, ..], [along, across, _]) = (placed.count, placed.steps);
     let mut live = 0;
     let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
     for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
         let row = &mut row[work.before..][..width];
-        match &placed.shares {
-            None => fade(&values[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row),
-            Some(shares) => share(&values[c * across..], along, shares.of_row(k, c), row),
-        }
+        fade(&values[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row);
         live |= live_lines(row);
     }
     behind.fill(0.0);
@@ -267,16 +237,6 @@ fn fade<R: Real>(values: &[R], step: usize, (scale, fading): (f64, &[f64]), row:
         for ((row, value), fading) in row.iter_mut().zip(values.iter().step_by(step)).zip(fading) {
             *row = value.to_f64() * (scale * fading);
         }
-    }
-}
-
-/// Fills a row with every `step`-th value times its share in the slab. Voxels outside the run of shares get zeros.
-#[inline(always)]
-fn share<R: Real>(values: &[R], step: usize, (first, shares): (usize, &[f64]), row: &mut [f64]) {
-    row.fill(0.0);
-    let values = values.iter().skip(first * step).step_by(step);
-    for ((row, value), share) in row[first..].iter_mut().zip(values).zip(shares) {
-        *row = value.to_f64() * share;
     }
 }
 

@@ -93,7 +93,7 @@ fn slices_spread_like_single_values() {
         cut += usize::from(more.iter().any(|n| *n < 0));
         let size = [0, 1].map(|i| (high[i] - low[i] + 1 + more[i] + more[2 + i]).max(1) as usize);
         let rectangle = Rectangle::holding([0, 1].map(|i| low[i] - more[i]), size, fineness);
-        let placed = Placed::new(&spreading, &block, (&clip, None), &rectangle);
+        let placed = Placed::new(&spreading, &block, &clip, &rectangle);
         let single: Vec<f32> = values.iter().map(|v| *v as f32).collect();
         let few: Vec<(u32, f64)> = (0..).zip(values.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways =
@@ -105,7 +105,7 @@ fn slices_spread_like_single_values() {
         assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // sparse values may all lie outside
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
-        let placed = Placed::new(&spreading, &block, (&clip, None), &whole);
+        let placed = Placed::new(&spreading, &block, &clip, &whole);
         placed.add(PlaneValues::Double(&values), &mut all.planes_mut()[0], &mut work);
         let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.touched().take(2) {

@@ -1,0 +1,218 @@
+//! Renders a batch of frames from one view: reads layers of blocks front to back, and adds the slices between them.
+
+use super::layer::Layers;
+use super::needed::{Known, Need};
+use super::probe::Probe;
+use super::row::Blend;
+use super::sweep::{Band, Work};
+use super::units::Units;
+use super::values::samples;
+use super::view::{Slice, SlicedView};
+use super::{GROUP, finish};
+use crate::base::error::Result;
+use crate::base::grid::{BlockGrid, Region};
+use crate::render::report::{RenderReport, lap};
+use crate::render::scene::FrameBatch;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// A batch of frames, seen from one view.
+pub(in crate::render) struct Batch<'a, B: Blend> {
+    /// The number of the view.
+    pub(in crate::render) number: usize,
+    pub(in crate::render) view: &'a SlicedView,
+    pub(in crate::render) blend: &'a B,
+    pub(in crate::render) blocks: BlockGrid,
+    pub(in crate::render) batch: &'a dyn FrameBatch,
+    /// Blocks to decode at a time.
+    pub(in crate::render) together: usize,
+    /// Called with numbers of finished slices of all frames.
+    pub(in crate::render) advance: &'a (dyn Fn(usize) + Sync),
+}
+
+/// A frame in work.
+struct Frame<B: Blend> {
+    units: Units,
+    layers: Layers,
+    groups: Vec<B::Group>,
+    limits: Vec<f32>,
+}
+
+impl<B: Blend> Frame<B> {
+    fn new(view: &SlicedView, most: usize, units: Units) -> Self {
+        let groups = groups(view);
+        Self { units, layers: Layers::new(view, most), groups: vec![B::EMPTY; groups], limits: vec![B::OPEN; groups] }
+    }
+}
+
+/// The number of groups of cells of a view.
+fn groups(view: &SlicedView) -> usize {
+    view.extent[0] / GROUP * view.extent[1] * view.cells * view.cells
+}
+
+/// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
+fn most_layers(view: &SlicedView, edge: usize) -> usize {
+    (edge + 2 * view.reach[2]).min(view.count[2])
+}
+
+/// Bytes of a batch of `frames` frames without decoded blocks. Blocks have `edge` voxels a side.
+pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, edge: usize) -> usize {
+    let layers = Layers::bytes(view, most_layers(view, edge));
+    let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
+    let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
+    let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view));
+    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view))
+}
+
+/// Rows of each band.
+fn rows_of_band(view: &SlicedView) -> usize {
+    let bands = rayon::current_num_threads().min(view.extent[1] / LEAST_ROWS).max(1);
+    view.extent[1].div_ceil(bands)
+}
+
+impl<B: Blend> Batch<'_, B> {
+    /// The pictures of all frames, one after another.
+    pub(in crate::render) fn render(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
+        let known = Known::new(self.view, self.blocks, self.batch.selection());
+        let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks.edge));
+        let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
+        let mut probe = report.views[self.number].probed.is_none().then(|| Probe::new(self.view, self.blend));
+        let mut next = 0;
+        for layer in self.layers() {
+            let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
+            let mut clock = Instant::now();
+            frames.iter_mut().for_each(|frame| frame.layers.advance(self.view.first_needed(next), met));
+            self.read(&known, layer, (&units, &mut frames), report)?;
+            lap(&mut clock, &mut report.decode_seconds);
+            let ready = self.view.ready(next, met);
+            next = ready.end;
+            let slices: Vec<Slice> = ready.clone().filter_map(|number| self.view.slice(number)).collect();
+            frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            if let (Some(probe), Some(frame)) = (&mut probe, frames.first()) {
+                probe.add(self.blend, &frame.units, &frame.layers, met);
+            }
+            lap(&mut clock, &mut report.splat_seconds);
+            (self.advance)(ready.len() * units.len());
+        }
+        (self.advance)((self.view.slices() - next) * units.len());
+        let mut clock = Instant::now();
+        let pictures = self.finish(&frames);
+        report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
+        lap(&mut clock, &mut report.inverse_seconds);
+        Ok(pictures)
+    }
+
+    /// The first and the last voxel along a of each layer of blocks, in the order in which rays meet them.
+    fn layers(&self) -> Vec<[usize; 2]> {
+        let (axis, clip, edge) = (self.view.shear.axes[2], &self.view.clip, self.blocks.edge);
+        if self.view.extent.contains(&0) {
+            return Vec::new();
+        }
+        let (first, last) = (clip.start[axis], clip.end[axis] - 1);
+        let ends = |n: usize| [(n * edge).max(first), (n * edge + edge - 1).min(last)];
+        let layers = first / edge..last / edge + 1;
+        if self.view.is_reversed() { layers.rev().map(ends).collect() } else { layers.map(ends).collect() }
+    }
+
+    /// The units of each frame.
+    fn units(&self, known: &Known) -> Result<Vec<Units>> {
+        let frames = self.batch.layout().frames;
+        match known.middle() {
+            Some(middle) => Ok(vec![self.blend.units(middle); frames]),
+            None if B::CENTRED => self.middles(frames),
+            None => Ok(vec![self.blend.units(0.0); frames]),
+        }
+    }
+
+    /// Units around the middle of the first block of each frame that has any sample.
+    fn middles(&self, frames: usize) -> Result<Vec<Units>> {
+        let mut middles = vec![None; frames];
+        for block in &self.batch.selection().blocks {
+            self.batch.fetch(&[*block])?;
+            let planes = self.batch.planes(*block)?;
+            let all = samples(self.batch, planes.as_ref(), &vec![Units { zero: 0.0, per: 1.0 / 16.0 }; frames])?;
+            for (middle, samples) in middles.iter_mut().zip(all).filter(|(middle, _)| middle.is_none()) {
+                let present = || samples.iter().copied().filter(|sample| !sample.is_nan());
+                let ends = [present().fold(f32::INFINITY, f32::min), present().fold(f32::NEG_INFINITY, f32::max)];
+                *middle = (ends[0] <= ends[1]).then(|| 16.0 * (f64::from(ends[0]) + f64::from(ends[1])) / 2.0);
+            }
+            if middles.iter().all(Option::is_some) {
+                break;
+            }
+        }
+        Ok(middles.into_iter().map(|middle| self.blend.units(middle.unwrap_or(0.0))).collect())
+    }
+
+    /// Reads the blocks of a layer, as far as they are needed.
+    fn read(
+        &self,
+        known: &Known,
+        [first, last]: [usize; 2],
+        (units, frames): (&[Units], &mut [Frame<B>]),
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let (view, axis) = (self.view, self.view.shear.axes[2]);
+        let mut region = view.clip;
+        (region.start[axis], region.end[axis]) = (first, last + 1);
+        let limits: Vec<&[f32]> = frames.iter().map(|frame| frame.limits.as_slice()).collect();
+        let need = |block: usize| (block, known.need((view, self.blend, &units[0]), &limits, block));
+        let needs: Vec<(usize, Need)> = self.blocks.touching(&region).map(need).collect();
+        let (read, others): (Vec<_>, Vec<_>) = needs.into_iter().partition(|(_, need)| *need == Need::Read);
+        for (block, need) in others {
+            let region = self.blocks.region(block);
+            match need {
+                Need::Read => {}
+                Need::Missing => report.blocks_transparent += 1,
+                Need::Fill(_) => report.blocks_transparent += 1,
+                Need::Hidden(_) => report.blocks_hidden += 1,
+            }
+            let fill = |units: &Units| match need {
+                Need::Fill(value) | Need::Hidden(value) => units.of(value),
+                Need::Read | Need::Missing => f32::NAN,
+            };
+            frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));
+        }
+        let read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
+        for blocks in read.chunks(self.together.max(1)) {
+            self.batch.fetch(blocks)?;
+            let all = blocks.par_iter().map(|block| self.decode(*block, units)).collect::<Result<Vec<_>>>()?;
+            frames.par_iter_mut().enumerate().for_each(|(n, frame)| {
+                all.iter().for_each(|(region, samples, _)| frame.layers.put(view, region, &samples[n]));
+            });
+            report.blocks_read += all.len() as u64;
+            report.coefficients += all.iter().map(|(.., held)| held[0]).sum::<u64>();
+            report.bytes_read += all.iter().map(|(.., held)| held[1]).sum::<u64>();
+        }
+        frames.par_iter_mut().for_each(|frame| frame.layers.seal(view.count[0]));
+        Ok(())
+    }
+
+    /// The samples of a block in each frame; and what it held, for the report.
+    fn decode(&self, block: usize, units: &[Units]) -> Result<(Region, Vec<Vec<f32>>, [u64; 2])> {
+        let planes = self.batch.planes(block)?;
+        Ok((self.blocks.region(block), samples(self.batch, planes.as_ref(), units)?, planes.held()))
+    }
+
+    /// Adds slices to all cells of a frame, in bands of rows.
+    fn add(&self, slices: &[Slice], frame: &mut Frame<B>) {
+        let view = self.view;
+        let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
+        let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
+        chunks.enumerate().for_each(|(n, (groups, limits))| {
+            let (work, rows) = (Work::new(view, rows), n * rows..((n + 1) * rows).min(view.extent[1]));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, work };
+            slices.iter().for_each(|slice| band.add(slice, &frame.layers));
+        });
+    }
+
+    fn finish(&self, frames: &[Frame<B>]) -> Vec<f32> {
+        let [width, height] = self.view.camera.size;
+        let mut pictures = vec![0.0; frames.len() * width * height * B::NUMBERS];
+        let of_frames = pictures.chunks_exact_mut(width * height * B::NUMBERS).zip(frames);
+        of_frames.for_each(|(picture, frame)| finish::finish::<B>(self.view, &frame.units, &frame.groups, picture));
+        pictures
+    }
+}
+
+/// The least rows of a band: the rows at its edges are filtered for both bands.
+const LEAST_ROWS: usize = 32;

@@ -1,0 +1,20 @@
+//! The units of samples in slices.
+
+/// A linear map from values to 32-bit numbers: `(value - zero) * per`.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Units {
+    pub(in crate::render) zero: f64,
+    pub(in crate::render) per: f64,
+}
+
+impl Units {
+    pub(in crate::render) fn of(&self, value: f64) -> f32 {
+        /// Sums of 32-bit numbers up to this do not overflow.
+        const MOST: f64 = 5e37;
+        ((value - self.zero) * self.per).clamp(-MOST, MOST) as f32
+    }
+
+    pub(in crate::render) fn value(&self, number: f32) -> f64 {
+        f64::from(number) / self.per + self.zero
+    }
+}

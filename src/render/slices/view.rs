@@ -1,0 +1,253 @@
+//! The geometry of a view: slices across the principal axis, and their cells on the sheared lattice.
+//!
+//! The principal axis a is the one closest to the view direction; b and c are the others. A slice lies at a position s
+//! along a, in voxels. Its cells are `1 / cells` voxels apart along b and c. Cells of two slices with the same number
+//! (u, v) lie on one ray:
+//!
+//! ```text
+//! voxel position of a cell (b, c) = (u - alpha s, v - beta s)
+//! ```
+//!
+//! alpha and beta are the slopes of eq 35, so a ray crosses all slices at one (u, v), which is a point of the picture.
+
+use super::table::change;
+use super::taps::{Taps, along, reach};
+use super::{GROUP, LEAST};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{Grid, Region};
+use crate::render::config::{Mode, RenderConfig};
+use crate::render::splat::lattice::Shear;
+use crate::view::camera::{Camera, View};
+use std::ops::Range;
+
+/// A view cut into slices.
+#[derive(Debug, Clone)]
+pub(in crate::render) struct SlicedView {
+    pub(in crate::render) camera: Camera,
+    pub(super) shear: Shear,
+    pub(super) clip: Region,
+    /// The voxels of the region along b, c and a.
+    pub(super) count: [usize; 3],
+    /// The first of them.
+    start: [usize; 3],
+    /// Whether the ray meets the last voxels along a first.
+    reversed: bool,
+    /// Standard deviation of the kernel along b, c and a, in voxels.
+    sigma: [f64; 3],
+    /// Voxels that the kernel reaches to either side, along b, c and a.
+    pub(super) reach: [usize; 3],
+    /// Cells per voxel along b and c.
+    pub(in crate::render) cells: usize,
+    /// Slices per voxel along a.
+    fineness: usize,
+    /// The lattice's first cell, in whole voxels.
+    corner: [i64; 2],
+    /// Width and height of the lattice in voxels; the width is a multiple of [`GROUP`].
+    pub(super) extent: [usize; 2],
+    /// Length of a ray between two slices, in world units.
+    pub(in crate::render) step: f64,
+}
+
+/// One slice: the weights of voxels along each axis.
+#[derive(Debug, Clone)]
+pub(super) struct Slice {
+    pub(super) number: u32,
+    /// Weights along a; voxels are counted from the first that a ray meets.
+    pub(super) along: Taps,
+    /// Weights of each phase along b and c: those of cell `phase`. `cells` further on, they move by a voxel.
+    pub(super) across: [Vec<Taps>; 2],
+}
+
+/// The largest number of slices per voxel.
+const MOST: usize = 64;
+/// Pixels per voxel from which on several cells per voxel show.
+const FEW_PIXELS: f64 = 0.8;
+/// The default distance of slices and cells in standard deviations of the kernel.
+const FINE: f64 = 2.0 / 3.0;
+/// With one slice a voxel, opacities may change by this within an eighth of the range of values.
+const SMOOTH: f64 = 0.1;
+/// Cells around the picture that interpolation needs.
+const RIM: f64 = 2.0;
+
+impl SlicedView {
+    /// Cuts a view of `grid`.
+    ///
+    /// # Errors
+    /// A region outside the volume, a camera without a picture, or a number of slices out of range.
+    pub(in crate::render) fn new(grid: &Grid, config: &RenderConfig, view: &View) -> Result<Self> {
+        let clip = config.clip(grid)?;
+        let camera = Camera::new(view, grid)?;
+        let shear = Shear::new(&camera, grid, 1);
+        let (start, count) = along(&clip, shear.axes);
+        let sigma = shear.axes.map(|axis| config.kernel.sigma / grid.spacing[axis]);
+        if let Some(wrong) = config.mode.slices().filter(|n| !(1..=MOST).contains(n)) {
+            return Err(Error::setting("slices", format!("takes 1 to {MOST} per voxel, not {wrong}")));
+        }
+        let default = |sigma: f64| (1.0 / FINE / sigma - 1e-6).ceil().clamp(1.0, 8.0) as usize;
+        let pixels = shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
+        let across = if pixels < FEW_PIXELS { 1 } else { default(sigma[0].min(sigma[1])) };
+        let cells = config.mode.slices().unwrap_or(across);
+        let deeper = camera.step(shear.axes[2], 1.0)[2];
+        let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
+        let slices = default(2.0 * sigma[2]) * more_slices(&config.mode, voxel, grid);
+        let fineness = config.mode.slices().unwrap_or(slices);
+        let step = voxel / fineness as f64;
+        let mut cut = Self {
+            camera,
+            shear,
+            clip,
+            count,
+            start,
+            reversed: deeper < 0.0,
+            sigma,
+            reach: sigma.map(reach),
+            cells,
+            fineness,
+            corner: [0; 2],
+            extent: [0; 2],
+            step,
+        };
+        (cut.corner, cut.extent) = cut.lattice();
+        Ok(cut)
+    }
+
+    /// The part of the lattice that both the picture and the kernels of the region reach.
+    fn lattice(&self) -> ([i64; 2], [usize; 2]) {
+        let [seen, reached] = [self.cells_seen(), self.cells_reached(&self.clip)];
+        let ends: [[f64; 2]; 2] =
+            [0, 1].map(|i| [seen[i][0].max(reached[i][0]).floor(), seen[i][1].min(reached[i][1]).ceil()]);
+        let extent = ends.map(|[from, to]| if to >= from { (to - from) as usize + 1 } else { 0 });
+        let empty = extent.contains(&0);
+        let corner = ends.map(|[from, _]| from as i64);
+        (corner, if empty { [0; 2] } else { [extent[0].next_multiple_of(GROUP), extent[1]] })
+    }
+
+    /// The range of cells along b and c, in voxels, that the picture shows.
+    fn cells_seen(&self) -> [[f64; 2]; 2] {
+        let [width, height] = self.camera.size.map(|n| n as f64);
+        let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]].map(|pixel| self.cell_at(pixel));
+        let rim = RIM / self.cells as f64;
+        [0, 1].map(|i| ends(corners.iter().map(|corner| corner[i]), rim))
+    }
+
+    /// The range of cells along b and c, in voxels, that the kernels of a region reach.
+    fn cells_reached(&self, region: &Region) -> [[f64; 2]; 2] {
+        let (start, count) = along(region, self.shear.axes);
+        let depths = [start[2] as f64, (start[2] + count[2]) as f64 - 1.0];
+        let depths = [depths[0] - self.reach[2] as f64, depths[1] + self.reach[2] as f64];
+        [0, 1].map(|i| {
+            let sides = [start[i] as f64, (start[i] + count[i]) as f64 - 1.0];
+            let at = |side: f64| depths.map(|depth| side + self.shear.slopes[i] * depth);
+            ends(sides.into_iter().flat_map(at), self.reach[i] as f64)
+        })
+    }
+
+    /// The position of a picture's point on the lattice, in voxels.
+    pub(super) fn cell_at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        self.shear.cells([x - self.shear.origin[0], y - self.shear.origin[1]])
+    }
+
+    /// The position of a point of the picture in cells of the lattice, counted from its first cell.
+    pub(super) fn cell_of(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let at = self.cell_at(pixel);
+        [0, 1].map(|i| (at[i] - self.corner[i] as f64) * self.cells as f64)
+    }
+
+    /// Number of slices.
+    pub(in crate::render) fn slices(&self) -> usize {
+        (self.count[2] - 1 + 2 * self.reach[2]) * self.fineness
+    }
+
+    /// The position of a slice along a, in voxels from the first that a ray meets.
+    fn position(&self, number: usize) -> f64 {
+        (number as f64 + 0.5) / self.fineness as f64 - self.reach[2] as f64
+    }
+
+    /// The slices that need no voxel from `met` on, of all from `first` on: a range of numbers.
+    pub(super) fn ready(&self, first: usize, met: usize) -> Range<usize> {
+        let needs = |number: &usize| self.position(*number).floor() as i64 + self.reach[2] as i64;
+        let all = self.slices();
+        if met >= self.count[2] {
+            return first..all;
+        }
+        first..(first..all).find(|number| needs(number) >= met as i64).unwrap_or(all)
+    }
+
+    /// The first voxel along a, counted along the ray, that slices from `number` on need.
+    pub(super) fn first_needed(&self, number: usize) -> usize {
+        (self.position(number).floor() as i64 + 1 - self.reach[2] as i64).clamp(0, self.count[2] as i64) as usize
+    }
+
+    /// A slice; `None` if the ray is too short in all of it.
+    pub(super) fn slice(&self, number: usize) -> Option<Slice> {
+        let along = Taps::new(self.position(number), self.sigma[2]);
+        if along.presence(0, self.count[2]) * (along.density as f32) < LEAST {
+            return None;
+        }
+        let cell = |i: usize, phase: usize| self.corner[i] as f64 + phase as f64 / self.cells as f64;
+        let across = [0, 1].map(|i| (0..self.cells).map(|phase| self.taps(number, i, cell(i, phase))).collect());
+        Some(Slice { number: number as u32, along, across })
+    }
+
+    /// The weights along b or c of a cell's position in a slice.
+    fn taps(&self, number: usize, i: usize, cell: f64) -> Taps {
+        let position = self.position(number);
+        let voxel = if self.reversed {
+            (self.start[2] + self.count[2] - 1) as f64 - position
+        } else {
+            self.start[2] as f64 + position
+        };
+        Taps::new(cell - self.shear.slopes[i] * voxel - self.start[i] as f64, self.sigma[i])
+    }
+
+    /// The weights along b, c and a where the ray of a cell crosses a slice.
+    pub(super) fn taps_at(&self, number: usize, cell: [f64; 2]) -> [Taps; 3] {
+        let [b, c] = [0, 1].map(|i| self.taps(number, i, cell[i]));
+        [b, c, Taps::new(self.position(number), self.sigma[2])]
+    }
+
+    /// The same view with a number of slices per voxel, and how many slices of this view make one of those.
+    pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
+        (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)
+    }
+
+    /// The place of voxel layer `at` (an index along the grid's axis a), counted along the ray.
+    pub(super) fn met_at(&self, at: usize) -> usize {
+        if self.reversed { self.start[2] + self.count[2] - 1 - at } else { at - self.start[2] }
+    }
+
+    /// Whether rays meet the last voxels along a first.
+    pub(super) fn is_reversed(&self) -> bool {
+        self.reversed
+    }
+
+    /// The groups of cells that the kernels of a region reach: columns of groups, and rows in voxels.
+    pub(super) fn reached(&self, region: &Region) -> [Range<usize>; 2] {
+        let reached = self.cells_reached(region);
+        let within = |i: usize, most: usize| {
+            let ends = reached[i].map(|cell| cell - self.corner[i] as f64);
+            let from = (ends[0].floor() - 1.0).clamp(0.0, most as f64) as usize;
+            from..(ends[1].ceil() + 2.0).clamp(from as f64, most as f64) as usize
+        };
+        let [columns, rows] = [within(0, self.extent[0]), within(1, self.extent[1])];
+        [columns.start / GROUP..columns.end.div_ceil(GROUP), rows]
+    }
+}
+
+/// How many times as many slices as for smooth opacities a mode needs. `voxel` is the length of a ray along which it
+/// crosses a voxel.
+fn more_slices(mode: &Mode, voxel: f64, grid: &Grid) -> usize {
+    match mode {
+        Mode::Composite { transfer, unit, .. } => {
+            let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());
+            (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 4.0) as usize
+        }
+        _ => 2,
+    }
+}
+
+fn ends(values: impl Iterator<Item = f64>, rim: f64) -> [f64; 2] {
+    let [from, to] =
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], value| [from.min(value), to.max(value)]);
+    [from - rim, to + rim]
+}
