@@ -15,8 +15,9 @@ const LAYERS: [&[&str]; 7] = [
 ];
 
 /// The files below `src/` in which each third-party crate may be used.
-const ALLOWED_FILES: [(&str, &[&str]); 21] = [
-    ("memmap2::", &["base/mapped.rs"]),
+const ALLOWED_FILES: [(&str, &[&str]); 22] = [
+    ("memmap2::", &["base/mapped.rs", "base/zeroed.rs"]),
+    ("bytemuck::", &["base/zeroed.rs"]),
     ("libc::", &["base/mapped.rs"]),
     ("crossbeam_channel::", &["convert/"]),
     (
@@ -31,6 +32,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 21] = [
             "render/splat/accumulator.rs",
             "render/splat/band.rs",
             "render/splat/footprints.rs",
+            "render/splat/lattice/filtered.rs",
             "render/splat/lattice_bands.rs",
             "render/plan.rs",
             "render/weigh.rs",

@@ -33,7 +33,7 @@ fn picked(samples: &[u8], ty: SampleType, declared: Option<f64>, request: &Overv
     let Thinning { blocks, stride } = request.thinning;
     let mut values = vec![0.0; samples.len() / ty.size()];
     load(ty, samples, &mut values);
-    let [xs, ys, zs] = [0, 1, 2].map(|axis| taken(axis, blocks.edge, stride));
+    let [xs, ys, zs] = [0, 1, 2].map(|axis| taken(axis, blocks.edges[axis], stride));
     let mut out = Vec::new();
     for frame in request.frames {
         for z in &zs {
@@ -201,7 +201,7 @@ fn progress_counts_every_step_of_an_overview() {
 fn an_overview_fills_the_same_part_of_the_world() {
     for (edge, stride) in [(6, 4), (8, 2), (32, 4), (43, 8)] {
         let grid = Grid { dims: DIMS, spacing: [1.0, 0.5, 2.0], origin: [3.0, -1.0, 0.0] };
-        let blocks = wavesplat::base::grid::BlockGrid { dims: DIMS, edge };
+        let blocks = wavesplat::base::grid::BlockGrid::cubes(DIMS, edge);
         let thinning = Thinning { blocks, stride };
         let thinned = thinning.grid(&grid);
         assert_eq!(thinned.dims, [0, 1, 2].map(|axis| taken(axis, edge, stride).len()));

@@ -27,7 +27,7 @@ impl Scene for Formula {
     }
 
     fn blocks(&self) -> wavesplat::base::grid::BlockGrid {
-        wavesplat::base::grid::BlockGrid { dims: self.grid.dims, edge: 32 }
+        wavesplat::base::grid::BlockGrid::cubes(self.grid.dims, 32)
     }
 
     fn frames(&self) -> Option<usize> {

@@ -3,7 +3,7 @@
 //! A cell is 2 x 2 x 2 codes. A byte says which of them are not zero. Neighbours predict how many: the activity of a
 //! cell is the number of nonzero codes in the cells before it along x, y, z and t. Bytes of cells with similar activity
 //! go to one stream, and nonzero codes to streams by the activity around and in their cell. Every stream is then packed
-//! by rANS with frequencies of its own (eq 38). `FORMAT.md`, section 7, specifies the bytes.
+//! by rANS with frequencies of its own (eq 40). `FORMAT.md`, section 7, specifies the bytes.
 
 mod pack;
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! Coding s turns a state X into
 //!
 //! ```text
-//! X' = 2^b floor(X / F) + start + X mod F                                                                 (eq 38)
+//! X' = 2^b floor(X / F) + start + X mod F                                                                 (eq 40)
 //! ```
 //!
 //! and decoding undoes that: X' mod 2^b is a slot of s, and X = F floor(X' / 2^b) + X' mod 2^b - start. A state holds
@@ -161,7 +161,7 @@ fn encode_lanes<const N: usize>(symbols: &[u8], frequencies: &Frequencies, bits:
     out.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
 }
 
-/// Codes a symbol (eq 38), after the state has given up 16 bits if it would overflow.
+/// Codes a symbol (eq 40), after the state has given up 16 bits if it would overflow.
 fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
     if *state >= symbol.limit {
         words.push(*state as u16);
@@ -231,7 +231,7 @@ fn decode_lanes<const N: usize, const S: usize>(
     ensure(done, || "symbols and words do not end at the same place".into())
 }
 
-/// The next symbol of a state: the inverse of eq 38. Past the last word it reads zeros; the check at the end then fails.
+/// The next symbol of a state: the inverse of eq 40. Past the last word it reads zeros; the check at the end then fails.
 #[inline(always)]
 fn pop<const S: usize>(state: &mut u32, slots: &Slots<S>, words: &[[u8; 2]], next: &mut usize) -> u8 {
     let slot = *state & (S as u32 - 1);

@@ -113,19 +113,24 @@ impl Region {
     }
 }
 
-/// A volume cut into boxes of `edge` voxels a side; those at the upper faces may be smaller.
+/// A volume cut into boxes of the same size; those at the upper faces may be smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BlockGrid {
     /// Voxels of the volume along x, y, z.
     pub dims: [usize; 3],
-    /// Voxels a side of a whole block.
-    pub edge: usize,
+    /// Voxels of a whole block along x, y, z.
+    pub edges: [usize; 3],
 }
 
 impl BlockGrid {
+    /// A volume cut into cubes of `edge` voxels a side.
+    pub fn cubes(dims: [usize; 3], edge: usize) -> Self {
+        Self { dims, edges: [edge; 3] }
+    }
+
     /// Number of blocks along x, y, z.
     pub fn counts(&self) -> [usize; 3] {
-        self.dims.map(|n| n.div_ceil(self.edge))
+        std::array::from_fn(|a| self.dims[a].div_ceil(self.edges[a]))
     }
 
     /// Number of blocks.
@@ -143,8 +148,8 @@ impl BlockGrid {
         let [cx, cy, _] = self.counts();
         let at = [block % cx, block / cx % cy, block / (cx * cy)];
         Region {
-            start: at.map(|i| i * self.edge),
-            end: std::array::from_fn(|a| ((at[a] + 1) * self.edge).min(self.dims[a])),
+            start: std::array::from_fn(|a| at[a] * self.edges[a]),
+            end: std::array::from_fn(|a| ((at[a] + 1) * self.edges[a]).min(self.dims[a])),
         }
     }
 
@@ -152,12 +157,11 @@ impl BlockGrid {
     pub fn touching(&self, region: &Region) -> impl Iterator<Item = usize> + use<> {
         let [cx, cy, _] = self.counts();
         let blocks = Region {
-            start: region.start.map(|i| i / self.edge),
-            end: if region.is_empty() {
-                region.start.map(|i| i / self.edge)
-            } else {
-                region.end.map(|i| i.div_ceil(self.edge))
-            },
+            start: std::array::from_fn(|a| region.start[a] / self.edges[a]),
+            end: std::array::from_fn(|a| match region.is_empty() {
+                true => region.start[a] / self.edges[a],
+                false => region.end[a].div_ceil(self.edges[a]),
+            }),
         };
         blocks.iter().map(move |[x, y, z]| (z * cy + y) * cx + x)
     }
@@ -169,7 +173,7 @@ mod tests {
 
     #[test]
     fn blocks_tile_the_volume_without_overlap() {
-        let grid = BlockGrid { dims: [7, 5, 3], edge: 4 };
+        let grid = BlockGrid { dims: [7, 5, 3], edges: [4, 3, 2] };
         let mut seen = vec![0; 7 * 5 * 3];
         let whole = Grid::unit(grid.dims).whole();
         for block in 0..grid.len() {
@@ -190,7 +194,7 @@ mod tests {
 
     #[test]
     fn touching_agrees_with_testing_every_block() {
-        let grid = BlockGrid { dims: [9, 10, 11], edge: 4 };
+        let grid = BlockGrid { dims: [9, 10, 11], edges: [4, 5, 3] };
         for region in [
             Region { start: [0, 0, 0], end: [9, 10, 11] },
             Region { start: [3, 4, 7], end: [5, 5, 9] },

@@ -6,6 +6,7 @@ mod remedy;
 pub mod error;
 pub mod progress;
 pub(crate) mod memory;
+pub(crate) mod zeroed;
 pub(crate) mod half;
 pub mod sample;
 pub mod grid;

@@ -58,7 +58,7 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     progress.start(Some(firsts.len() as u64));
     let frames_read = FramesRead { archive: &archive, missing_value: task.config.missing_value, regions: &regions };
     let range = config.range.map_or_else(|| frames_read.range(source, config.window, &firsts), Ok)?;
-    let config = ConvertConfig { range: Some(range), block: Some(plan.blocks.edge), ..task.config };
+    let config = ConvertConfig { range: Some(range), block: Some(plan.blocks.edges[0]), ..task.config };
     let (mut coded, mut samples) = (0, 0);
     for first in &firsts {
         let window = source.window(*first, config.window.min(frames - first))?;
@@ -131,7 +131,7 @@ impl FramesRead<'_> {
 
 /// A block, moved inwards if a far face cuts it, so that all blocks have the same size.
 fn whole_block(plan: &Plan<'_>, block: usize) -> Region {
-    let (Region { start, .. }, BlockGrid { dims, edge }) = (plan.blocks.region(block), plan.blocks);
+    let (Region { start, .. }, BlockGrid { dims, edges: [edge, ..] }) = (plan.blocks.region(block), plan.blocks);
     let start: [usize; 3] = std::array::from_fn(|axis| start[axis].min(dims[axis].saturating_sub(edge)));
     Region { start, end: std::array::from_fn(|axis| (start[axis] + edge).min(dims[axis])) }
 }

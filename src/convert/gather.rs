@@ -180,7 +180,7 @@ impl WindowReader<'_> {
             SchemeSelector { config, archive: self.archive, channels: &channels, promise, magnitude, most, before };
         let scheme = scheme.choose()?;
         self.scheme = Some(scheme.clone());
-        let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edge);
+        let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edges[0]);
         codec.missing_value = config.missing_value;
         let id = self.id(scan.digest)?;
         let index =

@@ -275,7 +275,7 @@ impl<'a> Plan<'a> {
                 format!("holds 1 to {most} samples over a window, not {edge} voxels a side"),
             ));
         }
-        let blocks = BlockGrid { dims: archive.grid.dims, edge };
+        let blocks = BlockGrid::cubes(archive.grid.dims, edge);
         if u32::try_from(blocks.len()).is_err() {
             return Err(Error::setting(
                 "block",
@@ -375,7 +375,7 @@ fn batch_len(
     let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
-        let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edge);
+        let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edges[0]);
         let window = config.window;
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
         Error::setting(

@@ -85,7 +85,7 @@ impl CoefficientFile {
         let m = reader.metadata();
         let dims = m.dims.map(|n| n as usize);
         let grid = Grid { dims, spacing: m.spacing, origin: m.origin };
-        let blocks = BlockGrid { dims, edge: m.block_edge as usize };
+        let blocks = BlockGrid::cubes(dims, m.block_edge as usize);
         let colour_transform = colour_transform(m).map_err(failed)?;
         Ok(Self { path, grid, blocks, colour_transform, reader, state: None, skipped: None })
     }

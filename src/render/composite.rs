@@ -51,10 +51,10 @@ pub(super) fn least(scene: &dyn Scene, config: &RenderConfig, views: &[SlicedVie
 
 /// Bytes to render `frames` frames together, with `blocks` blocks decoded at a time.
 fn needed(scene: &dyn Scene, config: &RenderConfig, view: &SlicedView, (frames, blocks): (usize, usize)) -> usize {
-    let edge = scene.blocks().edge;
+    let grid = scene.blocks();
     let frames_bytes = match config.mode {
-        Mode::Composite { .. } => bytes::<Composite>(view, frames, edge),
-        _ => bytes::<Largest>(view, frames, edge),
+        Mode::Composite { .. } => bytes::<Composite>(view, frames, grid),
+        _ => bytes::<Largest>(view, frames, grid),
     };
     memory::FIXED + frames_bytes + blocks * block_bytes(scene, config, frames)
 }

@@ -100,6 +100,9 @@ pub struct RenderConfig {
     /// sum of weights, and grows in inverse proportion to the sum elsewhere. 0 selects the exact method. Default:
     /// [`default_splat_error`]. Composites and largest values are not splatted.
     pub splat_error: f64,
+    /// Whether a quick look is enough: about twice as fast, with a splat error that is estimated, not bounded. Default:
+    /// no.
+    pub quick: bool,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
     /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all
     /// have this error.
@@ -160,12 +163,16 @@ impl RenderConfig {
         if !(self.splat_error.is_finite() && self.splat_error >= 0.0) {
             return Err(Error::setting("splat_error", "takes a number of 0 or more"));
         }
+        if self.quick && self.certify {
+            return Err(Error::setting("quick", "has no bound, so it cannot be certified"));
+        }
         if self.mode.is_projection() {
             return Ok(());
         }
         let refused = [
             (self.kernel.tau != 0.0, "tau"),
             (self.certify, "certify"),
+            (self.quick, "quick"),
             (self.chooses_by_view(), "limited"),
             (self.quantity != Quantity::Mean, "quantity"),
         ];

@@ -88,7 +88,7 @@ use crate::view::camera::View;
 use plan::Budget;
 use slices::SlicedView;
 use splat::ViewSetup;
-use splat::reference_weights::without_dim_voxels;
+use splat::reference_weights::{with_backend, without_dim_voxels};
 use std::time::{Duration, Instant};
 
 /// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
@@ -154,7 +154,10 @@ impl Setups {
         let (grid, views) = (scene.grid(), config.views.iter());
         if config.mode.is_projection() {
             let volume = (*grid, scene.blocks());
-            let setup = |view: &View| without_dim_voxels(ViewSetup::new(volume, config, view)?, config);
+            let setup = |view: &View| {
+                let setup = with_backend(ViewSetup::new(volume, config, view)?, config)?;
+                without_dim_voxels(setup, config)
+            };
             return views.map(setup).collect::<Result<_>>().map(Self::Splatted);
         }
         if scene.channels() > 1 {
@@ -176,7 +179,13 @@ impl Setups {
     fn reports(&self, config: &RenderConfig) -> Vec<ViewReport> {
         let views = config.views.iter();
         match self {
-            Self::Splatted(setups) => views.zip(setups).map(|(view, setup)| ViewReport::new(view, setup)).collect(),
+            Self::Splatted(setups) => {
+                let of = |(view, setup): (&View, &ViewSetup)| ViewReport {
+                    splat_error_is_estimate: config.quick && setup.backend.is_lattice(),
+                    ..ViewReport::new(view, setup)
+                };
+                views.zip(setups).map(of).collect()
+            }
             Self::Sliced(all) => {
                 let of = |(view, sliced): (&View, &SlicedView)| {
                     ViewReport::of_slices(view, &sliced.camera, sliced.slices(), sliced.cells)

@@ -19,20 +19,20 @@ pub struct Thinning {
 
 impl Thinning {
     /// The number of voxels that are taken along an axis before position `at` of the volume.
-    fn before(&self, at: usize) -> usize {
-        let (edge, stride) = (self.blocks.edge, self.stride);
+    fn before(&self, axis: usize, at: usize) -> usize {
+        let (edge, stride) = (self.blocks.edges[axis], self.stride);
         at / edge * edge.div_ceil(stride) + (at % edge).div_ceil(stride)
     }
 
     /// The voxels along an axis that are taken.
     pub(super) fn taken(&self, axis: usize) -> Vec<usize> {
-        (0..self.blocks.dims[axis]).filter(|at| (at % self.blocks.edge).is_multiple_of(self.stride)).collect()
+        (0..self.blocks.dims[axis]).filter(|at| (at % self.blocks.edges[axis]).is_multiple_of(self.stride)).collect()
     }
 
     /// The voxels that are taken, cut into the same blocks.
     pub fn blocks(&self) -> BlockGrid {
-        let dims = self.blocks.dims.map(|n| self.before(n));
-        BlockGrid { dims, edge: self.blocks.edge.div_ceil(self.stride) }
+        let dims = std::array::from_fn(|a| self.before(a, self.blocks.dims[a]));
+        BlockGrid { dims, edges: self.blocks.edges.map(|edge| edge.div_ceil(self.stride)) }
     }
 
     /// A grid of the voxels that are taken: evenly spaced over the same part of the world.
@@ -46,8 +46,8 @@ impl Thinning {
     /// The region of the voxels that are taken from a region, at least one.
     pub fn region(&self, region: &Region) -> Region {
         let last = self.blocks().dims.map(|n| n - 1);
-        let start = std::array::from_fn(|a| self.before(region.start[a]).min(last[a]));
-        let end = std::array::from_fn(|a| self.before(region.end[a]).max(start[a] + 1));
+        let start = std::array::from_fn(|a| self.before(a, region.start[a]).min(last[a]));
+        let end = std::array::from_fn(|a| self.before(a, region.end[a]).max(start[a] + 1));
         Region { start, end }
     }
 }

@@ -126,7 +126,10 @@ impl<'a> Budget<'a> {
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
         let band = |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows);
         let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes)).max().unwrap_or(0);
-        let numbers = planes * self.setups.iter().map(band).sum::<usize>() + rayon::current_num_threads() * scratch;
+        let (bands, threads) = (self.setups.iter().map(band), rayon::current_num_threads());
+        // A thread filters one plane of a lattice in f64, out of place.
+        let filtered = bands.clone().max().unwrap_or(0);
+        let numbers = planes * bands.sum::<usize>() + threads * (scratch + filtered);
         numbers * size_of::<f64>()
     }
 
@@ -164,7 +167,8 @@ const FEW_ROWS: usize = 4;
 /// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
-    memory::FIXED + setups.len() * width * height * WEIGHT_BYTES
+    let ones = |setup: &ViewSetup| setup.backend.ones(width, height) * size_of::<f64>();
+    memory::FIXED + setups.len() * width * height * WEIGHT_BYTES + setups.iter().map(ones).sum::<usize>()
 }
 
 /// The largest number of requested frames in one batch.

@@ -12,6 +12,7 @@ use super::weigh::weigh;
 use super::weights::WeightedView;
 use crate::base::error::Result;
 use crate::base::progress::Progress;
+use crate::base::zeroed::Zeroed;
 use std::borrow::Cow;
 use std::time::Instant;
 
@@ -80,11 +81,17 @@ fn render_batch(
     let layout = batch.layout();
     let blocks = visible_blocks(batch, weighted, report);
     let reconstructors: Vec<_> = weighted.iter().map(|view| PixelReconstructor::new(batch, view, config)).collect();
-    let empty = |pixels: &PixelReconstructor<'_>| vec![f32::NAN; pixels.pictures() * budget.pixels()];
-    let mut pictures: Vec<Vec<f32>> = reconstructors.iter().map(empty).collect();
+    let empty = |pixels: &PixelReconstructor<'_>| {
+        let mut pictures = Zeroed::new(pixels.pictures() * budget.pixels());
+        pictures.fill(f32::NAN);
+        pictures
+    };
+    let mut pictures: Vec<Zeroed<f32>> = reconstructors.iter().map(empty).collect();
     for rows in budget.bands(&layout) {
-        let mut bands: Vec<_> =
-            weighted.iter().map(|view| BandAccumulator::new(view.setup, rows.clone(), &layout)).collect();
+        let mut bands: Vec<_> = weighted
+            .iter()
+            .map(|view| BandAccumulator::new(view.setup, rows.clone(), &layout).relative_to(view.weights.ones()))
+            .collect();
         report.add_splatted(&splat(&mut bands, (&blocks, budget.batch(&layout, rows.len())), &batch)?);
         let mut clock = Instant::now();
         for ((band, pixels), pictures) in bands.into_iter().zip(&reconstructors).zip(&mut pictures) {
@@ -117,7 +124,7 @@ fn visible_blocks(batch: &dyn FrameBatch, weighted: &[WeightedView<'_>], report:
 struct Pictures {
     pixels: usize,
     /// The pictures of all frames, followed by their error bounds if pictures are certified.
-    all: Vec<f32>,
+    all: Zeroed<f32>,
 }
 
 impl Pictures {

@@ -111,6 +111,8 @@ pub struct ViewReport {
     pub probed: Option<Probed>,
     /// The stated error of the splat method, measured like the requested splat error.
     pub stated_splat_error: f64,
+    /// Whether the stated error is only an estimate, for values without fine structures.
+    pub splat_error_is_estimate: bool,
     /// Estimated root mean square error over the pixels that are not background, in the unit of the pictures, without
     /// the splat error.
     pub expected_error: f64,

@@ -93,6 +93,7 @@ impl RenderConfig {
             frames: (0..scene.frames().unwrap_or(0)).collect(),
             region: None,
             splat_error: default_splat_error(scene.tolerance()),
+            quick: false,
             allowed: None,
             limited: Limit::Certified,
             certify: false,

@@ -6,26 +6,27 @@ use super::layout::{Layout, Order};
 use super::plan::Budget;
 use super::plane_values::{BlockPlanes, BlockSource, UnitValues};
 use super::splat::reference_weights::ReferenceWeights;
-use super::splat::{BandAccumulator, Pixels, ResolvedTile, ViewSetup, splat};
+use super::splat::{BandAccumulator, FilteredCells, Pixels, ResolvedTile, ViewSetup, splat};
 use super::weights::{WeightedView, Weights};
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
 use crate::view::footprint::{Footprint, Method};
-use crate::wavelet::LANES;
+use crate::wavelet::{LANES, Lane};
 use rayon::prelude::*;
 
 /// Computes the sums of weights of a view.
 pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Budget<'_>) -> Result<WeightedView<'a>> {
     let by = |method: Method| Footprint::new(config.kernel, &setup.grid, setup.camera.scale, method);
-    let sums = sums(setup, budget)?;
+    let (sums, cells) = sums(setup, budget)?;
     let largest = sums.iter().copied().fold(0.0, f64::max);
-    let mut weights = Weights { size: setup.camera.size, threshold: BACKGROUND * largest, sums, ..Weights::default() };
+    let mut weights =
+        Weights { size: setup.camera.size, threshold: BACKGROUND * largest, sums, cells, ..Weights::default() };
     if config.quantity == Quantity::Mean && setup.method != Method::EXACT {
         judge_background(&mut weights, &ReferenceWeights::new(setup, &by(Method::EXACT)?), setup.stated_error);
     }
     if config.certify {
         let whole = ViewSetup { footprint: by(certificate::WHOLE)?, ..setup.clone() };
-        weights.beyond = self::sums(&whole, budget)?;
+        weights.beyond = self::sums(&whole, budget)?.0;
         certificate::leave_beyond(&whole, &weights.sums, &mut weights.beyond);
     }
     Ok(WeightedView { setup, weights })
@@ -50,19 +51,23 @@ fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off
     (weights.threshold, weights.reference) = (threshold, sums);
 }
 
-/// The sums of weights of all pixels, as splatted by the setup.
-fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<Vec<f64>> {
+/// The sums of weights of all pixels, as splatted by the setup, and the cells of a lattice.
+fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<(Vec<f64>, Option<FilteredCells>)> {
     let layout =
         Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
-    let mut out = vec![0.0; setup.pixels()];
-    for rows in budget.bands(&layout) {
+    let (mut out, mut cells) = (vec![0.0; setup.pixels()], None);
+    let whole = 0..setup.camera.size[1];
+    // The cells of a lattice are kept whole.
+    let bands = if setup.backend.is_lattice() { vec![whole] } else { budget.bands(&layout) };
+    for rows in bands {
         let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
         let mut accumulator = BandAccumulator::new(setup, rows.clone(), &layout);
         let batch = budget.batch(&layout, rows.len());
         splat(std::slice::from_mut(&mut accumulator), (&blocks, batch), &Ones(&setup.blocks))?;
         accumulator.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
+        cells = accumulator.into_filtered();
     }
-    Ok(out)
+    Ok((out, cells))
 }
 
 /// A 1 for every voxel of a block.
@@ -79,10 +84,12 @@ fn put_first_plane(tile: &mut ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
     if tile.used().is_empty() {
         return;
     }
+    let mut plane = Lane::default();
     for (y, at) in rect.y.clone().zip((0..).step_by(rect.x.len())) {
         for first in (0..rect.x.len()).step_by(LANES) {
             let count = LANES.min(rect.x.len() - first);
-            pixels.put(0, [rect.x.start + first, y], &tile.load_one(at + first, count)[..count]);
+            tile.load(at + first, count, std::slice::from_mut(&mut plane));
+            pixels.put(0, [rect.x.start + first, y], &plane[..count]);
         }
     }
 }

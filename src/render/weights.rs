@@ -9,7 +9,7 @@
 //! uncut weights, so that the background does not depend on the splat method. Missing samples have no weight: their
 //! weights are subtracted.
 
-use super::splat::ViewSetup;
+use super::splat::{FilteredCells, Ones, ViewSetup};
 
 /// The least share of a pixel's weights that must be present.
 const LEAST_PRESENT: f64 = 1e-6;
@@ -20,6 +20,8 @@ pub(super) struct Weights {
     pub(super) size: [usize; 2],
     /// Sums of weights, splatted in the same way as values, so that the quotient is a mean.
     pub(super) sums: Vec<f64>,
+    /// The cells of a lattice that gave `sums`.
+    pub(super) cells: Option<FilteredCells>,
     /// Sums of uncut footprints, so that the background is the same for every splat method. If empty, `sums` serves
     /// instead.
     pub(super) reference: Vec<f64>,
@@ -58,6 +60,11 @@ impl PixelWeight {
 }
 
 impl Weights {
+    /// The image of the value 1 at all voxels, if the backend is a lattice.
+    pub(super) fn ones(&self) -> Option<Ones<'_>> {
+        self.cells.as_ref().map(|cells| Ones { cells, sums: &self.sums, width: self.size[0] })
+    }
+
     /// The sums of the pixels that are not background.
     pub(super) fn shown(&self) -> impl Iterator<Item = f64> {
         self.sums.iter().copied().filter(|sum| *sum >= self.threshold)

@@ -54,10 +54,9 @@ fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
     work.wavesplat("convert a.npy -o a.wspl --window 4").ok();
     work.wavesplat("convert a.npy -o haar.wspl --window 4 --basis haar --space none").ok();
     for input in ["a.wspl", "haar.wspl", "a.npy --method direct"] {
-        for mode in ["", "--quantity emission", "--mode mip --slabs 32"] {
+        for mode in ["", "--quantity emission", "--mode mip"] {
             work.render(&format!("{input} --size 64x64 {mode} -o all.npy --force")).ok();
             let [lo, hi] = extremes(&floats(&read_npy(&work.read("all.npy")).1));
-            let mode = mode.trim_end_matches(" --slabs 32");
             let range = |options: &str| {
                 let options = format!("{input} {SIZE} {mode} -o a.png --force --json {options}");
                 let json = work.render(&options).ok().json();

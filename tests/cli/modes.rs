@@ -151,7 +151,7 @@ fn a_sample_that_is_masked_but_was_not_missing_gives_code_4() {
     let lie = |b: &mut EncodedBlock, m: &mut Metadata| {
         let mut mask = vec![false; 8 * 8 * 8 * m.windows[1].frames as usize];
         let (nx, ny, nz) = (m.dims[0] as usize, m.dims[1] as usize, m.dims[2] as usize);
-        let blocks = BlockGrid { dims: [nx, ny, nz], edge: 8 };
+        let blocks = BlockGrid::cubes([nx, ny, nz], 8);
         mask.truncate(blocks.region(5).voxels() * m.windows[1].frames as usize);
         mask[7] = true;
         let mut raw = Vec::new();

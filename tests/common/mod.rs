@@ -129,6 +129,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         frames,
         region: None,
         splat_error: 0.0,
+        quick: false,
         allowed: None,
         limited: Default::default(),
         certify: false,

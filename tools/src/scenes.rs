@@ -38,6 +38,7 @@ pub(crate) fn projection(
         frames,
         region: None,
         splat_error,
+        quick: false,
         allowed: None,
         limited: Default::default(),
         certify: false,

@@ -87,6 +87,9 @@ pub(crate) struct Cli {
     /// tolerance, at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     pub(crate) splat_error: Option<f64>,
+    /// A quick look: twice as fast, with a splat error that is estimated and not bounded
+    #[arg(long, conflicts_with_all = ["splat_error", "error_image"], help_heading = "Kernel")]
+    pub(crate) fast: bool,
     /// Read and splat less: pictures may be off by this share of the value range (emissions: as if samples were). At
     /// least the file's largest sample error, or see --error
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]

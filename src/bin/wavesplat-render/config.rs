@@ -30,6 +30,7 @@ impl Cli {
             frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
             region: self.region.map(|r| r.resolve(grid)).transpose()?,
             splat_error,
+            quick: self.fast,
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),

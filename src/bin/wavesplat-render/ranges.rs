@@ -113,8 +113,9 @@ fn values_of_overview(scene: &mut dyn Scene, small: &RenderConfig, common: &Comm
 
 /// How to thin a scene for small pictures.
 fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
+    let least_edge = scene.blocks().edges.into_iter().fold(usize::MAX, usize::min);
     let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, PIXELS_APART)? };
-    while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < thinning.blocks.edge {
+    while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < least_edge {
         thinning.stride *= 2;
     }
     Ok(thinning)

@@ -47,6 +47,11 @@ impl Cli {
                 left_out.coefficients
             ));
         }
+        let estimates = report.views.iter().filter(|view| view.splat_error_is_estimate);
+        let estimate = estimates.map(|view| view.stated_splat_error).fold(0.0, f64::max);
+        if estimate > 0.0 {
+            self.common.note(format_args!("--fast adds an error of about {estimate:.1e} of the range (an estimate)"));
+        }
         if let Some(error) = report.certified_error {
             self.common.note(format_args!("no pixel is off by more than {error:.4e}"));
         }

@@ -19,8 +19,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Frames that are splatted together, so that the weights of voxels or pixels are computed once for all of them.
 const BATCH: usize = 32;
-/// Voxels per side of the boxes in which frames are read.
-const EDGE: usize = 32;
+/// Voxels of the boxes in which frames are read: rows long enough to read memory in order, and few enough voxels for
+/// the second-level cache.
+const EDGES: [usize; 3] = [128, 32, 32];
 
 /// An archive as a scene.
 pub struct FrameScene {
@@ -58,7 +59,7 @@ impl Scene for FrameScene {
     }
 
     fn blocks(&self) -> BlockGrid {
-        BlockGrid { dims: self.archive.grid.dims, edge: EDGE }
+        BlockGrid { dims: self.archive.grid.dims, edges: EDGES }
     }
 
     fn channels(&self) -> usize {

@@ -51,13 +51,13 @@ fn groups(view: &SlicedView) -> usize {
 }
 
 /// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
-fn most_layers(view: &SlicedView, edge: usize) -> usize {
-    (edge + 2 * view.reach[2]).min(view.count[2])
+fn most_layers(view: &SlicedView, blocks: BlockGrid) -> usize {
+    (blocks.edges[view.shear.axes[2]] + 2 * view.reach[2]).min(view.count[2])
 }
 
-/// Bytes of a batch of `frames` frames without decoded blocks. Blocks have `edge` voxels a side.
-pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, edge: usize) -> usize {
-    let layers = Layers::bytes(view, most_layers(view, edge));
+/// Bytes of a batch of `frames` frames without decoded blocks.
+pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, blocks: BlockGrid) -> usize {
+    let layers = Layers::bytes(view, most_layers(view, blocks));
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
     let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view));
@@ -74,7 +74,7 @@ impl<B: Blend> Batch<'_, B> {
     /// The pictures of all frames, one after another.
     pub(in crate::render) fn render(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
         let known = Known::new(self.view, self.blocks, self.batch.selection());
-        let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks.edge));
+        let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks));
         let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
         let mut probe = report.views[self.number].probed.is_none().then(|| Probe::new(self.view, self.blend));
         let mut next = 0;
@@ -104,7 +104,8 @@ impl<B: Blend> Batch<'_, B> {
 
     /// The first and the last voxel along a of each layer of blocks, in the order in which rays meet them.
     fn layers(&self) -> Vec<[usize; 2]> {
-        let (axis, clip, edge) = (self.view.shear.axes[2], &self.view.clip, self.blocks.edge);
+        let (axis, clip) = (self.view.shear.axes[2], &self.view.clip);
+        let edge = self.blocks.edges[axis];
         if self.view.extent.contains(&0) {
             return Vec::new();
         }

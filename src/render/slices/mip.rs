@@ -137,8 +137,8 @@ fn add(row: &Row<'_>, groups: &mut [Peaks], limits: &mut [f32]) {
 /// Adds the values of the next slice.
 #[inline(always)]
 fn add_values(values: &Sixteen, group: &mut Peaks) {
-    for i in 0..GROUP {
-        let (value, last, before) = (values[i], group.last[i], group.before[i]);
+    for (i, value) in values.iter().copied().enumerate() {
+        let (last, before) = (group.last[i], group.before[i]);
         let is_peak = before > NONE && value > NONE && last > before && last > value;
         let slope = value - before;
         let bend = if is_peak { 8.0 * ((last - before) + (last - value)) } else { 1.0 };

@@ -38,7 +38,7 @@ impl Known {
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
         let mut wide = ranges.clone();
         for (i, axis) in view.shear.axes.into_iter().enumerate() {
-            widen(&mut wide, blocks, axis, (2 * view.reach[i] - 1).div_ceil(blocks.edge));
+            widen(&mut wide, blocks, axis, (2 * view.reach[i] - 1).div_ceil(blocks.edges[axis]));
         }
         Self { blocks, ranges, wide, has_values }
     }
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn ranges_widen_to_the_blocks_around() {
-        let blocks = BlockGrid { dims: [20, 12, 8], edge: 4 };
+        let blocks = BlockGrid::cubes([20, 12, 8], 4);
         let mut ranges: Vec<(f64, f64)> = (0..blocks.len()).map(|n| (n as f64, n as f64)).collect();
         (0..3).for_each(|axis| widen(&mut ranges, blocks, axis, 1));
         for (block, found) in ranges.into_iter().enumerate() {

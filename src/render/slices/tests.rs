@@ -142,7 +142,6 @@ impl Case {
         let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
         assert!(expected.iter().any(|e| *e > 0.2) && found.len() == expected.len());
         let (found_rms, largest) = errors(&off);
-        println!("{name}: rms {found_rms:.1e}, largest {largest:.1e}");
         assert!(found_rms < rms && largest < most, "{name}: rms {found_rms:e}, largest {largest:e}");
     }
 }
@@ -241,7 +240,6 @@ fn the_largest_value_is_that_of_brute_force() {
             .zip(low.iter().zip(&high))
             .filter(|(f, (l, h))| (f.is_nan() && !h.is_nan()) || (!f.is_nan() && l.is_nan()));
         let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
-        println!("{name}: rms {rms:.1e}, largest {most:.1e}, sure {sure} of {shown}");
         assert!(rms < 6e-3 && most < 5e-2, "{name}: rms {rms:e}, largest {most:e}");
         assert!(sure > shown / 3 && shown > found.len() / 4 && wrong.count() == 0, "{name}: {sure} of {shown}");
     }
@@ -259,7 +257,6 @@ fn probed_rays_tell_the_errors_of_the_picture() {
         let of_pixel = off.chunks_exact(4).map(|pixel| pixel.iter().copied().fold(0.0, f64::max));
         let shown = of_pixel.zip(expected.chunks_exact(4)).filter(|(_, light)| light[3] > 0.0).map(|(off, _)| off);
         let (rms, largest) = errors(&shown.collect::<Vec<_>>());
-        println!("{slices}: {probed:?} of {rms:e}, {largest:e}");
         assert!(probed.rays > 10 && probed.rms > rms / 4.0 && probed.rms < 4.0 * rms && probed.largest < 2.0 * largest);
     }
     let table = report_of_a_step();

@@ -64,7 +64,7 @@ const MOST: usize = 64;
 const FEW_PIXELS: f64 = 0.8;
 /// The default distance of slices and cells in standard deviations of the kernel.
 const FINE: f64 = 2.0 / 3.0;
-/// With one slice a voxel, opacities may change by this within an eighth of the range of values.
+/// With the default distance of slices, opacities may change by this within an eighth of the range of values.
 const SMOOTH: f64 = 0.1;
 /// Cells around the picture that interpolation needs.
 const RIM: f64 = 2.0;
@@ -89,7 +89,7 @@ impl SlicedView {
         let cells = config.mode.slices().unwrap_or(across);
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
-        let slices = default(2.0 * sigma[2]) * more_slices(&config.mode, voxel, grid);
+        let slices = default(sigma[2]) * more_slices(&config.mode, voxel, grid);
         let fineness = config.mode.slices().unwrap_or(slices);
         let step = voxel / fineness as f64;
         let mut cut = Self {
@@ -242,7 +242,7 @@ fn more_slices(mode: &Mode, voxel: f64, grid: &Grid) -> usize {
             let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());
             (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 4.0) as usize
         }
-        _ => 2,
+        _ => 1,
     }
 }
 

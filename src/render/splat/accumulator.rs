@@ -3,7 +3,7 @@
 use super::backend::SplatBackend;
 use super::band::{Band, SplatStats, splat_in_batches};
 use super::footprints::{FootprintBands, Tile};
-use super::lattice::{Cells, Gather, Lattice};
+use super::lattice::{Cells, FilteredCells, Gather, Lattice, Ones};
 use super::lattice_bands::LatticeBands;
 use super::tile_rect::{TILE, TileRect};
 use super::view_setup::ViewSetup;
@@ -18,12 +18,16 @@ use std::ops::Range;
 pub(in crate::render) struct BandAccumulator<'a> {
     band: Band<'a>,
     planes: usize,
+    ones: Option<Ones<'a>>,
     sums: BandSums<'a>,
 }
 
 enum BandSums<'a> {
     Tiles(Vec<Tile>),
+    /// While blocks are added.
     Cells(&'a Lattice, Cells),
+    /// After the last block.
+    Filtered(&'a Lattice, FilteredCells),
 }
 
 impl<'a> BandAccumulator<'a> {
@@ -34,10 +38,32 @@ impl<'a> BandAccumulator<'a> {
         let sums = match &setup.backend {
             SplatBackend::Lattice(lattice) => BandSums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
             SplatBackend::Footprints => {
-                BandSums::Tiles(TileRect::cover(width, rows.clone(), TILE).into_iter().map(tile).collect())
+                BandSums::Tiles(TileRect::cover(width, rows.clone(), [TILE; 2]).into_iter().map(tile).collect())
             }
         };
-        Self { band: Band { setup, rows }, planes, sums }
+        Self { band: Band { setup, rows }, planes, ones: None, sums }
+    }
+
+    /// The same, rounded relative to the image of ones.
+    pub(in crate::render) fn relative_to(self, ones: Option<Ones<'a>>) -> Self {
+        Self { ones, ..self }
+    }
+
+    /// The filtered cells, if the backend is a lattice.
+    pub(in crate::render) fn into_filtered(self) -> Option<FilteredCells> {
+        match self.sums {
+            BandSums::Filtered(_, cells) => Some(cells),
+            BandSums::Tiles(_) | BandSums::Cells(..) => None,
+        }
+    }
+
+    /// Ends the sums of a lattice after the last block.
+    fn filter(&mut self) {
+        let sums = std::mem::replace(&mut self.sums, BandSums::Tiles(Vec::new()));
+        self.sums = match sums {
+            BandSums::Cells(lattice, cells) => BandSums::Filtered(lattice, lattice.filter(cells)),
+            sums => sums,
+        };
     }
 
     /// Calls `finish` for every tile, with its pixels in `pictures`, which have the size of the whole picture.
@@ -46,25 +72,38 @@ impl<'a> BandAccumulator<'a> {
         pictures: &mut [T],
         finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
     ) {
-        let (width, side) = (self.band.setup.camera.size[0], self.band.setup.backend.tile());
-        let columns = width.div_ceil(side);
-        let rects = TileRect::cover(width, self.band.rows.clone(), side);
-        let bands = self.by_rows_of_tiles(pictures, side);
+        let (width, tile) = (self.band.setup.camera.size[0], self.band.setup.backend.tile());
+        let columns = width.div_ceil(tile[0]);
+        let rects = TileRect::cover(width, self.band.rows.clone(), tile);
+        let bands = self.by_rows_of_tiles(pictures, tile[1]);
         rects.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (rects, planes))| {
             let mut pixels = Pixels { planes, width, top: rects[0].y.start };
             for (i, rect) in rects.iter().enumerate() {
-                finish(ResolvedTile::new(self, rect, n * columns + i), &mut pixels);
+                if let Some(sums) = self.tile(rect, n * columns + i) {
+                    finish(ResolvedTile { rect, planes: self.planes, sums }, &mut pixels);
+                }
             }
         });
     }
 
+    /// The sums of tile `number`, after the last block.
+    fn tile<'t>(&'t self, rect: &'t TileRect, number: usize) -> Option<TileSums<'t>> {
+        match &self.sums {
+            BandSums::Tiles(tiles) => Some(TileSums::Tile(&tiles[number])),
+            BandSums::Filtered(lattice, cells) => {
+                Some(TileSums::Gather(Box::new(Gather::new(lattice, cells, rect, self.ones))))
+            }
+            BandSums::Cells(..) => None,
+        }
+    }
+
     /// For every row of tiles, its rows of every picture.
-    fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], side: usize) -> Vec<Vec<&'p mut [T]>> {
-        let [width, height] = self.band.setup.camera.size;
+    fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], height: usize) -> Vec<Vec<&'p mut [T]>> {
+        let [width, rows] = self.band.setup.camera.size;
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
-        bands.resize_with(self.band.rows.len().div_ceil(side), Vec::new);
-        for picture in pictures.chunks_exact_mut(width * height) {
-            let rows = picture[self.band.rows.start * width..self.band.rows.end * width].chunks_mut(side * width);
+        bands.resize_with(self.band.rows.len().div_ceil(height), Vec::new);
+        for picture in pictures.chunks_exact_mut(width * rows) {
+            let rows = picture[self.band.rows.start * width..self.band.rows.end * width].chunks_mut(height * width);
             bands.iter_mut().zip(rows).for_each(|(band, rows)| band.push(rows));
         }
         bands
@@ -80,43 +119,24 @@ pub(in crate::render) struct ResolvedTile<'a> {
 
 enum TileSums<'a> {
     Tile(&'a Tile),
-    Gather(Gather<'a>),
+    Gather(Box<Gather<'a>>),
 }
 
-impl<'a> ResolvedTile<'a> {
-    /// Tile `number` of a band.
-    fn new(band: &'a BandAccumulator<'a>, rect: &'a TileRect, number: usize) -> Self {
-        let sums = match &band.sums {
-            BandSums::Tiles(tiles) => TileSums::Tile(&tiles[number]),
-            BandSums::Cells(lattice, cells) => TileSums::Gather(Gather::new(lattice, (&[cells], band.planes), rect)),
-        };
-        Self { rect, planes: band.planes, sums }
-    }
-
+impl ResolvedTile<'_> {
     /// The planes that may have sums.
     pub(in crate::render) fn used(&self) -> Vec<usize> {
         match &self.sums {
             TileSums::Tile(_) => (0..self.planes).collect(),
-            TileSums::Gather(gather) => gather.used().to_vec(),
+            TileSums::Gather(gather) => gather.used(),
         }
     }
 
-    /// Loads the planes at `count` pixels from `first` on into the first lanes of `planes`.
+    /// Loads the planes at `count` pixels of a row, from `first` on, into the first lanes of `planes`.
     pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         match &mut self.sums {
             TileSums::Tile(tile) => tile.load(first, count, planes),
             TileSums::Gather(gather) => gather.load(first, count, planes),
         }
-    }
-
-    /// The same for a tile with one plane.
-    pub(in crate::render) fn load_one(&mut self, first: usize, count: usize) -> Lane {
-        let mut planes = [Lane::default()];
-        match &mut self.sums {
-            TileSums::Tile(tile) => tile.load(first, count, &mut planes),
-            TileSums::Gather(gather) => planes[0] = gather.load_one(first, count),
-        }
-        planes[0]
     }
 }
 
@@ -141,7 +161,7 @@ impl<T: Copy> Pixels<'_, T> {
     }
 }
 
-/// Splats blocks in order, `batch` at a time, each into all bands that it reaches. A block is decoded once for all
+/// Splats all blocks in order, `batch` at a time, each into all bands that it reaches. A block is decoded once for all
 /// bands that take footprints, and once for all bands that have a lattice.
 pub(in crate::render) fn splat(
     accumulators: &mut [BandAccumulator<'_>],
@@ -150,13 +170,15 @@ pub(in crate::render) fn splat(
 ) -> Result<SplatStats> {
     let (mut tiles, mut cells) = (Vec::new(), Vec::new());
     let planes = accumulators.first().map_or(0, |accumulator| accumulator.planes);
-    for BandAccumulator { band, sums, .. } in accumulators {
+    for BandAccumulator { band, sums, .. } in accumulators.iter_mut() {
         match sums {
             BandSums::Tiles(of_band) => tiles.push((band.clone(), of_band)),
             BandSums::Cells(lattice, of_band) => cells.push((band.clone(), *lattice, of_band)),
+            BandSums::Filtered(..) => {}
         }
     }
     let mut stats = splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
     stats += splat_in_batches(&mut LatticeBands::new(cells), blocks, source)?;
+    accumulators.iter_mut().for_each(BandAccumulator::filter);
     Ok(stats)
 }

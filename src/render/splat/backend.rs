@@ -3,7 +3,7 @@
 //! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
 //! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
 
-use super::lattice::Lattice;
+use super::lattice::{Lattice, SliceError};
 use super::tile_rect::{TILE, pixels_reached};
 use crate::base::grid::{Grid, Region};
 use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
@@ -30,16 +30,29 @@ pub(super) fn footprint_method(config: &RenderConfig) -> Method {
 }
 
 impl SplatBackend {
-    /// Chooses the backend of a view, and the method named in reports. Certified pictures take footprints.
+    /// Chooses the backend of a view, and the method named in reports. Certified pictures take footprints. `slices` is
+    /// the largest number of slices that a ray meets, in units of the largest sum of weights in the picture.
     pub(super) fn choose(
         config: &RenderConfig,
         volume: (&Grid, &Region),
         camera: &Camera,
         footprint: &Footprint,
+        slices: f64,
     ) -> (Self, Method) {
         let error = most_splat_error(config.quantity, config.splat_error);
-        let lattice = (!config.certify).then(|| Lattice::within(error, config.kernel, volume, camera, footprint));
-        match lattice.flatten() {
+        let stated = |slice: SliceError| match config.quantity {
+            Quantity::Mean => slices * slice.of_a_mean(),
+            Quantity::Emission => slices * slice.sum,
+        };
+        let estimated = |slice: SliceError| match config.quantity {
+            Quantity::Mean => slices * slice.of_a_smooth_mean(),
+            Quantity::Emission => slices * slice.of_waves,
+        };
+        let lattice = || match config.quick {
+            true => Lattice::quick(config.kernel, volume, camera, footprint, estimated),
+            false => Lattice::within(error, config.kernel, volume, camera, footprint, stated),
+        };
+        match (!config.certify).then(lattice).flatten() {
             Some((lattice, method)) => (Self::Lattice(Arc::new(lattice)), method),
             None => (Self::Footprints, footprint_method(config)),
         }
@@ -50,10 +63,10 @@ impl SplatBackend {
         matches!(self, Self::Lattice(_))
     }
 
-    /// Pixels per side of a tile.
-    pub(in crate::render) fn tile(&self) -> usize {
+    /// Width and height of a tile in pixels.
+    pub(in crate::render) fn tile(&self) -> [usize; 2] {
         match self {
-            Self::Footprints => TILE,
+            Self::Footprints => [TILE; 2],
             Self::Lattice(lattice) => lattice.tile(),
         }
     }
@@ -76,7 +89,16 @@ impl SplatBackend {
     pub(in crate::render) fn band_sums(&self, width: usize, rows: usize) -> usize {
         match self {
             Self::Footprints => width * rows.next_multiple_of(TILE),
-            Self::Lattice(lattice) => lattice.band_cells(width, rows),
+            // In f32, in f64, and in f32 side by side.
+            Self::Lattice(lattice) => 2 * lattice.band_cells(width, rows),
+        }
+    }
+
+    /// An upper bound of the sums of the whole picture that a lattice keeps: the cells of ones, and scratch for them.
+    pub(in crate::render) fn ones(&self, width: usize, height: usize) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(_) => 3 * self.band_sums(width, height),
         }
     }
 

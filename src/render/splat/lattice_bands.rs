@@ -15,7 +15,7 @@ pub(super) struct LatticeBands<'a, 'c> {
     /// The cells of each band.
     rectangles: Vec<Rectangle>,
     /// Buffers for reuse: fresh memory from the system costs as much as the work done in it.
-    spare: Mutex<Vec<(Scratch, Work)>>,
+    spare: Mutex<Vec<(Scratch, Work<f32>)>>,
 }
 
 /// A block and its location in every band that it reaches.
@@ -45,8 +45,8 @@ impl<'a, 'c> LatticeBands<'a, 'c> {
     /// The location of a block in a band; `None` if it does not reach the band.
     fn locate(&self, band: usize, block: usize) -> Option<Placed> {
         let setup = self.bands[band].setup;
-        let (region, clip) = (setup.blocks.region(block), &setup.clip);
-        self.bands[band].sees(block).then(|| self.lattices[band].placed(&region, clip, &self.rectangles[band]))
+        let region = setup.blocks.region(block);
+        self.bands[band].sees(block).then(|| self.lattices[band].placed(&region, &setup.clip, &self.rectangles[band]))
     }
 }
 

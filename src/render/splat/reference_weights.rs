@@ -3,12 +3,24 @@
 //! They also bound the contribution of voxels beyond a depth, since weights fall as exp(-tau z) (eq 3), so that the
 //! deepest voxels can be left out.
 
+use super::backend::SplatBackend;
 use super::lattice::Shear;
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
+use crate::base::grid::Region;
 use crate::render::config::{RenderConfig, most_splat_error};
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
+
+/// Chooses the backend of a view.
+pub(in crate::render) fn with_backend(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
+    let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
+    let slices = ReferenceWeights::new(&setup, &exact).slices();
+    let volume = (&setup.grid, &setup.clip);
+    (setup.backend, setup.method) = SplatBackend::choose(config, volume, &setup.camera, &setup.footprint, slices);
+    setup.stated_error = setup.method.stated_error;
+    Ok(setup)
+}
 
 /// Leaves out voxels so deep that their contribution fits in the part of the splat error that the method leaves.
 pub(in crate::render) fn without_dim_voxels(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
@@ -37,11 +49,16 @@ impl<'a> ReferenceWeights<'a> {
         Self { setup, footprint, shear: Shear::new(&setup.camera, &setup.grid, 1) }
     }
 
-    /// The sum at a pixel's centre, over the voxels within reach, slice by slice and row by row.
-    pub(in crate::render) fn at(&self, [x, y]: [usize; 2]) -> f64 {
+    /// The sum at a pixel's centre.
+    pub(in crate::render) fn at(&self, pixel: [usize; 2]) -> f64 {
+        self.at_point(pixel.map(|n| n as f64 + 0.5))
+    }
+
+    /// The sum at a point of the picture plane, over the voxels within reach, slice by slice and row by row.
+    fn at_point(&self, point: [f64; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
         let clip = &self.setup.clip;
-        let point = [x as f64 + 0.5 - self.shear.origin[0], y as f64 + 0.5 - self.shear.origin[1]];
+        let point = [0, 1].map(|i| point[i] - self.shear.origin[i]);
         let [_, v] = self.shear.cells(point);
         let half = self.half(1);
         let mut sum = 0.0;
@@ -58,7 +75,7 @@ impl<'a> ReferenceWeights<'a> {
 
     /// An upper bound of the sum at any point of the picture plane.
     ///
-    /// The sum of an infinite slice is largest at the position of a voxel. The number of slices that a ray meets is
+    /// The sum of a slice is largest at the position of a voxel. The number of slices that a ray meets is
     /// limited by their extent, footprints included, and each slice is a step deeper than the last. The ray may meet
     /// the first slice in front of the volume, and voxels of a slice may be nearer than the point where the ray meets
     /// the slice.
@@ -70,6 +87,19 @@ impl<'a> ReferenceWeights<'a> {
         let (deeper, nearer) = (self.deeper(), self.nearer());
         let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - 2.0 * nearer).max(0.0))).sum();
         along * self.slice() * self.footprint.at_depth(self.nearest())
+    }
+
+    /// An upper bound of the sums of all slices that a ray meets, each as if the slice were infinite, as a multiple of
+    /// the largest sum in the picture plane. Near 1, except for volumes that are thin or dimmed.
+    pub(super) fn slices(&self) -> f64 {
+        let Region { start, end } = &self.setup.clip;
+        let point = |share: f64| {
+            let voxel = [0, 1, 2].map(|a| start[a] + ((end[a] - 1 - start[a]) as f64 * share).round() as usize);
+            let [x, y, _] = self.setup.camera.project(self.setup.grid.position(voxel));
+            self.at_point([x, y])
+        };
+        let shares = if self.setup.tau == 0.0 { &[0.5][..] } else { &[0.0, 0.25, 0.5, 0.75, 1.0] };
+        self.most() / shares.iter().map(|share| point(*share)).fold(0.0, f64::max)
     }
 
     /// A depth beyond which all voxels together add at most `share` of the nearest voxel's own weight, and so of the
@@ -101,11 +131,12 @@ impl<'a> ReferenceWeights<'a> {
         self.setup.camera.nearest_of(&self.setup.grid.crop(&self.setup.clip))
     }
 
-    /// The sum of weights of an infinite slice at the position of one of its voxels, in units of that voxel's weight.
+    /// An upper bound of the sum of weights of a slice at any point, in units of a voxel's own weight: the sum at a voxel
+    /// with as many voxels to each side as the volume has.
     fn slice(&self) -> f64 {
-        let rows = self.half(1).ceil() as isize;
         let [b, c] = self.shear.pixels;
-        let most = self.half(0).ceil() as isize;
+        let dims = self.setup.clip.dims();
+        let [most, rows] = [0, 1].map(|i| self.half(i).min(dims[self.shear.axes[i]] as f64).ceil() as isize);
         let weight = |i: isize, j: isize| {
             let [x, y] = [0, 1].map(|n| i as f64 * b[n] + j as f64 * c[n]);
             self.footprint.share([x, y])
@@ -145,4 +176,45 @@ fn around(centre: f64, half: f64, all: Range<usize>) -> Range<usize> {
     let end = (centre + half + 1.0).floor().clamp(0.0, all.end as f64) as usize;
     let start = (centre - half).ceil().clamp(all.start as f64, all.end as f64) as usize;
     start.min(end)..end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::grid::{BlockGrid, Grid};
+    use crate::render::config::{Limit, Mode, Quantity};
+    use crate::view::camera::View;
+    use crate::view::footprint::Kernel;
+
+    /// The setup of a view of 128^3 voxels with the default settings.
+    fn setup(azimuth: f64, elevation: f64, quantity: Quantity) -> ViewSetup {
+        let grid = Grid::unit([128; 3]);
+        let view = View { azimuth, elevation, roll: 0.0, size: [512; 2], scale: Some(2.3), center: None };
+        let config = RenderConfig {
+            mode: Mode::Projection,
+            views: vec![view],
+            kernel: Kernel::of_grid(&grid),
+            quantity,
+            frames: vec![0],
+            region: None,
+            splat_error: 1e-3,
+            quick: false,
+            allowed: None,
+            limited: Limit::Certified,
+            certify: false,
+            memory: 1 << 29,
+        };
+        let setup = ViewSetup::new((grid, BlockGrid::cubes(grid.dims, 32)), &config, &view);
+        setup.and_then(|setup| with_backend(setup, &config)).expect("a valid view")
+    }
+
+    #[test]
+    fn ordinary_views_take_the_lattice() {
+        for (azimuth, elevation) in [(0.0, 0.0), (3.0, 2.0), (17.0, 11.0), (30.0, 30.0), (45.0, 35.26), (80.0, 70.0)] {
+            for quantity in [Quantity::Mean, Quantity::Emission] {
+                let setup = setup(azimuth, elevation, quantity);
+                assert!(setup.backend.is_lattice() && setup.stated_error <= 1e-3, "{azimuth} {elevation} {quantity:?}");
+            }
+        }
+    }
 }

@@ -18,11 +18,11 @@ pub(in crate::render) struct TileRect {
 }
 
 impl TileRect {
-    /// Tiles of `side` pixels per side that cover the rows `y` of a picture `width` pixels wide. Tiles at the right and
-    /// lower edges may be smaller.
-    pub(in crate::render) fn cover(width: usize, y: Range<usize>, side: usize) -> Vec<Self> {
-        let pieces = |r: Range<usize>| r.clone().step_by(side).map(move |s| s..(s + side).min(r.end));
-        pieces(y).flat_map(|y| pieces(0..width).map(move |x| Self { x, y: y.clone() })).collect()
+    /// Tiles of the size `tile` that cover the rows `y` of a picture `width` pixels wide. Tiles at the right and lower
+    /// edges may be smaller.
+    pub(in crate::render) fn cover(width: usize, y: Range<usize>, tile: [usize; 2]) -> Vec<Self> {
+        let pieces = |r: Range<usize>, most: usize| r.clone().step_by(most).map(move |s| s..(s + most).min(r.end));
+        pieces(y, tile[1]).flat_map(|y| pieces(0..width, tile[0]).map(move |x| Self { x, y: y.clone() })).collect()
     }
 
     /// Number of pixels.
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn tiles_cover_each_pixel_once() {
         let mut counts = vec![0; 150 * 100];
-        for rect in TileRect::cover(150, 30..100, TILE) {
+        for rect in TileRect::cover(150, 30..100, [TILE; 2]) {
             for y in rect.y.clone() {
                 rect.x.clone().for_each(|x| counts[y * 150 + x] += 1);
             }

@@ -33,7 +33,7 @@ pub(in crate::render) struct ViewSetup {
 }
 
 impl ViewSetup {
-    /// The setup of a view of `grid`, which is cut into `blocks`.
+    /// The setup of a view of `grid`, which is cut into `blocks`, with footprints.
     ///
     /// # Errors
     /// A region outside the volume, a camera without a picture, or an attenuation that leaves no weights.
@@ -50,8 +50,8 @@ impl ViewSetup {
             let what = "all voxels of the region lie so deep that their weights are beyond numbers";
             return Err(Error::setting("tau", format!("{what} (tau {:e})", config.kernel.tau)));
         }
-        let (backend, method) = SplatBackend::choose(config, (&grid, &clip), &camera, &footprint);
-        let (tau, stated_error, deepest) = (config.kernel.tau, method.stated_error, f64::INFINITY);
+        let (tau, method, deepest) = (config.kernel.tau, footprint_method(config), f64::INFINITY);
+        let (backend, stated_error) = (SplatBackend::Footprints, method.stated_error);
         Ok(Self { camera, footprint, tau, grid, blocks, clip, backend, method, stated_error, deepest })
     }
 

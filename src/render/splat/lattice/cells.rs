@@ -1,5 +1,7 @@
 //! The cells (eq 35) of a band of a picture, with planes of sums.
 
+use crate::base::zeroed::Zeroed;
+use crate::codec::real::Real;
 use std::ops::Range;
 
 /// A rectangle of cells with planes of sums.
@@ -8,9 +10,21 @@ use std::ops::Range;
 /// side by side, so the values that a row of voxels adds to them are side by side, too.
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
-    rectangle: Rectangle,
-    /// Planes without any value are not allocated.
-    planes: Vec<Option<Aligned>>,
+    pub(super) rectangle: Rectangle,
+    /// The sums of ordinary values, plane by plane.
+    pub(super) single: Zeroed<f32>,
+    /// For each plane, the sums of values that sums in f32 cannot hold, and of the middles of blocks. A plane is the sum
+    /// of both.
+    pub(super) planes: Vec<PlaneSums>,
+}
+
+/// The sums of one plane of cells that few planes have.
+#[derive(Debug, Default)]
+pub(super) struct PlaneSums {
+    /// Whether it has sums in f32.
+    pub(super) has_single: bool,
+    /// The sums in f64, allocated with the first value.
+    pub(super) double: Option<Aligned<f64>>,
 }
 
 /// The extent of a rectangle of cells and its layout in memory.
@@ -37,37 +51,42 @@ pub(super) struct Run {
     pub(super) inside: usize,
 }
 
-/// Numbers in a cache line.
-pub(super) const LINE: usize = 8;
+/// Numbers that are processed together.
+pub(super) const LINE: usize = 16;
 
-/// Numbers aligned to cache lines, initially zero.
+/// Numbers whose lines are aligned, initially zero.
 #[derive(Debug, Default)]
-pub(super) struct Aligned {
-    numbers: Vec<f64>,
+pub(super) struct Aligned<R> {
+    numbers: Vec<R>,
     first: usize,
     len: usize,
 }
 
-impl Aligned {
+impl<R: Real> Aligned<R> {
     pub(super) fn of(len: usize) -> Self {
         // Written here: memory that is read before it is written costs twice.
         let mut numbers = Vec::with_capacity(len + LINE - 1);
-        numbers.resize(len + LINE - 1, 0.0);
-        let first = numbers.as_ptr().align_offset(LINE * size_of::<f64>()).min(LINE - 1);
+        numbers.resize(len + LINE - 1, R::default());
+        let first = numbers.as_ptr().align_offset(LINE * size_of::<R>()).min(LINE - 1);
         Self { numbers, first, len }
+    }
+
+    /// The same memory for `len` numbers, if it is large enough; new memory otherwise.
+    pub(super) fn resized(self, len: usize) -> Self {
+        if self.first + len <= self.numbers.len() { Self { len, ..self } } else { Self::of(len) }
     }
 }
 
-impl std::ops::Deref for Aligned {
-    type Target = [f64];
+impl<R> std::ops::Deref for Aligned<R> {
+    type Target = [R];
 
-    fn deref(&self) -> &[f64] {
+    fn deref(&self) -> &[R] {
         &self.numbers[self.first..][..self.len]
     }
 }
 
-impl std::ops::DerefMut for Aligned {
-    fn deref_mut(&mut self) -> &mut [f64] {
+impl<R> std::ops::DerefMut for Aligned<R> {
+    fn deref_mut(&mut self) -> &mut [R] {
         &mut self.numbers[self.first..][..self.len]
     }
 }
@@ -115,17 +134,6 @@ impl Rectangle {
         (0..self.run as isize).contains(&j).then(|| u.rem_euclid(self.phases as isize) as usize * self.run + j as usize)
     }
 
-    /// The cells u, u + q, ... of a row, less than `count` cells from u, that lie in the rectangle: the offset of the
-    /// first of them from u, and their range in the row.
-    pub(super) fn first_in_row(&self, u: isize, count: usize) -> (usize, Range<usize>) {
-        let phases = self.phases;
-        let skipped = ((self.first[0] - u).max(0) as usize).div_ceil(phases);
-        let wanted = count.div_ceil(phases).saturating_sub(skipped);
-        let here = self.in_row(u + (skipped * phases) as isize);
-        let run = here.map_or(0..0, |start| start..start + wanted.min(self.run - start % self.run));
-        (skipped * phases, run)
-    }
-
     /// The range of row v in a plane; `None` outside the rectangle.
     pub(super) fn row(&self, v: isize) -> Option<Range<usize>> {
         let v = usize::try_from(v - self.first[1]).ok().filter(|v| *v < self.size[1])?;
@@ -141,64 +149,79 @@ impl Cells {
 
     /// Cells with all planes at zero.
     pub(super) fn new(rectangle: Rectangle, planes: usize) -> Self {
-        Self { rectangle, planes: (0..planes).map(|_| None).collect() }
-    }
-
-    /// The allocated planes: their indices and sums.
-    pub(super) fn touched(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        let planes = self.planes.iter().enumerate();
-        planes.filter_map(|(number, sums)| sums.as_deref().map(|sums| (number, sums)))
+        let single = Zeroed::new(planes * rectangle.area());
+        Self { rectangle, single, planes: (0..planes).map(|_| PlaneSums::default()).collect() }
     }
 
     /// All planes, for adding values.
     pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
         let rectangle = self.rectangle;
-        self.planes.iter_mut().map(|sums| CellPlane { rectangle, sums }).collect()
+        let single = self.single.chunks_exact_mut(rectangle.area().max(1));
+        // A rectangle without cells has no chunks.
+        let single = single.map(Some).chain(std::iter::repeat_with(|| None)).map(Option::unwrap_or_default);
+        self.planes.iter_mut().zip(single).map(|(sums, single)| CellPlane { rectangle, single, sums }).collect()
     }
 }
 
 impl CellPlane<'_> {
-    /// The sums; allocates them as zeros if necessary.
-    pub(super) fn sums(&mut self) -> &mut [f64] {
-        let area = self.rectangle.area();
-        self.sums.get_or_insert_with(|| Aligned::of(area))
+    /// The sums in f32.
+    pub(super) fn single(&mut self) -> &mut [f32] {
+        self.sums.has_single = true;
+        self.single
     }
 
-    /// Adds the cells of another rectangle.
-    pub(super) fn add(&mut self, rectangle: &Rectangle, sums: &[f64]) {
+    /// The sums in f64; allocates them as zeros if necessary.
+    pub(super) fn double(&mut self) -> &mut [f64] {
+        let area = self.rectangle.area();
+        self.sums.double.get_or_insert_with(|| Aligned::of(area))
+    }
+
+    /// Adds `scale` times the cells of another rectangle to the sums in f32.
+    pub(super) fn add_single(&mut self, rectangle: &Rectangle, sums: &[f32], scale: f32) {
         let own = self.rectangle;
-        let own_sums = self.sums();
-        for (v, from) in (rectangle.first[1]..).zip(sums.chunks_exact(rectangle.size[0])) {
-            let Some(row) = own.row(v) else { continue };
-            let to = &mut own_sums[row];
-            for (phase, from) in from.chunks_exact(rectangle.run).enumerate() {
-                let run = own.run_of(rectangle.first[0] + phase as isize, rectangle.run / LINE);
-                add_to(&mut to[run.start..][..run.here.len() * LINE], &from[run.here.start * LINE..]);
-            }
+        add_rectangle((&own, self.single()), (rectangle, sums), |to, from| add_scaled_single(to, from, scale));
+    }
+
+    /// Adds `scale` times the cells of another rectangle to the sums in f64.
+    pub(super) fn add_double<R: Real>(&mut self, rectangle: &Rectangle, sums: &[R], scale: f64) {
+        let own = self.rectangle;
+        add_rectangle((&own, self.double()), (rectangle, sums), |to, from| add_scaled_double(to, from, scale));
+    }
+}
+
+/// Calls `add(to, from)` for all runs of cells that two rectangles share.
+fn add_rectangle<S, R>(
+    (own, sums): (&Rectangle, &mut [S]),
+    (rectangle, more): (&Rectangle, &[R]),
+    add: impl Fn(&mut [S], &[R]),
+) {
+    for (v, from) in (rectangle.first[1]..).zip(more.chunks_exact(rectangle.size[0])) {
+        let Some(row) = own.row(v) else { continue };
+        let to = &mut sums[row];
+        for (phase, from) in from.chunks_exact(rectangle.run).enumerate() {
+            let run = own.run_of(rectangle.first[0] + phase as isize, rectangle.run / LINE);
+            add(&mut to[run.start..][..run.here.len() * LINE], &from[run.here.start * LINE..]);
         }
     }
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_to(sums: &mut [f64], more: &[f64]) {
-    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+fn add_scaled_single(sums: &mut [f32], more: &[f32], scale: f32) {
+    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += scale * more);
+}
+
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn add_scaled_double<R: Real>(sums: &mut [f64], more: &[R], scale: f64) {
+    sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += scale * more.to_f64());
 }
 
 /// One plane of cells.
 #[derive(Debug)]
 pub(in crate::render) struct CellPlane<'a> {
     pub(super) rectangle: Rectangle,
-    sums: &'a mut Option<Aligned>,
+    single: &'a mut [f32],
+    sums: &'a mut PlaneSums,
 }
-
-/// The number of planes in a bundle, for `planes` planes in total.
-pub(super) fn side_by_side(planes: usize) -> usize {
-    planes.next_power_of_two().min(TOGETHER)
-}
-
-/// The largest number of planes in a bundle: their sums stay in registers, and their cells in the first-level cache for
-/// some pixels.
-pub(super) const TOGETHER: usize = 16;
 
 #[cfg(test)]
 mod tests {
@@ -207,24 +230,19 @@ mod tests {
     #[test]
     fn runs_are_the_cells_within_the_rectangle() {
         let rectangle = Rectangle::holding([-3, 2], [14, 2], 2);
-        assert_eq!((rectangle.first, rectangle.size, rectangle.run), ([-16, 2], [32, 2], 16));
+        assert_eq!((rectangle.first, rectangle.size, rectangle.run), ([-32, 2], [64, 2], 32));
         let run = |start, here, inside| Run { start, here, inside };
-        // Even cells first: -16, -14, ... 14, then -15, -13, ... 15.
+        // Even cells first: -32, -30, ... 30, then -31, -29, ... 31.
         for (u, lines, expected) in [
-            (-16, 1, run(0, 0..1, 0)),
-            (-19, 2, run(16, 1..2, 6)),
-            (-18, 1, run(0, 0..0, 7)),
-            (15, 3, run(24, 0..1, 7)),
-            (16, 3, run(16, 0..0, 0)),
+            (-32, 1, run(0, 0..1, 0)),
+            (-35, 2, run(32, 1..2, 14)),
+            (-34, 1, run(0, 0..0, 15)),
+            (31, 3, run(48, 0..1, 15)),
+            (32, 3, run(32, 0..0, 0)),
         ] {
             assert_eq!(rectangle.run_of(u, lines), expected, "{u}");
         }
-        for (u, count, expected) in
-            [(-16, 4, (0, 0..2)), (-19, 8, (4, 16..18)), (13, 9, (0, 30..32)), (16, 3, (0, 0..0))]
-        {
-            assert_eq!(rectangle.first_in_row(u, count), expected, "{u}");
-        }
-        assert_eq!([1, 2, 3, 4].map(|v| rectangle.row(v)), [None, Some(0..32), Some(32..64), None]);
-        assert_eq!([-17, -16, 1, 15, 16].map(|u| rectangle.in_row(u)), [None, Some(0), Some(24), Some(31), None]);
+        assert_eq!([1, 2, 3, 4].map(|v| rectangle.row(v)), [None, Some(0..64), Some(64..128), None]);
+        assert_eq!([-33, -32, 1, 31, 32].map(|u| rectangle.in_row(u)), [None, Some(0), Some(48), Some(63), None]);
     }
 }

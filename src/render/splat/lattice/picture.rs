@@ -1,8 +1,12 @@
-//! The lattice of one view as a splat backend. A view uses it if its stated error (eq 37) is small enough and it is
-//! less work than footprints.
+//! The lattice of one view as a splat backend. A view uses it if its stated error is small enough and it is less work
+//! than footprints.
 
-use super::cells::{Cells, LINE, Rectangle, side_by_side};
-use super::kernel::{Kernel, SINGLES};
+use super::cells::{Cells, LINE, Rectangle};
+use super::error::SliceError;
+use super::filtered::{FilteredCells, TOGETHER};
+use super::kernel::Kernel;
+use super::prefilter::{self, HALF, Taps};
+use super::product::Product;
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Placed, Spreading};
@@ -17,50 +21,100 @@ use std::ops::Range;
 pub(in crate::render) struct Lattice {
     spreading: Spreading,
     pub(super) kernel: Kernel,
+    /// The kernel as a product, if it is one.
+    pub(super) product: Option<Product>,
+    /// The prefilters along u and v.
+    taps: [Taps; 2],
     /// Reach of the footprint in pixels: farther cells do not influence a pixel.
     reach: f64,
     /// f at its centre.
     pub(super) peak: f64,
-    /// The cells that any voxel reaches: the first along each axis, and their number.
+    /// The cells that any voxel reaches, prefilter included: the first along each axis, and their number.
     bounds: ([isize; 2], [usize; 2]),
 }
 
+/// A bound for a kernel and its cut, a choice, and its prefilters.
+type Bound = fn((&Kernel, f64), (usize, usize), &[Taps; 2]) -> SliceError;
+
 /// Cells per voxel and degrees of splines, roughly from the cheapest on.
-const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
+const CHOICES: [(usize, usize); 8] = [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5), (3, 4), (4, 5)];
 /// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
 /// The largest number of cells of a tile.
 const TILE_CELLS: usize = 4096;
+/// Width of a tile in units of its height.
+const WIDE: usize = 4;
 
 impl Lattice {
-    /// The lattice that splats within `error` (as in [`Method::within`]), and its method for reports; `None` if
-    /// footprints are better.
+    /// The lattice that splats within `error`, and its method for reports; `None` if footprints are better. `stated`
+    /// gives the error of the picture for the error of a slice.
     pub(in crate::render) fn within(
         error: f64,
         gaussian: Gaussian,
         (grid, clip): (&Grid, &Region),
         camera: &Camera,
         footprint: &Footprint,
+        stated: impl Fn(SliceError) -> f64,
     ) -> Option<(Self, Method)> {
         let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
-        let radius = (2.0 * libm::log(20.0 / error)).sqrt(); // leaves half of the error for the lattice
-        for (fineness, degree) in CHOICES.into_iter().filter(|_| error > SINGLES) {
-            let shear = Shear::new(camera, grid, fineness);
-            let kernel = Kernel::new(&shear, sigma, degree, radius);
-            let Some(kernel) = kernel else { continue };
-            let spreading = Spreading { shear, degree, tau: gaussian.tau };
-            let (reach, peak) = (radius * sigma, footprint.at_depth(0.0));
-            let mut lattice = Self { spreading, kernel, reach, peak, bounds: Default::default() };
-            if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
+        let radius = (2.0 * libm::log(1.0 / (CUT * error))).sqrt();
+        for choice in CHOICES.into_iter().filter(|_| error > LEAST) {
+            let lattice = Self::new(choice, (gaussian.tau, sigma, radius), (grid, clip), (camera, footprint));
+            let Some(lattice) = lattice else { continue };
+            if stated(lattice.slice_error(SliceError::at_least)) > error {
                 continue;
             }
-            lattice.bounds = lattice.rectangle(clip);
-            let stated_error = lattice.kernel.error(&shear, sigma, error);
+            let stated_error = stated(lattice.slice_error(SliceError::new));
             if stated_error <= error {
                 return Some((lattice, Method { name: "lattice", radius, stated_error }));
             }
         }
         None
+    }
+
+    /// The fastest lattice, whose error is only estimated: one cell a voxel. `estimated` gives the estimate for the
+    /// picture from the error of a slice.
+    pub(in crate::render) fn quick(
+        gaussian: Gaussian,
+        volume: (&Grid, &Region),
+        camera: &Camera,
+        footprint: &Footprint,
+        estimated: impl Fn(SliceError) -> f64,
+    ) -> Option<(Self, Method)> {
+        let (sigma, radius) = (gaussian.sigma * camera.scale, QUICK_RADIUS);
+        let lattice = Self::new(QUICK, (gaussian.tau, sigma, radius), volume, (camera, footprint))?;
+        let stated_error = estimated(lattice.slice_error(SliceError::new));
+        Some((lattice, Method { name: "lattice-fast", radius, stated_error }))
+    }
+
+    /// The lattice with these cells per voxel and this degree; `None` if footprints are less work, or it does not suit.
+    fn new(
+        (fineness, degree): (usize, usize),
+        (tau, sigma, radius): (f64, f64, f64),
+        (grid, clip): (&Grid, &Region),
+        (camera, footprint): (&Camera, &Footprint),
+    ) -> Option<Self> {
+        let shear = Shear::new(camera, grid, fineness);
+        let kernel = Kernel::new(&shear, sigma, radius)?;
+        let spreading = Spreading { shear, degree, tau };
+        let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
+        let product = Product::new(&shear, sigma, radius);
+        let reach = product.as_ref().map_or_else(|| kernel.reach(&shear), |product| product.reach(&shear));
+        let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
+        let mut lattice = Self { spreading, kernel, product, taps, reach, peak, bounds };
+        if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
+            return None;
+        }
+        let (first, size) = lattice.rectangle(clip);
+        lattice.bounds = (first.map(|n| n - HALF as isize), size.map(|n| n + 2 * HALF));
+        Some(lattice)
+    }
+
+    /// The error of a slice, by one of the bounds.
+    fn slice_error(&self, bound: Bound) -> SliceError {
+        let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
+        let choice = (self.spreading.shear.fineness, self.spreading.degree);
+        bound((&self.kernel, cut), choice, &self.taps)
     }
 
     fn suits(&self) -> bool {
@@ -77,7 +131,7 @@ impl Lattice {
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let positions = [self.position([0.0; 2]), self.kernel.half()];
+        let positions = [self.position([0.0; 2]), self.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
         per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64))
             && positions.iter().all(|n| within(n, 1e9))
@@ -88,8 +142,8 @@ impl Lattice {
         let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
         let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
         let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
-        let (pixels, side) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
-        let copied = area(self.cells_reached(&(0..side), &(0..side)).1) as f64 * pixels / (side * side) as f64;
+        let (pixels, tile) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
+        let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
         GATHERING * self.kernel.cells() as f64 * pixels
             + COPYING * copied
             + SPREADING * clip.voxels() as f64 * (degree + 1.0) * (q + 1.0)
@@ -98,10 +152,9 @@ impl Lattice {
     /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         const VALUES: usize = 3; // in their own type, as f32, as f64
-        let side = self.tile();
-        let tile = area(self.cells_reached(&(0..side), &(0..side)).1.map(|n| n + 2)); // covers rounding and any tile position
-        let bundles = planes.next_multiple_of(side_by_side(planes).max(1));
-        self.block_cells(block) + VALUES * block.voxels() + bundles * tile
+        let tile = area(self.tile_cells(self.tile()).map(|n| n + 2)); // covers rounding and any tile position
+        let padded = planes.next_multiple_of(TOGETHER);
+        self.block_cells(block) + VALUES * block.voxels() + (padded + planes + 1) * tile
     }
 
     /// The cells that the voxels of a region reach: the first along each axis, and their number.
@@ -122,6 +175,11 @@ impl Lattice {
         (low.map(|first| first - pad as isize), [size(0), size(1)])
     }
 
+    /// An upper bound of the distance from a pixel to any cell that counts, along u and v.
+    fn half(&self) -> [f64; 2] {
+        self.product.as_ref().map_or_else(|| self.kernel.half(), Product::half)
+    }
+
     /// The cells of a rectangle of pixels: the first along each axis, and their number.
     pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
         let corners = [x.start, x.end].into_iter().flat_map(|x| [y.start, y.end].map(move |y| [x as f64, y as f64]));
@@ -129,7 +187,7 @@ impl Lattice {
         for position in corners.map(|pixel| self.position(pixel)) {
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
         }
-        let half = self.kernel.half();
+        let half = self.half();
         let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
         (first, [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize))
     }
@@ -143,6 +201,7 @@ impl Lattice {
     /// The columns and rows of the picture that a block can reach. Both are empty if either is.
     pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
         let (first, cells) = self.rectangle(region);
+        let (first, cells) = (first.map(|n| n - HALF as isize), cells.map(|n| n + 2 * HALF));
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
@@ -155,22 +214,34 @@ impl Lattice {
     /// The cells of a band of a picture, with all planes at zero.
     pub(in crate::render) fn cells_of(&self, width: usize, rows: &Range<usize>, planes: usize) -> Cells {
         let ((first, size), (low, most)) = (self.cells_reached(&(0..width), rows), self.bounds);
-        let start = [0, 1].map(|i| first[i].max(low[i]));
-        let end = |i: usize| (first[i] + size[i] as isize).min(low[i] + most[i] as isize);
+        let start = [0, 1].map(|i| (first[i] - HALF as isize).max(low[i]));
+        let end = |i: usize| (first[i] + (size[i] + HALF) as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
     }
 
-    /// Pixels per side of a tile: the largest side whose cells with all planes stay in a core's cache.
-    pub(in crate::render) fn tile(&self) -> usize {
-        let fits = |side: &usize| area(self.cells_reached(&(0..*side), &(0..*side)).1) <= TILE_CELLS;
-        [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1)
+    /// The filtered cells of a band.
+    pub(in crate::render) fn filter(&self, cells: Cells) -> FilteredCells {
+        FilteredCells::new(cells, &self.taps)
+    }
+
+    /// Width and height of a tile in pixels. A square of the height is the largest one whose cells with all planes stay
+    /// in a core's cache. Wide tiles share most cells of a row.
+    pub(in crate::render) fn tile(&self) -> [usize; 2] {
+        let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
+        let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
+        [WIDE * side, side]
+    }
+
+    /// Cells along u and v that a tile reaches.
+    fn tile_cells(&self, [width, height]: [usize; 2]) -> [usize; 2] {
+        self.cells_reached(&(0..width), &(0..height)).1
     }
 
     /// An upper bound of the cells of a plane of a band.
     pub(in crate::render) fn band_cells(&self, width: usize, rows: usize) -> usize {
         let (size, most) = (self.cells_reached(&(0..width), &(0..rows)).1, self.bounds.1);
-        self.held([0, 1].map(|i| (size[i] + 2).min(most[i]))) // covers rounding and any band position
+        self.held([0, 1].map(|i| (size[i] + 2 * HALF + 2).min(most[i]))) // covers rounding and any band position
     }
 
     /// An upper bound of the cells of a plane of a block.
@@ -184,6 +255,14 @@ impl Lattice {
         (size[0] + 3 * self.spreading.shear.fineness * LINE) * size[1]
     }
 }
+
+/// The choice for a quick look, and the cut of its kernel in standard deviations.
+const QUICK: (usize, usize) = (1, 3);
+const QUICK_RADIUS: f64 = 3.5;
+/// The share of the error that is left for the cut of the kernel.
+const CUT: f64 = 0.03;
+/// Smaller errors are below what sums in f32 can promise.
+const LEAST: f64 = 3e-5;
 
 /// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
 /// product from voxels to cells, in units of a product of a footprint.

@@ -2,16 +2,17 @@
 //! [DeBoor](crate::bibliography).
 
 /// The highest degree.
-pub(super) const MOST_DEGREE: usize = 7;
+pub(super) const MOST_DEGREE: usize = 5;
 
 /// Weights of the cells around a position.
 pub(super) type Spread = [f64; MOST_DEGREE + 1];
 
-/// The first cell that a value at `position` reaches, and the weights of this cell and the `degree` cells after it. The
-/// degree must be odd. The weights sum to 1, and their centre of mass is `position`.
+/// The first cell that a value at `position` reaches, and the weights of this cell and the `degree` cells after it.
+/// The weights sum to 1, and their centre of mass is `position`.
 pub(super) fn spread(degree: usize, position: f64) -> (isize, Spread) {
-    let below = position.floor();
-    (below as isize - (degree / 2) as isize, weights(degree, position - below))
+    let start = position - (degree + 1) as f64 / 2.0; // the spline is nonzero for degree + 1 cells from here on
+    let below = start.floor();
+    (below as isize + 1, weights(degree, start - below))
 }
 
 /// The cardinal B-splines that are nonzero at `t` in [0, 1), from left to right, by the recurrence of
@@ -37,7 +38,7 @@ mod tests {
 
     #[test]
     fn weights_sum_to_one_around_the_place() {
-        for degree in [1, 3, 5, 7] {
+        for degree in 1..=MOST_DEGREE {
             for position in [-3.75, -1.0, 0.0, 0.3, 17.999] {
                 let (first, weights) = spread(degree, position);
                 let cells = || (first..).zip(&weights[..=degree]);
@@ -46,6 +47,14 @@ mod tests {
                 assert!((sum - 1.0).abs() < 1e-15 && (centre - position).abs() < 1e-14, "{degree} {position}");
             }
         }
+    }
+
+    #[test]
+    fn the_spline_of_degree_four_by_hand() {
+        let (first, weights) = spread(4, 2.0);
+        let expected = [1.0, 76.0, 230.0, 76.0, 1.0].map(|w| w / 384.0);
+        assert_eq!(first, 0);
+        assert!(weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-15));
     }
 
     #[test]

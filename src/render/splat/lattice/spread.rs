@@ -2,14 +2,19 @@
 //!
 //! All voxels of a slice perpendicular to the principal axis have the same weights. So a row of voxels is convolved
 //! with the weights along u, once for each phase, and a row of cells is a sum of such rows times the weights along v.
+//! A block is summed in f32, then added to its plane. Values that are large compared with their range are spread less
+//! their middle, and the middle by the cells of a block of ones in f64.
 
 use super::Spreading;
+use super::block_values::{BlockValues, fits_single};
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
+use super::shear::Shear;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::render::plane_values::PlaneValues;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// The location of a block's voxels in cells, the same for all planes.
 #[derive(Debug)]
@@ -26,8 +31,12 @@ pub(in crate::render) struct Placed {
     count: [usize; 3],
     first: usize,
     steps: [usize; 3],
-    /// exp(-tau z) from the first voxel along b and c.
+    /// exp(-tau z) of the nearest voxel: the block's cells are in units of it.
+    nearest: f64,
+    /// exp(-tau z) from the first voxel along b and c; empty without attenuation.
     fading: [Vec<f64>; 2],
+    /// The cells of the value 1 at all voxels, once needed.
+    ones: OnceLock<Aligned<f64>>,
 }
 
 /// A slice of a block, perpendicular to the principal axis.
@@ -36,7 +45,7 @@ struct Slice {
     /// The first cell that the first voxel reaches.
     cell: [isize; 2],
     along: Spread,
-    /// Weights along v, times exp(-tau z) of the first voxel.
+    /// Weights along v, times exp(-tau z) of the first voxel in units of the block's nearest one.
     across: Spread,
     /// The voxels along b and along c that reach cells of the planes.
     voxels: [Range<usize>; 2],
@@ -44,11 +53,11 @@ struct Slice {
 
 /// Scratch for spreading a block.
 #[derive(Debug, Default)]
-pub(in crate::render) struct Work {
+pub(in crate::render) struct Work<R> {
     /// Rows of values times their fading, with zeros on both sides.
-    faded: Vec<f64>,
+    faded: Vec<R>,
     /// The block's own cells.
-    sums: Aligned,
+    sums: Aligned<R>,
     /// Number of zeros before a faded row, and the width of a row with its zeros.
     before: usize,
     width: usize,
@@ -63,11 +72,13 @@ impl Placed {
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
         let count = shear.axes.map(|axis| dims[axis]);
-        let fading = [0, 1].map(|i| {
-            let depth = spreading.tau * shear.depths[i];
-            (0..count[i]).map(|n| libm::exp(-depth * n as f64)).collect()
+        let tau = spreading.tau;
+        let fading = [0, 1].map(|i| match tau {
+            0.0 => Vec::new(),
+            _ => (0..count[i]).map(|n| libm::exp(-tau * shear.depths[i] * n as f64)).collect(),
         });
-        let slice = |k| Slice::new(clip.start, spreading, k, [count[0], count[1]], extent);
+        let nearest = nearest_depth(shear, clip.start, count);
+        let slice = |k| Slice::new((clip.start, nearest), spreading, k, [count[0], count[1]], extent);
         let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
             spreading: *spreading,
@@ -76,14 +87,16 @@ impl Placed {
             count,
             first: region.index(clip.start),
             steps: shear.axes.map(stride),
+            nearest: libm::exp(-tau * nearest),
             fading,
+            ones: OnceLock::new(),
             region: *region,
             clip,
         }
     }
 
     /// Adds values to a plane.
-    pub(in crate::render) fn add(&self, values: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work) {
+    pub(in crate::render) fn add(&self, values: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work<f32>) {
         match values {
             PlaneValues::Nothing => {}
             PlaneValues::Single(values) => self.add_all(values, plane, work),
@@ -95,16 +108,39 @@ impl Placed {
     }
 
     /// Adds dense values through the block's own cells, which stay in the second-level cache.
-    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, work: &mut Work) {
-        if work.sums.len() < self.rectangle.area() {
-            work.sums = Aligned::of(self.rectangle.area());
+    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, work: &mut Work<f32>) {
+        let values = BlockValues::new(values);
+        if values.middle != 0.0 {
+            let ones = self.ones.get_or_init(|| self.spread_ones());
+            plane.add_double(&self.rectangle, ones, values.middle * self.nearest);
         }
+        if values.scale != 0.0 {
+            let (sums, scale) = (self.spread(&values, work), values.scale * self.nearest);
+            if values.scale == 1.0 && fits_single(values.largest * self.nearest) {
+                plane.add_single(&self.rectangle, &sums, scale as f32);
+            } else {
+                plane.add_double(&self.rectangle, &sums, scale);
+            }
+            work.sums = sums;
+        }
+    }
+
+    /// The cells of the value 1 at all voxels, in f64.
+    fn spread_ones(&self) -> Aligned<f64> {
+        let ones = vec![1.0; self.region.voxels()];
+        self.spread(&BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 }, &mut Work::default())
+    }
+
+    /// The block's own cells.
+    fn spread<R: Real, S: Real>(&self, values: &BlockValues<'_, R>, work: &mut Work<S>) -> Aligned<S> {
+        let area = self.rectangle.area();
         let mut sums = std::mem::take(&mut work.sums);
-        let own = &mut sums[..self.rectangle.area()];
-        own.fill(0.0);
-        add_block(self, values, own, work);
-        plane.add(&self.rectangle, own);
-        work.sums = sums;
+        if sums.len() != area {
+            sums = sums.resized(area);
+        }
+        sums.fill(S::default());
+        add_block(self, values, &mut sums, work);
+        sums
     }
 
     fn add_one(&self, voxel: u32, value: f64, plane: &mut CellPlane<'_>) {
@@ -114,12 +150,17 @@ impl Placed {
             return;
         }
         let value = value * libm::exp(-tau * shear.depth(voxel));
+        if value == 0.0 {
+            return;
+        }
         let [(u, along), (v, across)] = shear.position(voxel).map(|position| spread(*degree, position));
         for (v, across) in (v..).zip(&across[..=*degree]) {
             let Some(row) = plane.rectangle.row(v) else { continue };
             for (u, along) in (u..).zip(&along[..=*degree]) {
-                if let Some(at) = plane.rectangle.in_row(u) {
-                    plane.sums()[row.start + at] += value * across * along;
+                match plane.rectangle.in_row(u) {
+                    Some(at) if fits_single(value) => plane.single()[row.start + at] += (value * across * along) as f32,
+                    Some(at) => plane.double()[row.start + at] += value * across * along,
+                    None => {}
                 }
             }
         }
@@ -128,15 +169,27 @@ impl Placed {
 
 impl Slice {
     /// The `k`-th slice, of `count` voxels along b and c from `start` on.
-    fn new(start: [usize; 3], spreading: &Spreading, k: usize, count: [usize; 2], extent: &Rectangle) -> Self {
+    fn new(
+        (start, nearest): ([usize; 3], f64),
+        spreading: &Spreading,
+        k: usize,
+        count: [usize; 2],
+        extent: &Rectangle,
+    ) -> Self {
         let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
         let [u, v] = spreading.shear.position(voxel).map(|position| spread(spreading.degree, position));
-        let fading = libm::exp(-spreading.tau * spreading.shear.depth(voxel));
+        let fading = libm::exp(-spreading.tau * (spreading.shear.depth(voxel) - nearest));
         let cell = [u.0, v.0];
         let voxels = [0, 1].map(|i| extent.voxels_reaching(i, cell[i], spreading.degree, count[i]));
         Self { cell, along: u.1, across: v.1.map(|w| w * fading), voxels }
     }
+}
+
+/// The depth of the nearest voxel of a box of voxels. The counts are along b, c and a.
+fn nearest_depth(shear: &Shear, start: [usize; 3], count: [usize; 3]) -> f64 {
+    let deeper = |i: usize| (shear.depths[i] * count[i].saturating_sub(1) as f64).min(0.0);
+    shear.depth(start) + (0..3).map(deeper).sum::<f64>()
 }
 
 /// The cells that slices of `count` voxels along b and c reach.
@@ -153,26 +206,25 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_block<R: Real>(placed: &Placed, values: &[R], sums: &mut [f64], work: &mut Work) {
+fn add_block<R: Real, S: Real>(placed: &Placed, values: &BlockValues<'_, R>, sums: &mut [S], work: &mut Work<S>) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
-        (1, ..=4) => add_slices::<R, 1, 4>(placed, values, sums, work),
-        (1, _) => add_slices::<R, 1, 8>(placed, values, sums, work),
-        (2, ..=2) => add_slices::<R, 2, 2>(placed, values, sums, work),
-        (2, 3) => add_slices::<R, 2, 3>(placed, values, sums, work),
-        (2, _) => add_slices::<R, 2, 4>(placed, values, sums, work),
-        (3, _) => add_slices::<R, 3, 3>(placed, values, sums, work),
-        (_, _) => add_slices::<R, 4, 2>(placed, values, sums, work),
+        (1, ..=4) => add_slices::<R, S, 1, 4>(placed, values, sums, work),
+        (1, _) => add_slices::<R, S, 1, 6>(placed, values, sums, work),
+        (2, ..=2) => add_slices::<R, S, 2, 2>(placed, values, sums, work),
+        (2, _) => add_slices::<R, S, 2, 3>(placed, values, sums, work),
+        (3, _) => add_slices::<R, S, 3, 2>(placed, values, sums, work),
+        (_, _) => add_slices::<R, S, 4, 2>(placed, values, sums, work),
     }
 }
 
 /// Adds all slices, with `Q` cells per voxel. At most `TAPS` voxels along an axis reach a cell.
 #[inline(always)]
-fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
+fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
     placed: &Placed,
-    values: &[R],
-    sums: &mut [f64],
-    work: &mut Work,
+    values: &BlockValues<'_, R>,
+    sums: &mut [S],
+    work: &mut Work<S>,
 ) {
     work.clear(placed, TAPS);
     for first in (0..placed.count[1]).step_by(ROWS) {
@@ -182,11 +234,10 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
             if rows.is_empty() {
                 continue;
             }
-            let values = &values[placed.first + k * placed.steps[2]..];
-            let (live, voxels) = (fade_rows(placed, values, &rows, work), &slice.voxels[0]);
+            let (live, voxels) = (fade_rows(placed, (k, values), &rows, work), &slice.voxels[0]);
             let live = live.start.max(voxels.start / LINE)..live.end.min(voxels.end.div_ceil(LINE));
             if !live.is_empty() {
-                add_rows::<Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
+                add_rows::<S, Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
             }
         }
     }
@@ -195,7 +246,7 @@ fn add_slices<R: Real, const Q: usize, const TAPS: usize>(
 /// Number of rows that are taken through all slices together: the cells that they reach stay in the first-level cache.
 const ROWS: usize = 32;
 
-impl Work {
+impl<S: Real> Work<S> {
     fn clear(&mut self, placed: &Placed, taps: usize) {
         self.before = LINE - 1 + taps - 1;
         self.lines = (self.before + placed.count[0]).div_ceil(LINE);
@@ -203,22 +254,30 @@ impl Work {
         // Rows of zeros follow the last row.
         let rows = ROWS.min(placed.count[1]) + taps - 1;
         self.faded.clear();
-        self.faded.resize(rows * self.width, 0.0);
+        self.faded.resize(rows * self.width, S::default());
     }
 }
 
 /// Computes rows of a slice times their fading. Returns the range of cache lines that hold nonzero values.
 #[inline(always)]
-fn fade_rows<R: Real>(placed: &Placed, values: &[R], rows: &Range<usize>, work: &mut Work) -> Range<usize> {
-    let ([width, ..], [along, across, _]) = (placed.count, placed.steps);
+fn fade_rows<R: Real, S: Real>(
+    placed: &Placed,
+    (k, values): (usize, &BlockValues<'_, R>),
+    rows: &Range<usize>,
+    work: &mut Work<S>,
+) -> Range<usize> {
+    let ([width, ..], [along, across, slices]) = (placed.count, placed.steps);
     let mut live = 0;
     let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
     for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
         let row = &mut row[work.before..][..width];
-        fade(&values[c * across..], along, (placed.fading[1][c], &placed.fading[0]), row);
+        values.load_row(placed.first + k * slices + c * across, along, row);
+        if let [_, ..] = placed.fading[0][..] {
+            fade(row, placed.fading[1][c], &placed.fading[0]);
+        }
         live |= live_lines(row);
     }
-    behind.fill(0.0);
+    behind.fill(S::default());
     let end = if live >> LAST == 1 { width.div_ceil(LINE) } else { 64 - live.leading_zeros() as usize };
     (live.trailing_zeros() as usize).min(end)..end
 }
@@ -226,27 +285,19 @@ fn fade_rows<R: Real>(placed: &Placed, values: &[R], rows: &Range<usize>, work: 
 /// The bit for this line and all lines after it.
 const LAST: usize = 63;
 
-/// Fills a row with every `step`-th value times its fading.
+/// Multiplies a row by its fading.
 #[inline(always)]
-fn fade<R: Real>(values: &[R], step: usize, (scale, fading): (f64, &[f64]), row: &mut [f64]) {
-    if step == 1 {
-        for ((row, value), fading) in row.iter_mut().zip(values).zip(fading) {
-            *row = value.to_f64() * (scale * fading);
-        }
-    } else {
-        for ((row, value), fading) in row.iter_mut().zip(values.iter().step_by(step)).zip(fading) {
-            *row = value.to_f64() * (scale * fading);
-        }
-    }
+fn fade<S: Real>(row: &mut [S], scale: f64, fading: &[f64]) {
+    row.iter_mut().zip(fading).for_each(|(value, fading)| *value = *value * S::of(scale * fading));
 }
 
-/// A bit for each cache line of a row that is not zero.
+/// A bit for each line of a row that is not zero.
 #[inline(always)]
-fn live_lines(row: &[f64]) -> u64 {
+fn live_lines<S: Real>(row: &[S]) -> u64 {
     let mut live = 0;
     for (n, line) in row.chunks(LINE).enumerate() {
-        let bits = line.iter().fold(0, |bits, v| bits | (v.to_bits() << 1)); // the shift drops the sign of zero
-        live |= u64::from(bits != 0) << n.min(LAST);
+        let any = line.iter().fold(false, |any, value| any | (*value != S::default()));
+        live |= u64::from(any) << n.min(LAST);
     }
     live
 }
@@ -254,15 +305,15 @@ fn live_lines(row: &[f64]) -> u64 {
 /// Adds rows of a slice to all cells that they reach, one column of cache lines at a time. Down the rows of voxels c,
 /// the values spread along u stay in registers for all rows of cells that they reach.
 #[inline(always)]
-fn add_rows<const Q: usize, const TAPS: usize>(
+fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
     (slice, rectangle): (&Slice, &Rectangle),
     (rows, live): (&Range<usize>, &Range<usize>),
-    work: &Work,
-    sums: &mut [f64],
+    work: &Work<S>,
+    sums: &mut [S],
 ) {
-    let across = by_phase::<Q, TAPS>(&slice.across);
+    let across = by_phase::<S, Q, TAPS>(&slice.across);
     let top = (slice.cell[1] - rectangle.first[1]) as usize + rows.start * Q;
-    for (phase, along) in by_phase::<Q, TAPS>(&slice.along).into_iter().enumerate() {
+    for (phase, along) in by_phase::<S, Q, TAPS>(&slice.along).into_iter().enumerate() {
         let run = rectangle.run_of(slice.cell[0] + phase as isize, work.lines);
         let reached = live.start..live.end + (run.inside + TAPS - 2) / LINE + 1;
         for n in reached.start.max(run.here.start)..reached.end.min(run.here.end) {
@@ -270,7 +321,7 @@ fn add_rows<const Q: usize, const TAPS: usize>(
             let from = n * LINE + work.before - run.inside + 1 - TAPS;
             let faded = work.faded[from..].chunks(work.width).take(rows.len() + TAPS - 1);
             let mut sums = sums[top * rectangle.size[0] + column..].chunks_mut(rectangle.size[0]);
-            let mut window = [[0.0; LINE]; TAPS];
+            let mut window = [[S::default(); LINE]; TAPS];
             for row in faded {
                 for m in (1..TAPS).rev() {
                     window[m] = window[m - 1];
@@ -286,35 +337,37 @@ fn add_rows<const Q: usize, const TAPS: usize>(
 
 /// The weights of the voxels that reach a cell of each phase: of the voxel at the cell, of the voxel before it, ...
 #[inline(always)]
-fn by_phase<const Q: usize, const TAPS: usize>(weights: &Spread) -> [[f64; TAPS]; Q] {
-    let mut of_phases = [[0.0; TAPS]; Q];
+fn by_phase<S: Real, const Q: usize, const TAPS: usize>(weights: &Spread) -> [[S; TAPS]; Q] {
+    let mut of_phases = [[S::default(); TAPS]; Q];
     for (phase, taps) in of_phases.iter_mut().enumerate() {
-        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = *weight);
+        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::of(*weight));
     }
     of_phases
 }
 
 /// out_j = sum over m of w_m row_(j + TAPS - 1 - m)
 #[inline(always)]
-fn convolved<const TAPS: usize>(row: &[f64], weights: &[f64; TAPS]) -> [f64; LINE] {
+fn convolved<S: Real, const TAPS: usize>(row: &[S], weights: &[S; TAPS]) -> [S; LINE] {
     let row = &row[..LINE + TAPS - 1];
-    let mut out = [0.0; LINE];
+    let mut out = [S::default(); LINE];
     for m in 0..TAPS {
         for l in 0..LINE {
-            out[l] += weights[m] * row[TAPS - 1 - m + l];
+            out[l] = out[l] + weights[m] * row[TAPS - 1 - m + l];
         }
     }
     out
 }
 
 #[inline(always)]
-fn add_weighted<const TAPS: usize>(rows: &[[f64; LINE]; TAPS], weights: &[f64; TAPS], sums: &mut [f64]) {
+fn add_weighted<S: Real, const TAPS: usize>(rows: &[[S; LINE]; TAPS], weights: &[S; TAPS], sums: &mut [S]) {
     let sums = &mut sums[..LINE];
-    let mut more = [0.0; LINE];
+    let mut more = [S::default(); LINE];
     for m in 0..TAPS {
         for l in 0..LINE {
-            more[l] += weights[m] * rows[m][l];
+            more[l] = more[l] + weights[m] * rows[m][l];
         }
     }
-    (0..LINE).for_each(|l| sums[l] += more[l]);
+    for l in 0..LINE {
+        sums[l] = sums[l] + more[l];
+    }
 }

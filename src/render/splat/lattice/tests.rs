@@ -56,7 +56,7 @@ fn each_by_itself(spreading: &Spreading, block: &Region, clip: &Region, values: 
 }
 
 /// Cells per voxel and degree.
-const CHOICES: [(usize, usize); 9] = [(1, 3), (1, 5), (1, 7), (2, 3), (2, 5), (2, 7), (3, 5), (3, 7), (4, 7)];
+const CHOICES: [(usize, usize); 8] = [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5), (3, 4), (4, 5)];
 
 #[test]
 fn slices_spread_like_single_values() {
@@ -101,14 +101,17 @@ fn slices_spread_like_single_values() {
         let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
         let into = planes.planes_mut().into_iter().zip(ways);
         into.for_each(|(mut plane, values)| placed.add(values, &mut plane, &mut work));
-        let touched: Vec<usize> = planes.touched().map(|(number, _)| number).collect();
-        assert!(touched == [0, 1, 2] || touched == [0, 1], "{touched:?}"); // sparse values may all lie outside
+        let planes = touched(&planes);
+        let numbers: Vec<usize> = planes.iter().map(|(number, _)| *number).collect();
+        let some_values = every == 1; // sparse values may all be zero, or lie outside
+        assert!(numbers == [0, 1, 2] || !some_values && numbers.iter().all(|n| *n < 3), "{numbers:?}");
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
         let placed = Placed::new(&spreading, &block, &clip, &whole);
         placed.add(PlaneValues::Double(&values), &mut all.planes_mut()[0], &mut work);
-        let all: BTreeMap<[isize; 2], f64> = all.touched().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
-        for (number, plane) in planes.touched().take(2) {
+        let all = touched(&all);
+        let all: BTreeMap<[isize; 2], f64> = all.iter().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
+        for (number, plane) in planes.iter().filter(|(number, _)| *number < 2) {
             for (cell, sum) in cells_of(&rectangle, plane) {
                 assert_eq!(
                     sum,
@@ -117,15 +120,27 @@ fn slices_spread_like_single_values() {
                 );
             }
         }
-        for (number, plane) in planes.touched() {
+        for (number, plane) in &planes {
             for (cell, sum) in cells_of(&rectangle, plane) {
                 let expected = expected.get(&cell).copied().unwrap_or(0.0);
                 let off = (sum - expected).abs();
-                assert!(off < 1e-10 * (1.0 + expected.abs()), "{seed}, {number}: {sum} for {expected} at {cell:?}");
+                assert!(off < 4e-6 * (1.0 + expected.abs()), "{seed}, {number}: {sum} for {expected} at {cell:?}");
             }
         }
     }
     assert!(cut > 100 && clipped > 100);
+}
+
+/// The planes with sums.
+fn touched(cells: &Cells) -> Vec<(usize, Vec<f64>)> {
+    let single = cells.single.chunks_exact(cells.rectangle.area());
+    let planes = single.zip(&cells.planes).enumerate();
+    let with_sums = planes.filter(|(_, (_, sums))| sums.has_single || sums.double.is_some());
+    let all = |(number, (single, sums)): (usize, (&[f32], &super::cells::PlaneSums))| {
+        let double = |at: usize| sums.double.as_ref().map_or(0.0, |double| double[at]);
+        (number, single.iter().enumerate().map(|(at, sum)| f64::from(*sum) + double(at)).collect())
+    };
+    with_sums.map(all).collect()
 }
 
 /// Every cell of a plane and its sum.

@@ -177,6 +177,7 @@ fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[
         frames: view.frames.clone(),
         region: view.region.map(|_| region(view, scene.grid())),
         splat_error: view.splat_error,
+        quick: false,
         allowed: view.allowed,
         limited: Limit::Expected,
         memory: MEMORY,
