@@ -137,6 +137,7 @@ fn no_signs_of_samples_exceed_the_stated_error() {
         ((45.0, 35.26), 7.0, [1.0; 3]),
         ((200.0, -30.0), 90.0, [0.9, 1.0, 1.0]),
     ];
+    let mut attacked = 0;
     for ((azimuth, elevation), roll, spacing) in attacks {
         let grid = Grid { spacing, ..Grid::unit([7, 6, 8]) };
         let voxels = grid.whole().voxels();
@@ -148,7 +149,10 @@ fn no_signs_of_samples_exceed_the_stated_error() {
             let config = RenderConfig { splat_error, ..exact.clone() };
             let (found, report) = pictures(&mut direct(&memory, None), &config);
             let (expected, _) = pictures(&mut direct(&memory, None), &exact);
-            assert_eq!(report.views[0].method, "lattice", "{azimuth}");
+            if report.views[0].method != "lattice" {
+                continue; // footprints are less work
+            }
+            attacked += 1;
             let (mut errors, mut weights) = (vec![0.0; 2500], vec![0.0; 2500]);
             for (at, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 errors[at % 2500] += (f64::from(*found) - f64::from(*expected)).abs();
@@ -161,6 +165,7 @@ fn no_signs_of_samples_exceed_the_stated_error() {
             assert!(reached > 0.02 * stated, "{azimuth}: {reached:e} is far from {stated:e}");
         }
     }
+    assert!(attacked >= 9, "{attacked} were splatted on a lattice");
 }
 
 #[test]
@@ -281,7 +286,12 @@ fn few_frames_by_value_equal_those_of_a_full_rendering() {
                     for (a, b) in picture.iter().zip(&all[frame * 50 * 45..]) {
                         let same = a.is_nan() && b.is_nan();
                         let off = (f64::from(*a) - f64::from(*b)).abs();
-                        assert!(same || off <= 2.0 * (rounding(*a) + rounding(*b)), "{basis:?}, {frame}: {a} for {b}");
+                        // A lattice sums in f32.
+                        let sums = if splat_error > 0.0 { 1e-6 * f64::from(b.abs()) } else { 0.0 };
+                        assert!(
+                            same || off <= sums + 2.0 * (rounding(*a) + rounding(*b)),
+                            "{basis:?}, {frame}: {a} for {b}"
+                        );
                     }
                 }
             }
