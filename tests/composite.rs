@@ -187,7 +187,7 @@ fn the_bound_holds_for_the_largest_value() {
 /// A small object in an empty volume, in front of a wall that hides everything behind it.
 fn scene_with_a_wall(grid: &Grid) -> Vec<f64> {
     let value = |[x, y, z]: [usize; 3], t: usize| match y {
-        y if y > grid.dims[1] - 19 => 0.0,
+        y if y > grid.dims[1] - 25 => 0.0,
         y if y > grid.dims[1] - 35 => 4.0 + 0.1 * ((x + z + t) as f64).sin(),
         _ => 2.0 + (0.3 * (x + y + z + t) as f64).sin(),
     };

@@ -201,7 +201,7 @@ pub(crate) fn bits(picture: &[f32]) -> Vec<u32> {
 pub(crate) fn under_less_memory(scene: &mut dyn wavesplat::render::Scene, config: &RenderConfig) -> usize {
     let (first, errors, _) = rendered(scene, config);
     let mut count = 0;
-    for memory in [MEMORY, 48 << 20, 40 << 20, 32 << 20, 28 << 20, 24 << 20, 18 << 20, 14 << 20, 11 << 20, 9 << 20] {
+    for memory in [MEMORY, 160 << 20, 96 << 20, 64 << 20, 48 << 20, 32 << 20, 24 << 20, 18 << 20, 14 << 20, 10 << 20] {
         let config = RenderConfig { memory, ..config.clone() };
         let found = rendered_if_it_can_be(scene, &config);
         if let Err(Error::Setting { setting: "memory", .. }) = found {

@@ -153,8 +153,8 @@ impl Lattice {
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         const VALUES: usize = 3; // in their own type, as f32, as f64
         let tile = area(self.tile_cells(self.tile()).map(|n| n + 2)); // covers rounding and any tile position
-        let padded = planes.next_multiple_of(TOGETHER);
-        self.block_cells(block) + VALUES * block.voxels() + (padded + planes + 1) * tile
+        let in_f32 = planes.next_multiple_of(TOGETHER).div_ceil(2);
+        self.block_cells(block) + VALUES * block.voxels() + (in_f32 + planes + 1) * tile
     }
 
     /// The cells that the voxels of a region reach: the first along each axis, and their number.
