@@ -209,8 +209,8 @@ fn transparent_and_hidden_blocks_are_not_read() {
     let off = found.iter().zip(&whole).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(off < 1e-5, "{off:e}");
     assert!(report.blocks_transparent > report.blocks / 10 && of_all.blocks_transparent == 0, "{report:?}");
-    assert!(report.blocks_hidden > 0);
-    assert!(report.blocks_read < report.blocks / 2, "{report:?}");
+    assert!(report.blocks_hidden > report.blocks / 10, "{report:?}");
+    assert_eq!(report.blocks_read, report.blocks - report.blocks_transparent - report.blocks_hidden);
 }
 
 #[test]
