@@ -162,6 +162,15 @@ impl TransferFunction {
         &self.opacity
     }
 
+    /// The points (value, colour) between which colours are interpolated, ascending by value.
+    pub(crate) fn colour_points(&self) -> Vec<(f64, Colour)> {
+        let (lo, hi) = self.range;
+        match &self.colours {
+            Colours::Named(named) => named.points().map(|(share, c)| (lo + share * (hi - lo), c)).collect(),
+            Colours::Points(points, _) => points.clone(),
+        }
+    }
+
     /// The values of the first and the last opacity.
     pub(crate) fn opacity_range(&self) -> (f64, f64) {
         (self.opacity[0].0, self.opacity[self.opacity.len() - 1].0)

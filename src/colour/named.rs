@@ -23,6 +23,12 @@ impl Named {
         self.name == "coolwarm"
     }
 
+    /// The colours, and their shares of the range, 0 to 1.
+    pub(super) fn points(&self) -> impl Iterator<Item = (f64, Colour)> {
+        let last = (self.colours.len() - 1) as f64;
+        self.colours.iter().enumerate().map(move |(n, colour)| (n as f64 / last, *colour))
+    }
+
     /// The colour at a share of the range, 0 to 1.
     pub(super) fn colour(&self, t: f64) -> Colour {
         let index = t * (self.colours.len() - 1) as f64;

@@ -152,12 +152,10 @@ fn add_part(
             lights[i][c] = entry[c] + rests[i] * entry[4 + c];
             sum[c] += lights[i][c];
         }
+        opacities[i] = -lights[i][3];
     }
     if sum[3] == 0.0 {
         return before;
-    }
-    for i in 0..GROUP {
-        opacities[i] = -lights[i][3];
     }
     let shares = shares(&opacities, lengths);
     sum = [0.0; 4];

@@ -17,7 +17,7 @@ pub(super) struct Taps {
     pub(super) first: i64,
     /// Weights of sum 1.
     pub(super) weights: Vec<f32>,
-    /// The sum of the kernel at all of these voxels; about 1 unless the kernel is narrow.
+    /// The sum of the kernel at all voxels; about 1 unless the kernel is narrow.
     pub(super) density: f64,
 }
 
@@ -25,14 +25,15 @@ impl Taps {
     /// The weights at a position in voxels, of a Gaussian whose standard deviation is `sigma` voxels.
     pub(super) fn new(position: f64, sigma: f64) -> Self {
         let (below, reach) = (position.floor(), reach(sigma) as i64);
-        let squares: Vec<f64> = (1 - reach..=reach).map(|n| (position - below - n as f64).powi(2)).collect();
-        let nearest = squares.iter().copied().fold(f64::INFINITY, f64::min);
-        let decay = 0.5 / (sigma * sigma);
-        let shares: Vec<f64> = squares.iter().map(|square| libm::exp((nearest - square) * decay)).collect();
+        let square = |n: i64| (position - below - n as f64).powi(2);
+        let (nearest, decay) = (square(0).min(square(1)), 0.5 / (sigma * sigma));
+        let share = |n: i64| libm::exp((nearest - square(n)) * decay);
+        let shares: Vec<f64> = (1 - reach..=reach).map(share).collect();
         let sum: f64 = shares.iter().sum();
+        let cut: f64 = (reach..3 * reach).map(|n| share(n + 1) + share(-n)).sum();
         let weights = shares.iter().map(|share| (share / sum) as f32).collect();
         let peak = libm::exp(-nearest * decay) / ((2.0 * std::f64::consts::PI).sqrt() * sigma);
-        Self { first: below as i64 + 1 - reach, weights, density: sum * peak }
+        Self { first: below as i64 + 1 - reach, weights, density: (sum + cut) * peak }
     }
 
     /// The weights that meet the voxels from 0 to `count`, for a kernel moved by `by` voxels: the first such voxel, and
@@ -70,7 +71,7 @@ mod tests {
                 let gauss = |n: f64| (-0.5 * ((position - n) / sigma).powi(2)).exp();
                 let all: f64 = (-60..60).map(|n| gauss(f64::from(n))).sum();
                 let density = all / ((2.0 * std::f64::consts::PI).sqrt() * sigma);
-                assert!((taps.density - density).abs() < 2e-4 * density.max(1e-300), "{sigma} {position}");
+                assert!((taps.density - density).abs() < 1e-9 * density.max(1e-300), "{sigma} {position}");
                 for (i, weight) in taps.weights.iter().enumerate().filter(|_| all > 1e-200) {
                     let expected = gauss((taps.first + i as i64) as f64) / all;
                     assert!((f64::from(*weight) - expected).abs() < 2e-4, "{sigma} {position} {i}");

@@ -62,9 +62,11 @@ pub(super) struct Slice {
 const MOST: usize = 64;
 /// Pixels per voxel from which on several cells per voxel show.
 const FEW_PIXELS: f64 = 0.8;
-/// The default distance of slices and cells in standard deviations of the kernel.
+/// The default distance of cells, and of slices for largest values, in standard deviations of the kernel.
 const FINE: f64 = 2.0 / 3.0;
-/// With the default distance of slices, opacities may change by this within an eighth of the range of values.
+/// The default distance of slices for smooth opacities.
+const COARSE: f64 = 4.0 / 3.0;
+/// Opacities of a voxel are smooth if they change by no more than this within an eighth of the range of values.
 const SMOOTH: f64 = 0.1;
 /// Cells around the picture that interpolation needs.
 const RIM: f64 = 2.0;
@@ -83,14 +85,12 @@ impl SlicedView {
         if let Some(wrong) = config.mode.slices().filter(|n| !(1..=MOST).contains(n)) {
             return Err(Error::setting("slices", format!("takes 1 to {MOST} per voxel, not {wrong}")));
         }
-        let default = |sigma: f64| (1.0 / FINE / sigma - 1e-6).ceil().clamp(1.0, 8.0) as usize;
         let pixels = shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
-        let across = if pixels < FEW_PIXELS { 1 } else { default(sigma[0].min(sigma[1])) };
+        let across = if pixels < FEW_PIXELS { 1 } else { per_voxel(FINE * sigma[0].min(sigma[1])) };
         let cells = config.mode.slices().unwrap_or(across);
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
-        let slices = default(sigma[2]) * more_slices(&config.mode, voxel, grid);
-        let fineness = config.mode.slices().unwrap_or(slices);
+        let fineness = config.mode.slices().unwrap_or_else(|| default_slices(&config.mode, sigma[2], (voxel, grid)));
         let step = voxel / fineness as f64;
         let mut cut = Self {
             camera,
@@ -234,16 +234,22 @@ impl SlicedView {
     }
 }
 
-/// How many times as many slices as for smooth opacities a mode needs. `voxel` is the length of a ray along which it
+/// The default number of slices per voxel for a kernel of `sigma` voxels. `voxel` is the length of a ray along which it
 /// crosses a voxel.
-fn more_slices(mode: &Mode, voxel: f64, grid: &Grid) -> usize {
+fn default_slices(mode: &Mode, sigma: f64, (voxel, grid): (f64, &Grid)) -> usize {
     match mode {
         Mode::Composite { transfer, unit, .. } => {
             let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());
-            (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 4.0) as usize
+            let sharp = (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 8.0) as usize;
+            sharp * per_voxel(COARSE * sigma)
         }
-        _ => 1,
+        _ => per_voxel(FINE * sigma),
     }
+}
+
+/// The number of slices or cells per voxel that are at most `distance` voxels apart; at most 8.
+fn per_voxel(distance: f64) -> usize {
+    (1.0 / distance - 1e-6).ceil().clamp(1.0, 8.0) as usize
 }
 
 fn ends(values: impl Iterator<Item = f64>, rim: f64) -> [f64; 2] {
