@@ -34,6 +34,7 @@ Examples:
   wavesplat-tools bench size mine.npy --tolerances 1e-2,1e-3
   wavesplat-tools bench layers mine.npy -o layers
   wavesplat-tools bench speed -o speed
+  wavesplat-tools bench speed --against other/target/release -o speed
 
 wavesplat's own instruments: the demo, the gallery, synthetic archives, differences of pictures and the benchmark.";
 
@@ -200,6 +201,9 @@ struct SpeedArgs {
     /// Small archives and pictures: whether everything works, in seconds
     #[arg(long)]
     small: bool,
+    /// Compare this build's wavesplat-render with the one in this folder instead: the same pictures by both, in turns
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["large", "peers", "spacings", "threads"])]
+    against: Option<PathBuf>,
     /// Also look at the memory of converting 4 GiB and 20 GiB, which are written to the folder of results
     #[arg(long)]
     large: bool,
@@ -384,7 +388,11 @@ fn bench_layers(args: &LayersArgs) -> Result<()> {
 }
 
 fn bench_speed(args: &SpeedArgs) -> Result<()> {
-    let (_, tables) = speed::run(&args.config()?, &mut say)?;
+    let config = args.config()?;
+    let tables = match &args.against {
+        Some(folder) => speed::against::run(&config, folder, &mut say)?,
+        None => speed::run(&config, &mut say)?.1,
+    };
     wavesplat::cli::print(&tables)
 }
 

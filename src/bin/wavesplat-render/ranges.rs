@@ -25,6 +25,9 @@ const PIXELS_APART: f64 = 1.0;
 /// since a wide kernel averages extremes away.
 const SIGMA: f64 = 0.5;
 
+/// The splat error of small pictures; it is small compared with what they leave out.
+const SPLAT_ERROR: f64 = 0.02;
+
 /// The number of frames in which to look for a range, and the number of samples up to which there are more than the
 /// least.
 const LEAST_FRAMES: usize = 4;
@@ -51,6 +54,7 @@ fn small(config: &RenderConfig) -> RenderConfig {
         view.scale = view.scale.map(|s| s * shrink);
     }
     small.certify = false;
+    (small.quick, small.splat_error) = (true, small.splat_error.max(SPLAT_ERROR));
     small.mode = match config.mode {
         Mode::Projection => Mode::Projection,
         // The colours of a composite are those of its samples, and the largest samples along rays are enough to find

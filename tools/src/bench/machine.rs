@@ -42,6 +42,12 @@ impl Provenance {
         let date = date.cloned().unwrap_or_else(today);
         Self { schema, version: env!("CARGO_PKG_VERSION").into(), machine: Machine::this(), date }
     }
+
+    /// The version, the machine and the day.
+    pub(super) fn words(&self) -> String {
+        let cpu = self.machine.cpu.as_deref().unwrap_or("unknown processor");
+        format!("wavesplat {} on {cpu}, {}, {}", self.version, self.machine.system, self.date)
+    }
 }
 
 fn cpu() -> Option<String> {

@@ -16,6 +16,7 @@
 //! archives    the archives of a run, and all measurements of one
 //! heap        rows about memory
 //! paper       rows of the paper's table 1
+//! against     another comparison: this build's `wavesplat-render` beside another build's
 //! ```
 
 mod measured;
@@ -33,6 +34,7 @@ mod peers;
 mod archives;
 mod heap;
 mod paper;
+pub mod against;
 
 pub use measured::{Measured, Time};
 pub use results::{Archive, Results, Row, SCHEMA};

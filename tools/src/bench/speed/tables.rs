@@ -3,7 +3,6 @@
 use super::measured::{Measured, Time, further};
 use super::plan::{FINEST, LOOSER, WHOLE};
 use super::results::{Archive, Results, Row};
-use crate::bench::machine::Provenance;
 use std::fmt::Write as _;
 
 const HEAD: &str = "\
@@ -32,10 +31,8 @@ pub(super) fn markdown(results: &Results) -> String {
 }
 
 fn made(results: &Results) -> String {
-    let Results { made: Provenance { machine, version, date, .. }, rounds, size, .. } = results;
-    let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
-    let mut text =
-        format!("wavesplat {version} on {cpu}, {}, {date}; {rounds} round(s), {size}x{size} pixels.\n", machine.system);
+    let Results { made, rounds, size, .. } = results;
+    let mut text = format!("{}; {rounds} round(s), {size}x{size} pixels.\n", made.words());
     for Archive { data, .. } in &results.archives {
         let _ = write!(text, "\n- {}", data.in_words());
     }
