@@ -54,7 +54,6 @@ fn small(config: &RenderConfig) -> RenderConfig {
         view.scale = view.scale.map(|s| s * shrink);
     }
     small.certify = false;
-    (small.quick, small.splat_error) = (true, small.splat_error.max(SPLAT_ERROR));
     small.mode = match config.mode {
         Mode::Projection => Mode::Projection,
         // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
@@ -62,6 +61,12 @@ fn small(config: &RenderConfig) -> RenderConfig {
         Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
     };
     small
+}
+
+/// The same pictures, less exact.
+fn rough(small: &RenderConfig) -> RenderConfig {
+    let quick = matches!(small.mode, Mode::Projection);
+    RenderConfig { quick, splat_error: small.splat_error.max(SPLAT_ERROR), ..small.clone() }
 }
 
 /// At most `count` frames, spread over the archive.
@@ -188,8 +193,9 @@ impl Ranges {
         check(scene, config)?; // before small pictures are rendered, so that errors name the full size
         let small = small(config);
         if of_pictures {
-            let values = values_of_overview(scene, &small, common)?;
-            ranges.set_values(values.map_or_else(|| values_of_frames(scene, &small, common), Ok)?);
+            let rough = rough(&small);
+            let values = values_of_overview(scene, &rough, common)?;
+            ranges.set_values(values.map_or_else(|| values_of_frames(scene, &rough, common), Ok)?);
         }
         if of_errors {
             let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
