@@ -7,25 +7,34 @@
 //! w(p) = sum over cells c of G(p - c) T(c)        G(d) = exp(-(uu du^2 + 2 uv du dv + vv dv^2) / 2)        (eq 37)
 //! ```
 //!
-//! with T the filtered splines of a voxel, and uu, uv, vv the inverse of the footprint's covariance in cells. In a row
-//! of cells G is a Gaussian along u, whose middle moves by uv / uu from row to row, times one across the rows:
+//! with T the filtered splines of a voxel, and uu, uv, vv the inverse of the footprint's covariance in cells. For a pixel
+//! at (s, t) after a cell, the weight of the cell (m, n) beside it is a product of one factor for each column, one for
+//! each row, one for the pixel, and one that is the same for all pixels:
 //!
 //! ```text
-//! uu du^2 + 2 uv du dv + vv dv^2 = uu (du + dv uv / uu)^2 + (vv - uv^2 / uu) dv^2
+//! G(s - m, t - n) = exp(-uu (s - m)^2 / 2 + uv m t) exp(-vv (t - n)^2 / 2 + uv n s) exp(-uv s t) exp(-uv m n)
 //! ```
 
-use super::axis::{AxisKernel, VECTOR};
+use super::axis::{PHASES, Phases, VECTOR, half, interpolated, split};
 use super::shear::Shear;
+use std::ops::Range;
 
 /// The kernel of a view.
 #[derive(Debug, Clone)]
 pub(super) struct Kernel {
     /// The inverse of its covariance in cells: uu, uv, vv.
     inverse: [f64; 3],
-    /// Along a row of cells.
-    along: AxisKernel,
-    /// Across the rows.
-    across: AxisKernel,
+    /// The kernel is cut at this number of standard deviations or beyond.
+    radius: f64,
+    /// Cells to each side with a weight, along u and v.
+    half: [usize; 2],
+    /// The factors of columns and of rows: a Gaussian, and exp(uv m t).
+    columns: [Phases; 2],
+    rows: [Phases; 2],
+    /// exp(-uv m n) for each row n.
+    cross: Vec<f32>,
+    /// The cells of each row with a weight.
+    spans: Vec<Range<usize>>,
 }
 
 impl Kernel {
@@ -35,9 +44,18 @@ impl Kernel {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
         let inverse = [b[0] * b[0] + b[1] * b[1], b[0] * c[0] + b[1] * c[1], c[0] * c[0] + c[1] * c[1]];
-        let [conditional, marginal] = [conditional_sigmas(inverse)[0], sigmas(inverse)[1]];
-        let [along, across] = [AxisKernel::new(conditional, radius)?, AxisKernel::new(marginal, radius)?];
-        Some(Self { inverse, along, across })
+        let [uu, uv, vv] = inverse;
+        let [u, v] = sigmas(inverse);
+        let half = [half(u, radius)?, half(v, radius)?];
+        let gaussian = |i: f64| move |t: f64, n: isize| libm::exp(-0.5 * i * (t - n as f64) * (t - n as f64));
+        let tilt = |t: f64, n: isize| libm::exp(uv * n as f64 * t);
+        let columns = [Phases::new(half[0], gaussian(uu)), Phases::new(half[0], tilt)];
+        let rows = [Phases::new(half[1], gaussian(vv)), Phases::new(half[1], tilt)];
+        let number = |i: usize, n: usize| n as f64 + 1.0 - half[i] as f64;
+        let cross = |n: usize| (0..columns[0].padded).map(move |m| libm::exp(-uv * number(0, m) * number(1, n)) as f32);
+        let cross = (0..2 * half[1]).flat_map(cross).collect();
+        let spans = (0..2 * half[1]).map(|n| span(inverse, radius, (half[0], number(1, n)))).collect();
+        Some(Self { inverse, radius, half, columns, rows, cross, spans })
     }
 
     /// The standard deviations along u and along v, in cells.
@@ -50,43 +68,55 @@ impl Kernel {
         conditional_sigmas(self.inverse)
     }
 
-    /// The largest share of the kernel's sum over all cells that its weights leave out or get wrong.
+    /// The largest share of the kernel's sum over all cells that its weights leave out or get wrong: the mass beyond the
+    /// cut at a few positions of the pixel, with a margin, and the interpolation between phases.
     pub(super) fn cut(&self) -> f64 {
-        self.along.cut + self.across.cut
+        let places = || (0..PLACES).map(|n| n as f64 / (PLACES - 1) as f64);
+        let left_out = |u: f64| places().map(move |v| self.left_out([u, v])).fold(0.0, f64::max);
+        let ([u, v], uv) = (self.sigmas(), self.inverse[1].abs() / PHASES as f64);
+        // exp(uv m t) is off by (uv m / PHASES)^2 / 8; m is off the pixel by the deviation along its axis.
+        let tilts: f64 = [u, v].map(|sigma| uv * uv * (sigma * sigma + 1.0) / 8.0).iter().sum();
+        let gaussians: f64 = self.conditional_sigmas().map(interpolated).iter().sum();
+        MARGIN * places().map(left_out).fold(0.0, f64::max) + gaussians + tilts
+    }
+
+    /// The share of the kernel's sum over all cells that its spans leave out, at a position after a cell.
+    fn left_out(&self, position: [f64; 2]) -> f64 {
+        let (mut all, mut held) = (0.0, 0.0);
+        let [across, down] = self.half.map(|half| half as isize + 4);
+        for n in 1 - down..=down {
+            let row = usize::try_from(n - 1 + self.half[1] as isize).ok().and_then(|n| self.spans.get(n));
+            for m in 1 - across..=across {
+                let weight = gaussian(self.inverse, [position[0] - m as f64, position[1] - n as f64]);
+                let cell = usize::try_from(m - 1 + self.half[0] as isize).ok();
+                let is_held = row.zip(cell).is_some_and(|(span, m)| span.contains(&m));
+                (all, held) = (all + weight, if is_held { held + weight } else { held });
+            }
+        }
+        1.0 - held / all
     }
 
     /// Number of cells with a weight.
     pub(super) fn cells(&self) -> usize {
-        self.along.cells * self.across.cells
-    }
-
-    /// Cells by which the middle of a row moves along u, for each row towards the pixel.
-    fn slant(&self) -> f64 {
-        self.inverse[1] / self.inverse[0]
+        self.spans.iter().map(ExactSizeIterator::len).sum()
     }
 
     /// An upper bound of the distance from a pixel to any cell with a weight, along u and v.
     pub(super) fn half(&self) -> [f64; 2] {
-        let [along, across] = [&self.along, &self.across].map(|axis| (axis.cells / 2) as f64);
-        [along + self.slant().abs() * across, across]
+        self.half.map(|half| half as f64)
     }
 
-    /// The largest distance in pixels, along x or y, from a pixel to any cell with a weight.
-    pub(super) fn reach(&self, shear: &Shear) -> f64 {
-        let [along, across] = [&self.along, &self.across].map(|axis| (axis.cells / 2) as f64);
-        let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / shear.fineness as f64));
-        let corner = |along: f64| {
-            let u = along - self.slant() * across;
-            (u * b[0] + across * c[0]).abs().max((u * b[1] + across * c[1]).abs())
-        };
-        corner(along).max(corner(-along))
+    /// An upper bound of the distance in pixels, along x or y, from a pixel to any cell with a weight: within the cut for
+    /// some position of the pixel between two cells.
+    pub(super) fn reach(&self, shear: &Shear, sigma: f64) -> f64 {
+        let cell = |i: usize| shear.pixels.iter().map(|step| (step[i] / shear.fineness as f64).abs()).sum::<f64>();
+        self.radius * sigma + cell(0).max(cell(1))
     }
 
     /// G at an offset (eq 37).
     #[cfg(test)]
-    pub(super) fn gaussian(&self, [u, v]: [f64; 2]) -> f64 {
-        let [uu, uv, vv] = self.inverse;
-        (-0.5 * ((uu * u + 2.0 * uv * v) * u + vv * v * v)).exp()
+    pub(super) fn gaussian(&self, offset: [f64; 2]) -> f64 {
+        gaussian(self.inverse, offset)
     }
 
     /// Computes the weights of a pixel at `position` (eq 37).
@@ -94,6 +124,35 @@ impl Kernel {
         fill(self, position, out);
     }
 }
+
+/// Positions of a pixel between two cells, along each axis, at which the cut is measured, and the margin for others.
+const PLACES: usize = 5;
+const MARGIN: f64 = 1.1;
+
+/// G at an offset (eq 37).
+fn gaussian([uu, uv, vv]: [f64; 3], [u, v]: [f64; 2]) -> f64 {
+    libm::exp(-0.5 * ((uu * u + 2.0 * uv * v) * u + vv * v * v))
+}
+
+/// The cells of row `n` that are within the cut for some position of the pixel after a cell.
+fn span([uu, uv, vv]: [f64; 3], radius: f64, (half, n): (usize, f64)) -> Range<usize> {
+    // The middle of the row, and half its width, for rows at a distance of n - t.
+    let (slant, rest) = (uv / uu, vv - uv * uv / uu);
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    for step in 0..=STEPS {
+        let v = step as f64 / STEPS as f64 - n;
+        let squared = (radius * radius - rest * v * v) / uu;
+        if squared >= 0.0 {
+            let (middle, width) = (slant * v, squared.sqrt());
+            ends = [ends[0].min(middle - width), ends[1].max(middle + width + 1.0)];
+        }
+    }
+    let cell = |end: f64| (end + half as f64 - 1.0).clamp(0.0, 2.0 * half as f64) as usize;
+    if ends[0] > ends[1] { 0..0 } else { cell(ends[0].ceil())..cell(ends[1].floor() + 1.0) }
+}
+
+/// Positions between two rows that give the cells of a row.
+const STEPS: usize = 8;
 
 fn sigmas([uu, uv, vv]: [f64; 3]) -> [f64; 2] {
     let det = uu * vv - uv * uv;
@@ -107,47 +166,79 @@ fn conditional_sigmas([uu, _, vv]: [f64; 3]) -> [f64; 2] {
 /// The weights of the cells of a pixel, row by row.
 #[derive(Debug)]
 pub(super) struct Weights {
-    /// The first row of cells.
-    top: isize,
-    /// The first cell of each row.
-    first: Vec<isize>,
-    /// The weights of all rows, padded, and the number of cells in a row.
+    /// The first column and row of cells.
+    first: [isize; 2],
+    /// The cells of each row with a weight.
+    spans: Vec<Range<usize>>,
+    /// The weights of all rows, padded.
     rows: Vec<f32>,
-    cells: usize,
-    across: Vec<f32>,
+    /// The factors of columns and of rows, and room for others.
+    columns: [Vec<f32>; 2],
+    across: [Vec<f32>; 2],
 }
 
 impl Weights {
     /// Allocates the weights for a kernel.
     pub(super) fn of(kernel: &Kernel) -> Self {
-        let (width, height) = (kernel.along.padded, kernel.across.cells);
-        let across = vec![0.0; kernel.across.padded];
-        Self { top: 0, first: vec![0; height], rows: vec![0.0; width * height], cells: kernel.along.cells, across }
+        let (width, height) = (kernel.columns[0].padded, kernel.rows[0].padded);
+        let (columns, across) = ([0, 1].map(|_| vec![0.0; width]), [0, 1].map(|_| vec![0.0; height]));
+        let (rows, spans) = (vec![0.0; width * kernel.spans.len()], kernel.spans.clone());
+        Self { first: [0; 2], spans, rows, columns, across }
     }
 
     /// For each row: v, u of its first cell, and the weights from there on.
     #[inline(always)]
     pub(super) fn rows(&self) -> impl Iterator<Item = (isize, isize, &[f32])> {
-        let rows = self.rows.chunks_exact(self.rows.len() / self.first.len());
-        (self.top..).zip(&self.first).zip(rows).map(|((v, u), weights)| (v, *u, &weights[..self.cells]))
+        let rows = self.rows.chunks_exact(self.columns[0].len()).zip(&self.spans);
+        let [u, v] = self.first;
+        (v..).zip(rows).map(move |(v, (row, span))| (v, u + span.start as isize, &row[span.clone()]))
     }
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn fill(kernel: &Kernel, [u, v]: [f64; 2], out: &mut Weights) {
-    out.top = kernel.across.weights(v, &mut out.across);
-    let slant = kernel.slant();
-    let rows = out.rows.chunks_exact_mut(kernel.along.padded).zip(&mut out.first).zip(&out.across);
-    for (n, ((row, first), across)) in rows.enumerate() {
-        *first = kernel.along.weights(u + slant * (v - (out.top + n as isize) as f64), row);
-        for vector in row.as_chunks_mut::<VECTOR>().0 {
-            let mut weights = *vector;
-            for weight in &mut weights {
-                *weight *= across;
+    let ((u, s), (v, t)) = (split(u), split(v));
+    out.first = [u + 1 - kernel.half[0] as isize, v + 1 - kernel.half[1] as isize];
+    product(&kernel.columns, [s, t], &mut out.columns);
+    product(&kernel.rows, [t, s], &mut out.across);
+    let scale = exp(-kernel.inverse[1] * s * t);
+    let ([columns, _], [across, _]) = (&out.columns, &out.across);
+    let rows = out.rows.chunks_exact_mut(columns.len()).zip(kernel.cross.chunks_exact(columns.len()));
+    for ((row, cross), across) in rows.zip(across) {
+        let factor = across * scale;
+        let vectors = row.as_chunks_mut::<VECTOR>().0.iter_mut().zip(cross.as_chunks::<VECTOR>().0);
+        for ((to, cross), column) in vectors.zip(columns.as_chunks::<VECTOR>().0) {
+            let mut weights = [0.0; VECTOR];
+            for l in 0..VECTOR {
+                weights[l] = cross[l] * column[l] * factor;
             }
-            *vector = weights;
+            *to = weights;
         }
     }
+}
+
+/// The product of two functions, at one position each, in the first of `out`.
+#[inline(always)]
+fn product([one, other]: &[Phases; 2], positions: [f64; 2], [out, more]: &mut [Vec<f32>; 2]) {
+    one.fill(positions[0], out);
+    other.fill(positions[1], more);
+    for (to, factor) in out.as_chunks_mut::<VECTOR>().0.iter_mut().zip(more.as_chunks::<VECTOR>().0) {
+        let mut products = *to;
+        for l in 0..VECTOR {
+            products[l] *= factor[l];
+        }
+        *to = products;
+    }
+}
+
+/// exp(x), to 1e-7: a ratio of polynomials if x is small.
+#[inline(always)]
+fn exp(x: f64) -> f32 {
+    if x.abs() > 0.5 {
+        return libm::exp(x) as f32;
+    }
+    let (even, odd) = (120.0 + 12.0 * x * x, x * (60.0 + x * x));
+    ((even + odd) / (even - odd)) as f32
 }
 
 #[cfg(test)]
@@ -165,7 +256,7 @@ mod tests {
             let shear = Shear::new(&camera, &grid, 2);
             let kernel = Kernel::new(&shear, sigma, 4.5).expect("a wide kernel");
             let mut weights = Weights::of(&kernel);
-            let (half, reach) = (kernel.half(), kernel.reach(&shear));
+            let (half, reach) = (kernel.half(), kernel.reach(&shear, sigma));
             for position in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
                 kernel.weights(position, &mut weights);
                 let mut held = 0.0;

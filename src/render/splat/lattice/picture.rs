@@ -99,7 +99,7 @@ impl Lattice {
         let spreading = Spreading { shear, degree, tau };
         let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
         let product = Product::new(&shear, sigma, radius);
-        let reach = product.as_ref().map_or_else(|| kernel.reach(&shear), |product| product.reach(&shear));
+        let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
         let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
         let mut lattice = Self { spreading, kernel, product, taps, reach, peak, bounds };
         if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {

@@ -28,7 +28,7 @@ pub(super) struct TwoPasses<'a> {
 
 impl<'a> TwoPasses<'a> {
     pub(super) fn new(product: &'a Product, rect: &TileRect, tile: &Window, bundles: &Bundles<'_>) -> Self {
-        let (x, cells) = (rect.x.clone(), product.along.padded);
+        let (x, cells) = (rect.x.clone(), product.along.padded());
         let mut weights = vec![0.0; x.len() * cells];
         let pixels = x.clone().zip(weights.chunks_exact_mut(cells));
         let first = pixels.map(|(x, weights)| {
@@ -46,7 +46,7 @@ impl<'a> TwoPasses<'a> {
             single: bundles.single.iter().map(|bundle| vec![0.0; width * bundle.places]).collect(),
             double: bundles.double.iter().map(|bundle| vec![0.0; width * bundle.places]).collect(),
             top: vec![0; width],
-            across: vec![0.0; width * product.across.padded],
+            across: vec![0.0; width * product.across.padded()],
         }
     }
 
@@ -58,7 +58,7 @@ impl<'a> TwoPasses<'a> {
         self.row = Some(y);
         let Product { across, v: [origin, per_row, per_column], .. } = self.product;
         let crossing = origin + (y as f64 + 0.5) * per_row;
-        let columns = (self.tile.first[0]..).zip(&mut self.top).zip(self.across.chunks_exact_mut(across.padded));
+        let columns = (self.tile.first[0]..).zip(&mut self.top).zip(self.across.chunks_exact_mut(across.padded()));
         columns.for_each(|((u, top), weights)| *top = across.weights(crossing + u as f64 * per_column, weights));
         let first = self.tile.first[0];
         let weights = (&self.top[..], &self.across[..], across.cells);
@@ -85,7 +85,7 @@ impl<'a> TwoPasses<'a> {
     fn sum_pixels<R: Real>(&self, columns: &[R], x: usize, sums: &mut [[R; TOGETHER]]) {
         let (n, along, places) = (x - self.x.start, &self.product.along, columns.len() / self.tile.size[0]);
         let first = &self.first[n..][..sums.len()];
-        let weights = &self.weights[n * along.padded..][..sums.len() * along.padded];
+        let weights = &self.weights[n * along.padded()..][..sums.len() * along.padded()];
         add_pixels(columns, places, (first, weights, along.cells), sums);
     }
 }
