@@ -42,7 +42,7 @@ const CHOICES: [(usize, usize); 8] = [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2
 const STEEPEST: f64 = 0.5;
 /// The largest number of cells of a tile.
 const TILE_CELLS: usize = 4096;
-/// Width of a tile in units of its height.
+/// Width of a tile in units of its height, if pixels are summed in two passes.
 const WIDE: usize = 4;
 
 impl Lattice {
@@ -226,11 +226,11 @@ impl Lattice {
     }
 
     /// Width and height of a tile in pixels. A square of the height is the largest one whose cells with all planes stay
-    /// in a core's cache. Wide tiles share most cells of a row.
+    /// in a core's cache. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
     pub(in crate::render) fn tile(&self) -> [usize; 2] {
         let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
         let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
-        [WIDE * side, side]
+        [if self.product.is_some() { WIDE * side } else { side }, side]
     }
 
     /// Cells along u and v that a tile reaches.
