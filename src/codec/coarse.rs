@@ -33,7 +33,7 @@ pub(crate) struct Lattice {
 impl Lattice {
     /// Every `stride`-th voxel, a power of two, along each axis of a block of `size` voxels, in some frames of the
     /// window, ascending. Where a pyramid refines time, frames between its coarse nodes are replaced by the last one
-    /// before; a finer level is taken if two frames fall on the same node.
+    /// before; level 1 is taken if two frames fall on the same node.
     pub(crate) fn new(codec: &WindowCodec, size: [usize; 3], (stride, frames): (usize, &[usize])) -> Self {
         let level = stride.trailing_zeros().min(COARSEST);
         let refines_time = codec.scheme.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));

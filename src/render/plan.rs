@@ -110,11 +110,13 @@ impl<'a> Budget<'a> {
         self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes)
     }
 
-    /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints.
+    /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints, and its cells of
+    /// ones in each other view.
     fn block_bytes(&self, planes: usize) -> usize {
         let footprints = self.setups.iter().filter(|setup| !setup.backend.is_lattice()).count();
         let terms = if footprints > 0 { SparseTerms::most_bytes(planes) } else { 0 };
-        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES)
+        let kept: usize = self.setups.iter().map(|setup| setup.backend.kept(&self.block)).sum();
+        self.block_bytes + self.block.voxels() * (terms + footprints * Splats::BYTES) + kept * size_of::<f64>()
     }
 
     /// Bytes of a batch's finished pictures.
@@ -124,12 +126,12 @@ impl<'a> Budget<'a> {
 
     /// Bytes of bands of `rows` rows with all planes, and of the scratch of all threads.
     fn band_bytes(&self, planes: usize, rows: usize) -> usize {
-        let band = |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows);
+        let band = |planes: usize| move |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows, planes);
         let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes)).max().unwrap_or(0);
-        let (bands, threads) = (self.setups.iter().map(band), rayon::current_num_threads());
+        let (bands, threads) = (self.setups.iter().map(band(planes)).sum::<usize>(), rayon::current_num_threads());
         // A thread filters one plane of a lattice in f64, out of place.
-        let filtered = bands.clone().max().unwrap_or(0);
-        let numbers = planes * bands.sum::<usize>() + threads * (scratch + filtered);
+        let filtered = self.setups.iter().map(band(1)).max().unwrap_or(0);
+        let numbers = bands + threads * (scratch + filtered);
         numbers * size_of::<f64>()
     }
 

@@ -44,7 +44,7 @@ pub struct RenderReport {
     pub blocks_outside: u64,
     /// Blocks left out because they are so deep that their contribution is within the splat error.
     pub blocks_dimmed: u64,
-    /// Blocks left out of composites because no value near them is visible.
+    /// Blocks left out of composites and largest values because no value near them is visible, or they hold nothing.
     pub blocks_transparent: u64,
     /// Blocks left out of composites because opaque values hide them in all frames of a batch, or no pixel sees them.
     pub blocks_hidden: u64,

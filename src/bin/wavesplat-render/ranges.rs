@@ -34,6 +34,9 @@ const LEAST_FRAMES: usize = 4;
 const MOST_FRAMES: usize = 16;
 const MOST_SAMPLES: usize = 5 << 20;
 
+/// Bytes of memory for each sample of an overview: it takes at most a quarter.
+const MEMORY_SHARE: usize = 32;
+
 /// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
 /// range.
 fn robust_range(values: &[f32]) -> (f64, f64) {
@@ -77,9 +80,14 @@ fn spread(scene: &dyn Scene, count: usize) -> Vec<usize> {
     frames
 }
 
+/// The number of samples to take.
+fn most_samples(small: &RenderConfig) -> usize {
+    MOST_SAMPLES.min(small.memory / MEMORY_SHARE)
+}
+
 /// The number of frames of `voxels` voxels in which to look for a range.
-fn frames_of(voxels: usize) -> usize {
-    (MOST_SAMPLES / voxels).clamp(LEAST_FRAMES, MOST_FRAMES)
+fn frames_of(voxels: usize, small: &RenderConfig) -> usize {
+    (most_samples(small) / voxels).clamp(LEAST_FRAMES, MOST_FRAMES)
 }
 
 /// The progress of small pictures.
@@ -89,7 +97,7 @@ fn progress(stage: &'static str, small: &RenderConfig, common: &CommonArgs) -> T
 
 /// The values of small pictures of a few frames.
 fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, common: &CommonArgs) -> Result<Vec<f32>> {
-    let frames = spread(scene, frames_of(scene.grid().dims.iter().product()));
+    let frames = spread(scene, frames_of(scene.grid().dims.iter().product(), small));
     let mut values = Vec::new();
     pictures(scene, &RenderConfig { frames, ..small.clone() }, &progress("range", small, common), &mut values)?;
     Ok(values)
@@ -98,46 +106,48 @@ fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, common: &Common
 /// The values of small pictures of an overview; none if the scene has none, or the volume is too small for one.
 fn values_of_overview(scene: &mut dyn Scene, small: &RenderConfig, common: &CommonArgs) -> Result<Option<Vec<f32>>> {
     let thinning = thinning(scene, small)?;
-    let frames = spread(scene, frames_of(voxels(&thinning)));
-    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let request = OverviewRequest { thinning, frames: &frames, region };
     if thinning.stride == 1 {
         return Ok(None);
     }
-    let Some(mut overview) = scene.overview(&request, &common.progress("overview", "steps"))? else { return Ok(None) };
+    let frames = spread(scene, frames_of(voxels(&thinning), small));
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let request = OverviewRequest { thinning, frames: &frames, region };
+    let Some(overview) = scene.overview(&request, &common.progress("overview", "steps"))? else { return Ok(None) };
     let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
-    let config = of_overview(&request, &grid, small);
-    while !overview.is_empty() {
-        let others = overview.split_off(request.samples());
-        let bytes = overview.into_iter().flat_map(f32::to_le_bytes).collect();
+    let config = of_overview(&request, &grid, small, size_of_val(&overview[..]));
+    for samples in overview.chunks_exact(request.samples()) {
+        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
         let mut frames = FrameScene::new(Box::new(ArraySource::new(grid, SampleType::F32, bytes)?), None);
+        // One bar for each channel would look like a restart.
         match scene.channels() {
             1 => pictures(&mut frames, &config, &progress("range", small, common), &mut values)?,
             _ => pictures(&mut frames, &config, &Silent, &mut values)?,
         };
-        overview = others;
     }
     Ok(Some(values))
 }
 
 /// How to thin a scene for small pictures.
 fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
-    let least_edge = scene.blocks().edges.into_iter().fold(usize::MAX, usize::min);
+    let edge = scene.blocks().edges.into_iter().fold(0, usize::max);
+    let most = most_samples(small);
     let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, PIXELS_APART)? };
-    while voxels(&thinning) * LEAST_FRAMES > MOST_SAMPLES && thinning.stride < least_edge {
+    // From then on, a block has one voxel.
+    while voxels(&thinning) * scene.channels() * LEAST_FRAMES > most && thinning.stride < edge {
         thinning.stride *= 2;
     }
     Ok(thinning)
 }
 
-/// The settings of small pictures of an overview.
-fn of_overview(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig) -> RenderConfig {
+/// The settings of small pictures of an overview, which takes `bytes` twice.
+fn of_overview(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
     let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
     RenderConfig {
         kernel: Kernel { sigma, ..small.kernel },
         frames: (0..request.frames.len()).collect(),
         region: small.region.map(|region| request.thinning.region(&region)),
         allowed: None,
+        memory: small.memory.saturating_sub(2 * bytes),
         ..small.clone()
     }
 }

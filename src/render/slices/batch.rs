@@ -61,7 +61,7 @@ pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, block
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
     let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view));
-    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view))
+    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLICES * Slice::bytes(view)
 }
 
 /// Rows of each band.
@@ -86,8 +86,11 @@ impl<B: Blend> Batch<'_, B> {
             lap(&mut clock, &mut report.decode_seconds);
             let ready = self.view.ready(next, met);
             next = ready.end;
-            let slices: Vec<Slice> = ready.clone().filter_map(|number| self.view.slice(number)).collect();
-            frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            for first in ready.clone().step_by(SLICES) {
+                let numbers = first..ready.end.min(first + SLICES);
+                let slices: Vec<Slice> = numbers.filter_map(|number| self.view.slice(number)).collect();
+                frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            }
             if let (Some(probe), Some(frame)) = (&mut probe, frames.first()) {
                 probe.add(self.blend, &frame.units, &frame.layers, met);
             }
@@ -214,6 +217,9 @@ impl<B: Blend> Batch<'_, B> {
         pictures
     }
 }
+
+/// Slices that are weighed at a time.
+const SLICES: usize = 32;
 
 /// The least rows of a band: the rows at its edges are filtered for both bands.
 const LEAST_ROWS: usize = 32;

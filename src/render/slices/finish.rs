@@ -63,7 +63,7 @@ impl<C> Cells<C> {
     /// The cells around a point, and their weights; `None` beyond the rim.
     fn around(&self, at: [f64; 2]) -> Option<Around<'_, C>> {
         let [column, row] = at.map(|at| (at.max(1.0) as usize) - 1);
-        let inside = at.iter().all(|at| *at >= 1.0) && column + 4 <= self.width;
+        let inside = at.iter().all(|at| *at >= 1.0) && column.saturating_add(4) <= self.width;
         let rows = row.saturating_add(4).saturating_mul(self.width) <= self.all.len();
         let of_row =
             |n: usize| self.all[(row + n) * self.width + column..].first_chunk().unwrap_or_else(|| self.none());

@@ -64,11 +64,11 @@ impl Blend for Largest {
 
     /// The interpolated value, between the least and the largest of the four cells around the pixel. If the kernel
     /// reaches no sample at some cells, those four are weighed by their distance.
-    fn pixel(units: &Units, cells: [&Sixteenth; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
+    fn pixel(units: &Units, cells: [&Four; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
         let inner = [cells[1][1], cells[1][2], cells[2][1], cells[2][2]];
         let there = |cells: &[f32]| cells.iter().all(|cell| *cell > NONE);
         let value = if cells.iter().all(|row| there(*row)) {
-            let of_row = |row: &Sixteenth| row.iter().zip(across).map(|(cell, weight)| cell * weight).sum::<f32>();
+            let of_row = |row: &Four| row.iter().zip(across).map(|(cell, weight)| cell * weight).sum::<f32>();
             let sum: f32 = cells.into_iter().zip(down).map(|(row, weight)| of_row(row) * weight).sum();
             let ends = inner.iter().fold((f32::INFINITY, NONE), |(lo, hi), cell| (lo.min(*cell), hi.max(*cell)));
             sum.clamp(ends.0, ends.1)
@@ -100,13 +100,13 @@ impl Blend for Largest {
 }
 
 /// Four cells of a row.
-type Sixteenth = [f32; 4];
+type Four = [f32; 4];
 
 /// The value of the nearest of the four cells around a pixel that has one.
 fn nearest(inner: [f32; 4], across: [f32; 4], down: [f32; 4]) -> f32 {
     let near = |n: usize| across[1 + n % 2] * down[1 + n / 2];
     let best = (0..4).filter(|n| inner[*n] > NONE).max_by(|a, b| near(*a).total_cmp(&near(*b)));
-    // Half of the picture of a pixel lies nearer to cells without a value.
+    // A pixel whose nearest cell with a value has less weight is background.
     best.filter(|n| near(*n) >= 0.25).map_or(NONE, |n| inner[n])
 }
 

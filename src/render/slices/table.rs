@@ -14,9 +14,6 @@ const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
 /// Shares of a step that count as nothing.
 const NEAR: f64 = 1e-3;
 
-/// Slices with less opacity are not visible; 300 of them hide 3e-4 of the light.
-pub(super) const FAINT: f32 = 1e-6;
-
 /// The light and opacity of one slice for every value.
 #[derive(Debug, Clone)]
 pub(in crate::render) struct Table {
@@ -106,7 +103,7 @@ impl Table {
         };
         let entries: Box<[[f32; 8]; ENTRIES]> = Box::new(std::array::from_fn(entry));
         let count = |sum: &mut u16, entry: &[f32; 8]| {
-            *sum += u16::from(-entry[3] > FAINT);
+            *sum += u16::from(entry[3] != 0.0);
             Some(*sum)
         };
         let visible = std::iter::once(0).chain(entries.iter().scan(0, count)).collect();
@@ -121,7 +118,7 @@ impl Table {
         std::array::from_fn(|i| self.entries[n][i] + rest * self.entries[n][4 + i])
     }
 
-    /// Whether a number from `lo` to `hi` has an opacity above [`FAINT`].
+    /// Whether a number from `lo` to `hi` has an opacity.
     pub(super) fn shows(&self, (lo, hi): (f32, f32)) -> bool {
         if lo > hi {
             return false;
@@ -130,7 +127,7 @@ impl Table {
         let from = first as usize + usize::from(first > (first as usize) as f32);
         let to = last as usize + 1;
         let within = from < to && self.visible[to] > self.visible[from];
-        within || [first, last].iter().any(|number| -self.at(*number)[3] > FAINT)
+        within || [first, last].iter().any(|number| self.at(*number)[3] != 0.0)
     }
 
     /// The exact light and minus the opacity of a value, for a share of a slice.

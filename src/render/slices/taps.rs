@@ -3,11 +3,11 @@
 use crate::base::grid::Region;
 
 /// The kernel is cut where a voxel is at least this many standard deviations away.
-const CUT: f64 = 4.0;
+pub(super) const CUT: f64 = 4.0;
 
 /// Voxels on each side of a position that the kernel reaches, for a standard deviation in voxels.
 pub(super) fn reach(sigma: f64) -> usize {
-    (CUT * sigma).ceil().clamp(1.0, 1e6) as usize
+    (CUT * sigma).ceil().max(1.0) as usize
 }
 
 /// The weights of the voxels around a position.

@@ -11,13 +11,14 @@
 //! alpha and beta are the slopes of eq 35, so a ray crosses all slices at one (u, v), which is a point of the picture.
 
 use super::table::change;
-use super::taps::{Taps, along, reach};
+use super::taps::{CUT, Taps, along, reach};
 use super::{GROUP, LEAST};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::{Grid, Region};
 use crate::render::config::{Mode, RenderConfig};
 use crate::render::splat::lattice::Shear;
 use crate::view::camera::{Camera, View};
+use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
 
 /// A view cut into slices.
@@ -58,8 +59,19 @@ pub(super) struct Slice {
     pub(super) across: [Vec<Taps>; 2],
 }
 
+impl Slice {
+    /// Bytes of its weights.
+    pub(super) fn bytes(view: &SlicedView) -> usize {
+        let across = 2 * view.cells * (view.reach[0].max(view.reach[1]));
+        size_of::<Self>() + (across + view.reach[2]) * 2 * size_of::<f32>() + 2 * view.cells * size_of::<Taps>()
+    }
+}
+
 /// The largest number of slices per voxel.
 const MOST: usize = 64;
+/// The largest number of voxels that the kernel reaches, and of the lattice along an axis: products of three are numbers.
+const MOST_REACH: f64 = 4096.0;
+const MOST_EXTENT: usize = 1 << 20;
 /// Pixels per voxel from which on several cells per voxel show.
 const FEW_PIXELS: f64 = 0.8;
 /// The default distance of cells, and of slices for largest values, in standard deviations of the kernel.
@@ -82,6 +94,10 @@ impl SlicedView {
         let shear = Shear::new(&camera, grid, 1);
         let (start, count) = along(&clip, shear.axes);
         let sigma = shear.axes.map(|axis| config.kernel.sigma / grid.spacing[axis]);
+        Footprint::new(config.kernel, grid, camera.scale, Method::EXACT)?; // weights are numbers
+        if sigma.iter().any(|sigma| sigma * CUT > MOST_REACH) {
+            return Err(too_wide());
+        }
         if let Some(wrong) = config.mode.slices().filter(|n| !(1..=MOST).contains(n)) {
             return Err(Error::setting("slices", format!("takes 1 to {MOST} per voxel, not {wrong}")));
         }
@@ -108,7 +124,7 @@ impl SlicedView {
             step,
         };
         (cut.corner, cut.extent) = cut.lattice();
-        Ok(cut)
+        if cut.extent.iter().any(|n| *n > MOST_EXTENT) { Err(too_wide()) } else { Ok(cut) }
     }
 
     /// The part of the lattice that both the picture and the kernels of the region reach.
@@ -116,7 +132,8 @@ impl SlicedView {
         let [seen, reached] = [self.cells_seen(), self.cells_reached(&self.clip)];
         let ends: [[f64; 2]; 2] =
             [0, 1].map(|i| [seen[i][0].max(reached[i][0]).floor(), seen[i][1].min(reached[i][1]).ceil()]);
-        let extent = ends.map(|[from, to]| if to >= from { (to - from) as usize + 1 } else { 0 });
+        let extent =
+            ends.map(|[from, to]| if to >= from { (to - from).min(2.0 * MOST_EXTENT as f64) as usize + 1 } else { 0 });
         let empty = extent.contains(&0);
         let corner = ends.map(|[from, _]| from as i64);
         (corner, if empty { [0; 2] } else { [extent[0].next_multiple_of(GROUP), extent[1]] })
@@ -250,6 +267,11 @@ fn default_slices(mode: &Mode, sigma: f64, (voxel, grid): (f64, &Grid)) -> usize
 /// The number of slices or cells per voxel that are at most `distance` voxels apart; at most 8.
 fn per_voxel(distance: f64) -> usize {
     (1.0 / distance - 1e-6).ceil().clamp(1.0, 8.0) as usize
+}
+
+fn too_wide() -> Error {
+    let what = "covers too many voxels along an axis for slices";
+    Error::setting("sigma", Note::with(what, Remedy::Adjust(&["sigma", "spacing"])))
 }
 
 fn ends(values: impl Iterator<Item = f64>, rim: f64) -> [f64; 2] {

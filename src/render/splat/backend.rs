@@ -3,7 +3,7 @@
 //! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
 //! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
 
-use super::lattice::{Lattice, SliceError};
+use super::lattice::{Lattice, SliceError, Volume};
 use super::tile_rect::{TILE, pixels_reached};
 use crate::base::grid::{Grid, Region};
 use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
@@ -34,7 +34,7 @@ impl SplatBackend {
     /// the largest number of slices that a ray meets, in units of the largest sum of weights in the picture.
     pub(super) fn choose(
         config: &RenderConfig,
-        volume: (&Grid, &Region),
+        volume: Volume<'_>,
         camera: &Camera,
         footprint: &Footprint,
         slices: f64,
@@ -85,12 +85,11 @@ impl SplatBackend {
         }
     }
 
-    /// An upper bound of the sums of a plane in a band of `width` x `rows` pixels.
-    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize) -> usize {
+    /// An upper bound of the f64 numbers for `planes` planes in a band of `width` x `rows` pixels.
+    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize, planes: usize) -> usize {
         match self {
-            Self::Footprints => width * rows.next_multiple_of(TILE),
-            // In f32, in f64, and in f32 side by side.
-            Self::Lattice(lattice) => 2 * lattice.band_cells(width, rows),
+            Self::Footprints => planes * width * rows.next_multiple_of(TILE),
+            Self::Lattice(lattice) => lattice.band_sums(width, rows, planes),
         }
     }
 
@@ -98,7 +97,15 @@ impl SplatBackend {
     pub(in crate::render) fn ones(&self, width: usize, height: usize) -> usize {
         match self {
             Self::Footprints => 0,
-            Self::Lattice(_) => 3 * self.band_sums(width, height),
+            Self::Lattice(_) => 3 * self.band_sums(width, height, 1),
+        }
+    }
+
+    /// The f64 numbers that may be kept with a block while it is splatted.
+    pub(in crate::render) fn kept(&self, block: &Region) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.block_cells(block),
         }
     }
 

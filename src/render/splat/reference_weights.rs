@@ -16,7 +16,7 @@ use std::ops::Range;
 pub(in crate::render) fn with_backend(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
     let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
     let slices = ReferenceWeights::new(&setup, &exact).slices();
-    let volume = (&setup.grid, &setup.clip);
+    let volume = (&setup.grid, &setup.clip, setup.blocks);
     (setup.backend, setup.method) = SplatBackend::choose(config, volume, &setup.camera, &setup.footprint, slices);
     setup.stated_error = setup.method.stated_error;
     Ok(setup)

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// The largest tau times depth of the nearest voxel for which means are computed: exponentials lose digits at 708, and
 /// then vanish.
-const DEEPEST: f64 = 640.0;
+const MOST_EXPONENT: f64 = 640.0;
 
 /// The setup of a view, shared by all frames.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl ViewSetup {
         let camera = Camera::new(view, &grid)?;
         let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
         let nearest = camera.nearest_of(&grid.crop(&clip));
-        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > DEEPEST {
+        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > MOST_EXPONENT {
             let what = "all voxels of the region lie so deep that their weights are beyond numbers";
             return Err(Error::setting("tau", format!("{what} (tau {:e})", config.kernel.tau)));
         }

@@ -42,25 +42,25 @@ pub(in crate::render) struct SliceError {
 }
 
 impl SliceError {
-    /// The error of a choice of cells per voxel and degree of splines, filtered along u and v. The number beside the kernel is
-    /// the share of its sum that its weights leave out.
-    pub(super) fn new(kernel: (&Kernel, f64), choice: (usize, usize), taps: &[Taps; 2]) -> Self {
-        Self::at_positions(kernel, choice, taps, 1)
+    /// The error of a choice of cells per voxel and degree of splines, filtered along u and v.
+    pub(super) fn new(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2]) -> Self {
+        Self::at_positions(weighting, choice, taps, 1)
     }
 
     /// A lower bound of these bounds, from few positions.
-    pub(super) fn at_least(kernel: (&Kernel, f64), choice: (usize, usize), taps: &[Taps; 2]) -> Self {
-        Self::at_positions(kernel, choice, taps, FEW)
+    pub(super) fn at_least(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2]) -> Self {
+        Self::at_positions(weighting, choice, taps, FEW)
     }
 
-    fn at_positions((kernel, cut): (&Kernel, f64), choice: (usize, usize), taps: &[Taps; 2], step: usize) -> Self {
+    fn at_positions(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2], step: usize) -> Self {
+        let Weighting { kernel, cut, additions } = *weighting;
         let (marginal, conditional) = (kernel.sigmas(), kernel.conditional_sigmas());
         let axis = |i: usize| Axis::new(choice, &taps[i], [conditional[i], marginal[i]], step);
         let [u, v] = [axis(0), axis(1)];
         // Either axis may be replaced first.
         let both = |[eu, ev]: [f64; 2]| (eu + ev * u.blur).min(ev + eu * v.blur).min(product(kernel, [eu, ev]));
         let cut = cut * u.amplified * v.amplified;
-        let rounding = ROUNDING * u.blur * v.blur;
+        let rounding = ROUNDING * (additions + OTHERS) as f64 * u.blur * v.blur;
         let bound = |errors| both(errors) + cut + rounding;
         Self {
             sum: bound([u.sum, v.sum]),
@@ -87,9 +87,20 @@ fn product(kernel: &Kernel, [eu, ev]: [f64; 2]) -> f64 {
     if is_product { eu + ev + eu * ev } else { f64::INFINITY }
 }
 
-/// Bound of the rounding of sums in f32: at most 144 additions for a cell of a block, 16 for its plane, 32 for the
-/// filters and 64 for a pixel, of values at most twice the value range, each off by 2^-24.
-const ROUNDING: f64 = 3.1e-5;
+/// A kernel as pixels use it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weighting<'a> {
+    pub(super) kernel: &'a Kernel,
+    /// The share of its sum that its weights leave out.
+    pub(super) cut: f64,
+    /// The largest number of additions for a cell of a plane.
+    pub(super) additions: usize,
+}
+
+/// Bound of the rounding of an addition in f32: 2^-24 of values at most twice the value range.
+const ROUNDING: f64 = 1.0 / (1_u64 << 23) as f64;
+/// Roundings besides the additions for a cell: 32 for the filters, 64 for a pixel, 8 for a weight.
+const OTHERS: usize = 104;
 
 /// Bounds along one axis, as shares of the largest sum of the Gaussian over an infinite row of voxels.
 #[derive(Debug, Clone, Copy, Default)]
@@ -250,13 +261,17 @@ mod tests {
         (shear, kernel)
     }
 
+    fn weighting(kernel: &Kernel) -> Weighting<'_> {
+        Weighting { kernel, cut: kernel.cut(), additions: 160 }
+    }
+
     #[test]
     fn finer_cells_and_higher_degrees_are_nearer() {
         for (azimuth, elevation, most) in [(0.0, 0.0, 1.0), (30.0, 30.0, 1.0), (45.0, 35.26, 0.9)] {
             for (fineness, degree, error) in [(2, 3, 2.3e-3), (2, 4, 8.5e-4), (2, 5, 6e-4), (3, 4, 3.5e-4)] {
                 let (_, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new((&kernel, kernel.cut()), (fineness, degree), &taps).of_a_mean();
+                let stated = SliceError::new(&weighting(&kernel), (fineness, degree), &taps).of_a_mean();
                 assert!(stated < most * error, "{fineness} {degree} at {azimuth}: {stated:e}");
             }
         }
@@ -298,7 +313,7 @@ mod tests {
             for (fineness, degree) in [(1, 5), (2, 3), (2, 4), (2, 5), (3, 4)] {
                 let (shear, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new((&kernel, kernel.cut()), (fineness, degree), &taps);
+                let stated = SliceError::new(&weighting(&kernel), (fineness, degree), &taps);
                 let mut most = [0.0_f64; 2];
                 for n in 0..81_u32 {
                     let at = |i: u32| f64::from(n / 3_u32.pow(i) % 3) / 3.0;

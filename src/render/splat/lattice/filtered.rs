@@ -50,6 +50,12 @@ pub(super) fn places(planes: usize) -> usize {
     planes.next_power_of_two().min(TOGETHER)
 }
 
+/// The places of all groups of `planes` planes together.
+pub(super) fn side_by_side(planes: usize) -> usize {
+    let rest = planes % TOGETHER;
+    planes - rest + if rest == 0 { 0 } else { places(rest) }
+}
+
 impl FilteredCells {
     /// Filters all planes along u and v.
     pub(super) fn new(cells: Cells, taps: &[Taps; 2]) -> Self {
@@ -103,10 +109,10 @@ struct Rows<'a, R> {
 
 /// Filters planes along v, and puts them side by side.
 fn groups(rectangle: &Rectangle, planes: &[Rows<'_, f32>], taps: &Taps) -> Vec<Group> {
-    let (places, taps) = (places(planes.len()), taps.map(|tap| tap as f32));
+    let taps = taps.map(|tap| tap as f32);
     let [width, height] = rectangle.size;
     let group = |planes: &[Rows<'_, f32>]| {
-        let stride = width + 1;
+        let (stride, places) = (width + 1, places(planes.len()));
         let mut cells = Zeroed::new(stride * height * places);
         cells.par_chunks_exact_mut((stride * places).max(1)).enumerate().for_each(|(v, cells)| {
             let mut row = vec![0.0; width];
@@ -120,7 +126,7 @@ fn groups(rectangle: &Rectangle, planes: &[Rows<'_, f32>], taps: &Taps) -> Vec<G
         let spans = planes.iter().map(Rows::spread_spans).collect();
         Group { planes: planes.iter().map(|plane| plane.number).collect(), places, stride, cells, spans }
     };
-    planes.chunks(places.max(1)).map(group).collect()
+    planes.chunks(TOGETHER).map(group).collect()
 }
 
 /// Filters a plane along v.

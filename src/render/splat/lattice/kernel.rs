@@ -47,6 +47,9 @@ impl Kernel {
         let [uu, uv, vv] = inverse;
         let [u, v] = sigmas(inverse);
         let half = [half(u, radius)?, half(v, radius)?];
+        if uv.abs() * (half[0] * half[1]) as f64 > MOST_EXPONENT {
+            return None;
+        }
         let gaussian = |i: f64| move |t: f64, n: isize| libm::exp(-0.5 * i * (t - n as f64) * (t - n as f64));
         let tilt = |t: f64, n: isize| libm::exp(uv * n as f64 * t);
         let columns = [Phases::new(half[0], gaussian(uu)), Phases::new(half[0], tilt)];
@@ -125,6 +128,8 @@ impl Kernel {
     }
 }
 
+/// exp of this, squared, is far from the limits of f32.
+const MOST_EXPONENT: f64 = 40.0;
 /// Positions of a pixel between two cells, along each axis, at which the cut is measured, and the margin for others.
 const PLACES: usize = 5;
 const MARGIN: f64 = 1.1;
@@ -246,6 +251,23 @@ mod tests {
     use super::*;
     use crate::base::grid::Grid;
     use crate::view::camera::{Camera, View};
+
+    #[test]
+    fn kernels_beyond_numbers_are_refused() {
+        let grid = Grid::unit([128; 3]);
+        let view = View { azimuth: 30.0, elevation: 30.0, roll: 10.0, size: [512; 2], scale: Some(2.3), center: None };
+        let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, 1);
+        for sigma in [1e-3, 0.03, 0.1, 0.3, 1.0, 3.0] {
+            let Some(kernel) = Kernel::new(&shear, sigma * 2.3, 3.5) else { continue };
+            let mut weights = Weights::of(&kernel);
+            for position in [[0.0, 0.0], [0.4, 0.9], [0.99, 0.01]] {
+                kernel.weights(position, &mut weights);
+                let finite = |row: &[f32]| row.iter().all(|weight| weight.is_finite());
+                assert!(weights.rows().all(|(_, _, row)| finite(row)), "{sigma}");
+            }
+        }
+        assert!(Kernel::new(&shear, 0.03 * 2.3, 3.5).is_none() && Kernel::new(&shear, 0.75 * 2.3, 3.5).is_some());
+    }
 
     #[test]
     fn weights_are_the_gaussian_at_every_cell() {

@@ -40,7 +40,7 @@ pub(super) use error::SliceError;
 pub(in crate::render) use filtered::FilteredCells;
 pub(super) use gather::Gather;
 pub(in crate::render) use gather::Ones;
-pub(super) use picture::Lattice;
+pub(super) use picture::{Lattice, Volume};
 pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, Work};
 

@@ -2,15 +2,15 @@
 //! than footprints.
 
 use super::cells::{Cells, LINE, Rectangle};
-use super::error::SliceError;
-use super::filtered::{FilteredCells, TOGETHER};
+use super::error::{SliceError, Weighting};
+use super::filtered::{FilteredCells, side_by_side};
 use super::kernel::Kernel;
 use super::prefilter::{self, HALF, Taps};
 use super::product::Product;
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Placed, Spreading};
-use crate::base::grid::{Grid, Region};
+use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::render::splat::tile_rect::{TILE, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
@@ -29,18 +29,22 @@ pub(in crate::render) struct Lattice {
     reach: f64,
     /// f at its centre.
     pub(super) peak: f64,
+    /// The largest number of additions for a cell of a plane.
+    additions: usize,
     /// The cells that any voxel reaches, prefilter included: the first along each axis, and their number.
     bounds: ([isize; 2], [usize; 2]),
 }
 
-/// A bound for a kernel and its cut, a choice, and its prefilters.
-type Bound = fn((&Kernel, f64), (usize, usize), &[Taps; 2]) -> SliceError;
+/// A bound for a kernel, a choice, and its prefilters.
+type Bound = fn(&Weighting<'_>, (usize, usize), &[Taps; 2]) -> SliceError;
+/// A grid, the voxels of it that count, and its blocks.
+pub(in crate::render) type Volume<'a> = (&'a Grid, &'a Region, BlockGrid);
 
 /// Cells per voxel and degrees of splines, roughly from the cheapest on.
 const CHOICES: [(usize, usize); 8] = [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5), (3, 4), (4, 5)];
 /// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
-/// The largest number of cells of a tile.
+/// The largest number of cells that a square tile reaches.
 const TILE_CELLS: usize = 4096;
 /// Width of a tile in units of its height, if pixels are summed in two passes.
 const WIDE: usize = 4;
@@ -51,7 +55,7 @@ impl Lattice {
     pub(in crate::render) fn within(
         error: f64,
         gaussian: Gaussian,
-        (grid, clip): (&Grid, &Region),
+        volume: Volume<'_>,
         camera: &Camera,
         footprint: &Footprint,
         stated: impl Fn(SliceError) -> f64,
@@ -59,7 +63,7 @@ impl Lattice {
         let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
         let radius = (2.0 * libm::log(1.0 / (CUT * error))).sqrt();
         for choice in CHOICES.into_iter().filter(|_| error > LEAST) {
-            let lattice = Self::new(choice, (gaussian.tau, sigma, radius), (grid, clip), (camera, footprint));
+            let lattice = Self::new(choice, (gaussian.tau, sigma, radius), volume, (camera, footprint));
             let Some(lattice) = lattice else { continue };
             if stated(lattice.slice_error(SliceError::at_least)) > error {
                 continue;
@@ -76,7 +80,7 @@ impl Lattice {
     /// picture from the error of a slice.
     pub(in crate::render) fn quick(
         gaussian: Gaussian,
-        volume: (&Grid, &Region),
+        volume: Volume<'_>,
         camera: &Camera,
         footprint: &Footprint,
         estimated: impl Fn(SliceError) -> f64,
@@ -91,7 +95,7 @@ impl Lattice {
     fn new(
         (fineness, degree): (usize, usize),
         (tau, sigma, radius): (f64, f64, f64),
-        (grid, clip): (&Grid, &Region),
+        (grid, clip, blocks): Volume<'_>,
         (camera, footprint): (&Camera, &Footprint),
     ) -> Option<Self> {
         let shear = Shear::new(camera, grid, fineness);
@@ -101,12 +105,12 @@ impl Lattice {
         let product = Product::new(&shear, sigma, radius);
         let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
         let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
-        let mut lattice = Self { spreading, kernel, product, taps, reach, peak, bounds };
+        let additions = additions(clip, blocks, shear.axes[2]);
+        let mut lattice = Self { spreading, kernel, product, taps, reach, peak, additions, bounds };
         if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
             return None;
         }
-        let (first, size) = lattice.rectangle(clip);
-        lattice.bounds = (first.map(|n| n - HALF as isize), size.map(|n| n + 2 * HALF));
+        lattice.bounds = lattice.filtered_rectangle(clip);
         Some(lattice)
     }
 
@@ -114,7 +118,7 @@ impl Lattice {
     fn slice_error(&self, bound: Bound) -> SliceError {
         let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
         let choice = (self.spreading.shear.fineness, self.spreading.degree);
-        bound((&self.kernel, cut), choice, &self.taps)
+        bound(&Weighting { kernel: &self.kernel, cut, additions: self.additions }, choice, &self.taps)
     }
 
     fn suits(&self) -> bool {
@@ -153,26 +157,29 @@ impl Lattice {
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         const VALUES: usize = 3; // in their own type, as f32, as f64
         let tile = area(self.tile_cells(self.tile()).map(|n| n + 2)); // covers rounding and any tile position
-        let in_f32 = planes.next_multiple_of(TOGETHER).div_ceil(2);
+        let in_f32 = side_by_side(planes).div_ceil(2);
         self.block_cells(block) + VALUES * block.voxels() + (in_f32 + planes + 1) * tile
     }
 
     /// The cells that the voxels of a region reach: the first along each axis, and their number.
     fn rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
         let Spreading { shear, degree, .. } = self.spreading;
-        let [b, c, a] = shear.axes;
         let (mut low, mut high) = ([isize::MAX; 2], [isize::MIN; 2]);
         for corner in 0..8 {
             let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
-            let mut voxel = [0; 3];
-            [b, c, a].into_iter().for_each(|axis| voxel[axis] = at(axis));
-            let first = shear.position(voxel).map(|position| spread(degree, position).0);
+            let first = shear.position(std::array::from_fn(at)).map(|position| spread(degree, position).0);
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
         }
         // One more cell covers rounding, and cells beyond the cut that count as well.
         let pad = 1;
         let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + degree + 1;
         (low.map(|first| first - pad as isize), [size(0), size(1)])
+    }
+
+    /// The same, with the cells that the prefilter reaches.
+    fn filtered_rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
+        let (first, size) = self.rectangle(region);
+        (first.map(|n| n - HALF as isize), size.map(|n| n + 2 * HALF))
     }
 
     /// An upper bound of the distance from a pixel to any cell that counts, along u and v.
@@ -200,8 +207,7 @@ impl Lattice {
 
     /// The columns and rows of the picture that a block can reach. Both are empty if either is.
     pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
-        let (first, cells) = self.rectangle(region);
-        let (first, cells) = (first.map(|n| n - HALF as isize), cells.map(|n| n + 2 * HALF));
+        let (first, cells) = self.filtered_rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
@@ -225,8 +231,7 @@ impl Lattice {
         FilteredCells::new(cells, &self.taps)
     }
 
-    /// Width and height of a tile in pixels. A square of the height is the largest one whose cells with all planes stay
-    /// in a core's cache. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
+    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
     pub(in crate::render) fn tile(&self) -> [usize; 2] {
         let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
         let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
@@ -238,14 +243,19 @@ impl Lattice {
         self.cells_reached(&(0..width), &(0..height)).1
     }
 
+    /// An upper bound of the f64 numbers for the planes of a band: in f32, in f64, and in f32 side by side.
+    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize, planes: usize) -> usize {
+        ((planes + side_by_side(planes)).div_ceil(2) + planes) * self.band_cells(width, rows)
+    }
+
     /// An upper bound of the cells of a plane of a band.
-    pub(in crate::render) fn band_cells(&self, width: usize, rows: usize) -> usize {
+    fn band_cells(&self, width: usize, rows: usize) -> usize {
         let (size, most) = (self.cells_reached(&(0..width), &(0..rows)).1, self.bounds.1);
         self.held([0, 1].map(|i| (size[i] + 2 * HALF + 2).min(most[i]))) // covers rounding and any band position
     }
 
     /// An upper bound of the cells of a plane of a block.
-    fn block_cells(&self, region: &Region) -> usize {
+    pub(in crate::render) fn block_cells(&self, region: &Region) -> usize {
         let size = self.rectangle(region).1;
         self.held(size.map(|n| n + MOST_DEGREE + self.spreading.shear.fineness))
     }
@@ -272,6 +282,14 @@ const SPREADING: f64 = 0.15;
 
 /// The largest error to aim for: larger errors would not be cheaper.
 const LARGEST: f64 = 0.05;
+
+/// The largest number of additions in f32 for a cell of a plane: the slices of a block and the voxels of a slice, and the
+/// blocks that a ray can meet, each with its neighbours.
+fn additions(clip: &Region, blocks: BlockGrid, axis: usize) -> usize {
+    let dims = clip.dims();
+    let met: usize = (0..3).map(|a| dims[a].div_ceil(blocks.edges[a]) + 1).sum();
+    blocks.edges[axis].min(dims[axis]) + 2 * (MOST_DEGREE + 1) + 4 * met
+}
 
 fn area([width, height]: [usize; 2]) -> usize {
     width * height

@@ -199,7 +199,7 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
         let cells = || slices.iter().map(|s| s.cell[i]);
         let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
         // Includes the zeros that pad rows with fewer taps.
-        (low, (high - low) as usize + q * count[i].saturating_sub(1) + spreading.degree.max(MOST_DEGREE) + 1 + q)
+        (low, (high - low) as usize + q * count[i].saturating_sub(1) + MOST_DEGREE + 1 + q)
     };
     let (u, v) = (range(0), range(1));
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
