@@ -59,29 +59,32 @@ fn views() -> [View; 3] {
 /// The steps of the reference along a ray.
 const STEPS: usize = 100;
 
-/// The largest difference of any component of any pixel in all frames from brute force. Pixels for which this has no
-/// number are ignored.
-fn largest_difference(
-    found: &[f32],
+/// What brute force gives for every component of all pixels in all frames; `None` where it has no number.
+fn brute_force(
     (grid, config): (&Grid, &RenderConfig),
     samples: &[f64],
     expected: impl Fn(&Rays<'_>, [usize; 2]) -> Vec<Option<f64>>,
-) -> f64 {
+) -> Vec<Option<f64>> {
     let scale = Camera::new(&config.views[0], grid).unwrap().scale;
     let (lattice, view) = of_reference(grid, config, scale);
     let [width, height] = config.views[0].size;
+    let frames = samples.chunks_exact(grid.whole().voxels());
+    let rays = frames.map(|values| Rays { lattice: &lattice, view: &view, values });
+    let pixels = |rays: Rays<'_>| -> Vec<Option<f64>> {
+        (0..width * height).flat_map(|pixel| expected(&rays, [pixel % width, pixel / width])).collect()
+    };
+    rays.flat_map(pixels).collect()
+}
+
+/// The largest difference of any component from brute force.
+fn largest_difference(found: &[f32], expected: &[Option<f64>]) -> f64 {
+    assert_eq!(found.len(), expected.len());
     let (mut largest, mut count) = (0.0_f64, 0);
-    let of_frame = found.len() / FRAMES;
-    for (values, picture) in samples.chunks_exact(grid.whole().voxels()).zip(found.chunks_exact(of_frame)) {
-        let rays = Rays { lattice: &lattice, view: &view, values };
-        for (pixel, numbers) in picture.chunks_exact(of_frame / (width * height)).enumerate() {
-            for (found, expected) in numbers.iter().zip(expected(&rays, [pixel % width, pixel / width])) {
-                let Some(expected) = expected else { continue };
-                assert_eq!(found.is_nan(), expected.is_nan(), "pixel {pixel}: {found} for {expected}");
-                largest = largest.max(if found.is_nan() { 0.0 } else { (f64::from(*found) - expected).abs() });
-                count += usize::from(!found.is_nan());
-            }
-        }
+    for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let Some(expected) = expected else { continue };
+        assert_eq!(found.is_nan(), expected.is_nan(), "number {n}: {found} for {expected}");
+        largest = largest.max(if found.is_nan() { 0.0 } else { (f64::from(*found) - expected).abs() });
+        count += usize::from(!found.is_nan());
     }
     assert!(count > found.len() / 8, "{count} of {}", found.len());
     largest
@@ -117,13 +120,14 @@ fn composites_are_those_of_brute_force() {
         let samples = field(&GRID, FRAMES, n as u64);
         let samples = if n == 1 { with_holes(samples) } else { samples };
         let file = exact(&samples, Basis::Haar);
+        let expected = brute_force((&GRID, &seen(view, &GRID, composite(None))), &samples, integral);
         for (slices, most) in [(None, 8e-2), (Some(4), 2e-2)] {
             let config = seen(view, &GRID, composite(slices));
             let mut scenes: [Box<dyn Scene>; 2] =
                 [Box::new(scene(&file)), Box::new(direct(&archive(GRID, SampleType::F64, &samples), None))];
             for scene in &mut scenes {
                 let (found, report) = pictures(scene.as_mut(), &config);
-                let off = largest_difference(&found, (&GRID, &config), &samples, integral);
+                let off = largest_difference(&found, &expected);
                 assert!(off < most, "view {n}, {slices:?} slices: {off:e}");
                 assert!(report.views[0].probed.is_some_and(|probed| probed.largest < most), "{report:?}");
             }
@@ -137,10 +141,11 @@ fn finer_slices_come_nearer_to_the_integral_along_the_ray() {
     let samples = field(&grid, FRAMES, 5);
     let memory = archive(grid, SampleType::F64, &samples);
     for view in [view(30.0, 25.0, [34, 32]), view(0.0, 90.0, [32, 32])] {
+        let expected = brute_force((&grid, &seen(view, &grid, composite(None))), &samples, integral);
         let error = |slices: usize| {
             let config = seen(view, &grid, composite(Some(slices)));
             let (found, _) = pictures(&mut direct(&memory, None), &config);
-            largest_difference(&found, (&grid, &config), &samples, integral)
+            largest_difference(&found, &expected)
         };
         let errors = [1, 2, 4].map(error);
         assert!(errors.windows(2).all(|pair| pair[1] < 0.5 * pair[0]) && errors[2] < 2e-2, "{errors:?}");
@@ -155,10 +160,11 @@ fn the_largest_value_is_that_of_brute_force() {
         let config = seen(view, &GRID, Mode::Mip { slices: Some(4) });
         let file = exact(&samples, SchemeConstraint::AUTO);
         let (found, _) = pictures(&mut scene(&file), &config);
-        let off = largest_difference(&found, (&GRID, &config), &samples, |rays, pixel| {
+        let expected = brute_force((&GRID, &config), &samples, |rays, pixel| {
             let [low, high] = [0.003, 0.03].map(|least| rays.largest(pixel, STEPS, least));
             vec![Some(low).filter(|low| (low - high).abs() < 1e-3)]
         });
+        let off = largest_difference(&found, &expected);
         assert!(off < 0.2, "view {n}: {off:e}");
     }
 }

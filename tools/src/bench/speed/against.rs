@@ -4,7 +4,7 @@
 
 use super::archives::{Bench, Subject};
 use super::convert::{Conversion, Scheme, run as convert};
-use super::results::{Row, Threshold};
+use super::results::{self, Row, Threshold};
 use super::settings::Config;
 use crate::bench::machine::Provenance;
 use crate::bench::size::Data;
@@ -145,7 +145,7 @@ fn seconds(
 }
 
 fn table(config: &Config, rows: &[Row]) -> String {
-    let made = Provenance::here(super::SCHEMA, config.date.as_ref());
+    let made = Provenance::here(results::SCHEMA, config.date.as_ref());
     let (size, rounds, tolerance) = (config.size, config.repeats, config.tolerances[0]);
     let mut text =
         format!("# This build beside another one\n\n{}; {rounds} round(s), {size}x{size} pixels.\n\n", made.words());
