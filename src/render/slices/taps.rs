@@ -5,6 +5,9 @@ use crate::base::grid::Region;
 /// The kernel is cut where a voxel is at least this many standard deviations away.
 pub(super) const CUT: f64 = 4.0;
 
+/// Positions are at most this far from the first voxel: farther ones have no weights, either.
+const FARTHEST: f64 = 1e15;
+
 /// Voxels on each side of a position that the kernel reaches, for a standard deviation in voxels.
 pub(super) fn reach(sigma: f64) -> usize {
     (CUT * sigma).ceil().max(1.0) as usize
@@ -24,6 +27,7 @@ pub(super) struct Taps {
 impl Taps {
     /// The weights at a position in voxels, of a Gaussian whose standard deviation is `sigma` voxels.
     pub(super) fn new(position: f64, sigma: f64) -> Self {
+        let position = position.clamp(-FARTHEST, FARTHEST);
         let (below, reach) = (position.floor(), reach(sigma) as i64);
         let square = |n: i64| (position - below - n as f64).powi(2);
         let (nearest, decay) = (square(0).min(square(1)), 0.5 / (sigma * sigma));
@@ -77,6 +81,14 @@ mod tests {
                     assert!((f64::from(*weight) - expected).abs() < 2e-4, "{sigma} {position} {i}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn positions_far_away_have_no_weights() {
+        for position in [1e300, -1e300, f64::INFINITY, 1e18, f64::NAN] {
+            let taps = Taps::new(position, 0.75);
+            assert!(position.is_nan() || taps.within(0, 1000).1.is_empty(), "{position}");
         }
     }
 
