@@ -13,7 +13,7 @@ mod tests;
 mod unpack;
 
 pub use pack::{estimate_cells, pack_cells};
-pub use unpack::unpack_cells;
+pub use unpack::{unpack_cells, unpack_sparse_cells};
 
 use crate::segments::max_segments;
 
@@ -99,8 +99,10 @@ struct Grid {
 /// Position of a row of cells.
 #[derive(Clone, Copy)]
 struct Row {
-    /// Its index along y.
+    /// Its indices along y, z, t.
     y: usize,
+    z: usize,
+    t: usize,
     /// Index of its first code in the box, and of its first count.
     code: usize,
     count: usize,
@@ -121,6 +123,8 @@ impl Grid {
         let st = if self.counts.is_empty() { 0 } else { st };
         let row = move |t, z, y| Row {
             y,
+            z,
+            t,
             code: sx * (2 * y + sy * (2 * z + sz * t)),
             count: cx * (y + 1 + (cy + 1) * (z + 1)),
             whole: [2 * y + 1 < sy, 2 * z + 1 < sz],

@@ -27,6 +27,7 @@ mod recovery;
 mod sample;
 mod section;
 mod segments;
+mod sparse;
 mod storage;
 mod structure;
 #[cfg(test)]
@@ -38,7 +39,7 @@ mod window;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
-pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells};
+pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells, unpack_sparse_cells};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use file_id::FileId;
@@ -54,6 +55,7 @@ pub use pyramid::{Axis, Pass, Pyramid, Stencil};
 pub use reader::Reader;
 pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
+pub use sparse::{CodeBox, SparseCodes};
 pub use storage::{ReadAhead, Storage, read_joined};
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

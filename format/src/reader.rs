@@ -3,7 +3,7 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, ParseResult, ensure};
-use crate::cells::unpack_cells;
+use crate::cells::{unpack_cells, unpack_sparse_cells};
 use crate::directory::{BlockEntry, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
@@ -14,6 +14,7 @@ use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::section::{FRAME, SectionId, decompress, read_section};
+use crate::sparse::{CodeBox, SparseCodes};
 use crate::{Error, ReadAhead, Result, Storage};
 use std::sync::Arc;
 
@@ -173,6 +174,33 @@ impl<S: Storage> Reader<S> {
         };
         let raw = self.part(block, part)?;
         let found = unpack_level(&geometry, level, &raw, codes);
+        unpacked(block, part, found, |&count| count).map(|_| ())
+    }
+
+    /// Appends the codes of a level of a pyramid that are not zero, with their places in `boxes`: the nodes that each pass of
+    /// the level adds.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the window has no such level or the boxes have other extents, [`Error::Lost`] if the block is
+    /// lost; otherwise as [`Self::part`].
+    pub fn sparse_codes(
+        &self,
+        block: &BlockEntry,
+        level: u8,
+        boxes: &[CodeBox],
+        codes: &mut SparseCodes,
+    ) -> Result<()> {
+        let geometry = self.geometry(block.id)?;
+        if !boxes.iter().map(|of| of.extents).eq(geometry.boxes(level)) {
+            return Err(Error::Invalid(format!("{}: other passes in level {level}", block.id)));
+        }
+        self.check_present(block)?;
+        let Some(part) = block.part(PartKind::Level(level)) else {
+            codes.skip(boxes);
+            return Ok(());
+        };
+        let raw = self.part(block, part)?;
+        let found = unpack_sparse_cells(&raw, boxes, codes);
         unpacked(block, part, found, |&count| count).map(|_| ())
     }
 

@@ -3,34 +3,38 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// A slice that returns its memory to a pool when dropped, for the next buffer of its type on any thread. So the pool
-/// never holds more buffers than were in use at one time. Only blocks use buffers, so none is much larger than the
-/// others.
+/// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. So the pool never
+/// holds more memory than buffers of its sizes had at one time. Only blocks use buffers, so none is much larger than others
+/// of its kind.
 #[derive(Debug, Default)]
-pub struct Buffer<T: Pooled>(Vec<T>);
+pub struct Buffer<T: Pooled> {
+    /// At least `len` values; the rest has been used before.
+    values: Vec<T>,
+    len: usize,
+}
 
 impl<T: Pooled> Buffer<T> {
-    /// Creates a slice of `len` entries with arbitrary values.
+    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough, or a new one.
     pub(crate) fn of(len: usize) -> Self {
-        let mut values = spare::<T>().pop().unwrap_or_default();
-        if values.capacity() < len {
-            values = Vec::new(); // avoids copying old values
-        }
-        values.resize(len, T::default());
-        Self(values)
+        let mut spare = spare::<T>();
+        let fits = (0..spare.len()).filter(|n| spare[*n].len() >= len).min_by_key(|n| spare[*n].len());
+        let values = fits.map(|n| spare.swap_remove(n));
+        drop(spare);
+        Self { values: values.unwrap_or_else(|| vec![T::default(); len]), len }
     }
 }
 
 impl<T: Pooled> FromIterator<T> for Buffer<T> {
     fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
-        Self(values.into_iter().collect())
+        let values: Vec<T> = values.into_iter().collect();
+        Self { len: values.len(), values }
     }
 }
 
 impl<T: Pooled> Drop for Buffer<T> {
     fn drop(&mut self) {
-        if self.0.capacity() > 0 {
-            spare::<T>().push(std::mem::take(&mut self.0));
+        if !self.values.is_empty() {
+            spare::<T>().push(std::mem::take(&mut self.values));
         }
     }
 }
@@ -39,13 +43,13 @@ impl<T: Pooled> Deref for Buffer<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        &self.0
+        &self.values[..self.len]
     }
 }
 
 impl<T: Pooled> DerefMut for Buffer<T> {
     fn deref_mut(&mut self) -> &mut [T] {
-        &mut self.0
+        &mut self.values[..self.len]
     }
 }
 
@@ -87,11 +91,13 @@ mod tests {
     #[test]
     fn memory_is_used_again_and_grows() {
         let address = |buffer: &Buffer<u64>| buffer.as_ptr();
-        let first = Buffer::of(1 << 12);
-        let memory = address(&first);
-        drop(first);
+        let (small, large) = (Buffer::of(1 << 8), Buffer::of(1 << 12));
+        let memory = [address(&small), address(&large)];
+        drop((small, large));
         let again = Buffer::of(1 << 10);
-        assert_eq!((address(&again), again.len()), (memory, 1 << 10));
+        assert_eq!((address(&again), again.len()), (memory[1], 1 << 10));
+        let small = Buffer::of(3);
+        assert_eq!((address(&small), small.len()), (memory[0], 3));
         assert_eq!(Buffer::<u64>::of(1 << 14).len(), 1 << 14);
     }
 }

@@ -5,7 +5,7 @@
 //! rest need not be read. Blocks without a pyramid are decoded whole, and then thinned.
 
 use super::WindowCodec;
-use super::buffer::{Buffer, Pooled};
+use super::buffer::Buffer;
 use super::decode::Block;
 use super::pyramid::PredictionPasses;
 use super::real::Real;
@@ -96,39 +96,34 @@ impl Lattice {
         codec: &WindowCodec,
         (pyramid, entry): (&Pyramid, &BlockEntry),
     ) -> Result<Vec<f64>> {
-        let ranges = codec.part_ranges(self.size);
-        let parts = &ranges[..[4, 2, 1][self.level as usize]];
-        let mut codes = Buffer::of(parts.last().map_or(0, |last| last.end));
-        for (part, range) in (0..).zip(parts) {
-            reader.codes(entry, part, &mut codes[range.clone()])?;
-        }
         Ok(match pyramid.single {
-            true => self.values_of_codes::<f32>(codec, pyramid, (entry.stats.step, &codes)),
-            false => self.values_of_codes::<f64>(codec, pyramid, (entry.stats.step, &codes)),
+            true => self.values_of_codes::<f32, S>(reader, codec, (pyramid, entry))?,
+            false => self.values_of_codes::<f64, S>(reader, codec, (pyramid, entry))?,
         })
     }
 
-    fn values_of_codes<R: Real + Pooled>(
+    fn values_of_codes<R: Real, S: Storage>(
         &self,
+        reader: &Reader<S>,
         codec: &WindowCodec,
-        pyramid: &Pyramid,
-        (step, codes): (f64, &[i32]),
-    ) -> Vec<f64> {
+        (pyramid, entry): (&Pyramid, &BlockEntry),
+    ) -> Result<Vec<f64>> {
         let level = self.level;
         let passes = PredictionPasses::down_to(pyramid, codec.shape(self.size), level);
+        let codes = passes.read(reader, entry, |_| true)?;
         let [x, y, z, ks] = passes.nodes();
         let mut field = Buffer::<R>::of(x * y * z * ks);
-        let marked = passes.decode(step, codes, &mut field);
+        let marked = passes.decode(entry.stats.step, &codes, &mut field);
         let level_along = |axis: Axis| if pyramid.order.contains(&axis) { level } else { 0 };
         let places = self.places([x, y, z], [Axis::X, Axis::Y, Axis::Z].map(level_along));
         let nodes = |k: usize| {
             let of_k = &field[k * (x * y * z)..][..x * y * z];
             places.iter().map(|at| of_k[*at].to_f64()).collect()
         };
-        self.invert(codec, places.len(), |k| {
+        Ok(self.invert(codec, places.len(), |k| {
             let k = k >> level_along(Axis::T);
             marked[k].then(|| nodes(k))
-        })
+        }))
     }
 
     /// The frames (eq 7) from the coefficients of each k; `None` stands for zeros.
@@ -179,77 +174,5 @@ impl Lattice {
             }
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use wavesplat_format::Stencil;
-
-    /// The next of some scattered numbers below `end`.
-    fn below(end: usize, state: &mut u64) -> usize {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 33) as usize % end
-    }
-
-    fn some_pyramid(state: &mut u64) -> Pyramid {
-        let mut left = vec![Axis::X, Axis::Y, Axis::Z, Axis::T];
-        let order = (0..below(5, state)).map(|_| left.swap_remove(below(left.len(), state))).collect();
-        let stencil = [Stencil::Linear, Stencil::Cubic][below(2, state)];
-        Pyramid { order, stencil, growth: 1.5, most: [1.0, 2.0, 9.0][below(3, state)], single: false }
-    }
-
-    #[test]
-    fn the_nodes_of_a_level_are_those_of_all_passes() {
-        let state = &mut 7;
-        let mut compared = 0;
-        for case in 0..2000 {
-            let pyramid = some_pyramid(state);
-            let shape: [usize; 4] = std::array::from_fn(|_| 1 + below([17, 4][case % 2], state));
-            let codes: Vec<i32> = (0..shape.iter().product()).map(|_| below(9, state) as i32 - 4).collect();
-            let mut whole = vec![0.0; codes.len()];
-            PredictionPasses::new(&pyramid, shape).decode(0.3, &codes, &mut whole);
-            for level in 0..=COARSEST {
-                let passes = PredictionPasses::down_to(&pyramid, shape, level);
-                let [x, y, z, _] = passes.nodes();
-                let mut coarse = vec![0.0_f64; passes.nodes().iter().product()];
-                passes.decode(0.3, &codes[..coarse.len()], &mut coarse);
-                let apart = [Axis::X, Axis::Y, Axis::Z, Axis::T]
-                    .map(|a| usize::from(pyramid.order.contains(&a)) * level as usize);
-                for (i, found) in coarse.iter().enumerate() {
-                    let node = [i % x, i / x % y, i / (x * y) % z, i / (x * y * z)];
-                    let at: [usize; 4] = std::array::from_fn(|a| node[a] << apart[a]);
-                    let expected: f64 = whole[at[0] + shape[0] * (at[1] + shape[1] * (at[2] + shape[2] * at[3]))];
-                    assert_eq!(found.to_bits(), expected.to_bits(), "{pyramid:?} {shape:?} {level} {at:?}");
-                    compared += 1;
-                }
-            }
-        }
-        assert!(compared > 1_000_000, "{compared}");
-    }
-    #[test]
-    fn some_ks_have_the_nodes_of_all_passes() {
-        let state = &mut 11;
-        let (mut compared, mut left_out) = (0, 0);
-        for case in 0..2000 {
-            let pyramid = some_pyramid(state);
-            let [x, y, z] = std::array::from_fn(|_| 1 + below([9, 4][case % 2], state));
-            let shape = [x, y, z, 1 + below(33, state)];
-            let codes: Vec<i32> = (0..shape.iter().product()).map(|_| below(9, state) as i32 - 4).collect();
-            let passes = PredictionPasses::new(&pyramid, shape);
-            let wanted: Vec<bool> = (0..shape[3]).map(|_| below(8, state) == 0).collect();
-            let (mut whole, mut some) = (vec![0.0_f64; codes.len()], vec![f64::NAN; codes.len()]);
-            assert_eq!(passes.decode(0.3, &codes, &mut whole), passes.decode_some(&wanted, 0.3, &codes, &mut some));
-            let of_k = |nodes: &[f64], k: usize| nodes[k * x * y * z..][..x * y * z].to_vec();
-            for k in 0..shape[3] {
-                let (found, expected) = (of_k(&some, k), of_k(&whole, k));
-                assert!(!wanted[k] || found == expected, "{pyramid:?} {shape:?} {wanted:?} {k}");
-                assert!(found.iter().all(|v| v.is_finite()));
-                compared += usize::from(wanted[k]);
-                left_out += usize::from(found != expected);
-            }
-        }
-        assert!(compared > 2000 && left_out > 2000, "{compared} {left_out}");
     }
 }

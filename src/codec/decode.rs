@@ -6,6 +6,7 @@
 
 use super::WindowCodec;
 use super::buffer::Buffer;
+use super::codes::Codes;
 use super::field::{Field, Plane};
 use super::pyramid::PredictionPasses;
 use super::rows::Change;
@@ -21,8 +22,8 @@ pub struct Block {
     pub voxels: usize,
     /// The quantisation step.
     pub step: f64,
-    /// The codes: at `k * voxels + voxel`, or with a pyramid pass after pass; empty if no level part was read.
-    pub codes: Buffer<i32>,
+    /// The codes of the level parts that were read.
+    pub(crate) codes: Codes,
     /// Samples stored exactly because their decoded values miss the bound.
     pub outliers: Outliers,
     /// Which samples are missing (`frame * voxels + voxel`), and the bytes of those in order; empty if none is missing.
@@ -46,7 +47,7 @@ impl Block {
             size,
             voxels: size.iter().product(),
             step: entry.stats.step,
-            codes: Buffer::default(),
+            codes: Codes::default(),
             outliers: reader.outliers(entry)?,
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
@@ -77,7 +78,7 @@ impl Block {
         let mut bytes = vec![0; samples * codec.sample.size()];
         sample::store(codec.sample, &vec![number; samples], &mut bytes);
         let (outliers, missing) = (Outliers::default(), (vec![true; samples], bytes));
-        Self { size, voxels, step: 0.0, codes: Buffer::default(), outliers, missing, exact: None, bytes_read: 0 }
+        Self { size, voxels, step: 0.0, codes: Codes::default(), outliers, missing, exact: None, bytes_read: 0 }
     }
 
     /// Reads the level parts that exist and that `wanted` needs; the codes of others are zero.
@@ -88,22 +89,38 @@ impl Block {
         entry: &BlockEntry,
         wanted: &[bool],
     ) -> Result<()> {
-        let part = |level: u8| entry.part(PartKind::Level(level)).filter(|_| codec.needs_part(level.into(), wanted));
-        let ranges = codec.part_ranges(self.size);
-        if (0..).zip(&ranges).all(|(level, _)| part(level).is_none()) {
+        let parts: Vec<&PartEntry> = Self::parts(codec, entry, wanted).filter(|part| is_level(part)).collect();
+        if parts.is_empty() {
             return Ok(());
         }
-        self.codes = Buffer::of(codec.basis.coefficients() * self.voxels);
-        for (level, range) in (0..).zip(ranges) {
-            match part(level) {
-                Some(part) => {
-                    reader.codes(entry, level, &mut self.codes[range])?;
-                    self.bytes_read += u64::from(part.stored_len);
-                }
-                None => self.codes[range].fill(0),
+        self.bytes_read += parts.iter().map(|part| u64::from(part.stored_len)).sum::<u64>();
+        let needed = |level: u8| parts.iter().any(|part| part.kind == PartKind::Level(level));
+        self.codes = match &codec.scheme.pyramid {
+            Some(pyramid) => {
+                let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
+                Codes::Sparse(passes.read(reader, entry, needed)?)
+            }
+            None => Codes::Dense(self.read_dense(reader, codec, entry, needed)?),
+        };
+        Ok(())
+    }
+
+    fn read_dense<S: Storage>(
+        &self,
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        needed: impl Fn(u8) -> bool,
+    ) -> Result<Buffer<i32>> {
+        let mut codes = Buffer::of(codec.basis.coefficients() * self.voxels);
+        for (level, range) in (0..).zip(codec.part_ranges(self.size)) {
+            if needed(level) {
+                reader.codes(entry, level, &mut codes[range])?;
+            } else {
+                codes[range].fill(0);
             }
         }
-        Ok(())
+        Ok(codes)
     }
 
     /// Decodes the codes to coefficients.
@@ -116,7 +133,7 @@ impl Block {
     pub(crate) fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
-        at_once.then(|| Field::refined(codec, self.size, self.step, (&self.codes, wanted)))
+        at_once.then(|| Field::refined(codec, self.size, self.step, (self.codes.sparse(), wanted)))
     }
 
     /// Whether any sample is stored exactly, and overrides the coefficients.
@@ -140,10 +157,10 @@ impl Block {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
             let ranges = codec.part_ranges(self.size).into_iter();
-            return ranges.map(|part| self.codes.get(part).map_or(0.0, of_codes)).collect();
+            return ranges.map(|part| self.codes.dense().get(part).map_or(0.0, of_codes)).collect();
         };
         let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
-        self.field(codec).changes(&passes).iter().map(Change::largest).collect()
+        self.field(codec).changes(&passes, self.step, self.codes.sparse()).iter().map(Change::largest).collect()
     }
 
     /// Whether a sample is missing.

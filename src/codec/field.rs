@@ -1,12 +1,13 @@
 //! The decoded coefficients of a block, for every scheme.
 
 use super::WindowCodec;
-use super::buffer::{Buffer, Pooled};
+use super::buffer::Buffer;
+use super::codes::Codes;
 use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::wavelet::{LANES, Lane, TimeBasis};
-use wavesplat_format::Pyramid;
+use wavesplat_format::{Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
 #[derive(Debug)]
@@ -51,16 +52,15 @@ impl<'a> Plane<'a> {
         codec: &WindowCodec,
         size: [usize; 3],
         step: f64,
-        (codes, k): (&[i32], usize),
+        (codes, k): (&Codes, usize),
         (single, double): (&'a mut Vec<f32>, &'a mut Vec<f64>),
     ) -> Self {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let voxels: usize = size.iter().product();
-            return Self::scaled(step, codes.get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
+            return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
         };
-        let passes = PredictionPasses::new(pyramid, codec.shape(size));
+        let (passes, codes) = (PredictionPasses::new(pyramid, codec.shape(size)), codes.sparse());
         match pyramid.single {
-            _ if codes.is_empty() => Self::Zero,
             true if passes.decode_one(k, step, codes, single) => Self::Single(single),
             false if passes.decode_one(k, step, codes, double) => Self::Double(double),
             _ => Self::Zero,
@@ -83,11 +83,10 @@ impl Field<'static> {
         codec: &WindowCodec,
         size: [usize; 3],
         step: f64,
-        (codes, wanted): (&[i32], &[bool]),
+        (codes, wanted): (&SparseCodes, &[bool]),
     ) -> Self {
         let shape = codec.shape(size);
         let (values, marked) = match &codec.scheme.pyramid {
-            _ if codes.is_empty() => (Values::Zero, vec![false; codec.basis.coefficients()]),
             Some(pyramid) if pyramid.single => refined(pyramid, shape, step, (codes, wanted), Values::Single),
             Some(pyramid) => refined(pyramid, shape, step, (codes, wanted), Values::Double),
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
@@ -98,11 +97,14 @@ impl Field<'static> {
 
 impl<'a> Field<'a> {
     /// Decodes all codes of a block of `size` voxels. Without codes, all coefficients are zero.
-    pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a [i32]) -> Self {
-        if codec.scheme.pyramid.is_some() || codes.is_empty() {
-            return Field::refined(codec, size, step, (codes, &vec![true; codec.basis.coefficients()]));
+    pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a Codes) -> Self {
+        match codes {
+            Codes::Dense(codes) if !codes.is_empty() => {
+                let marked = vec![true; codec.basis.coefficients()];
+                Self { values: Values::Codes { step, codes }, marked }
+            }
+            _ => Field::refined(codec, size, step, (codes.sparse(), &vec![true; codec.basis.coefficients()])),
         }
-        Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
     }
 
     /// The coefficient at `k * voxels + voxel`.
@@ -116,10 +118,10 @@ impl<'a> Field<'a> {
     }
 
     /// The change from leaving out each level part of a pyramid and all finer ones.
-    pub(super) fn changes(&self, passes: &PredictionPasses<'_>) -> Vec<Change> {
+    pub(super) fn changes(&self, passes: &PredictionPasses<'_>, step: f64, codes: &SparseCodes) -> Vec<Change> {
         match &self.values {
-            Values::Single(field) => passes.changes(field, &mut Vec::new()),
-            Values::Double(field) => passes.changes(field, &mut Vec::new()),
+            Values::Single(field) => passes.changes(step, codes, field),
+            Values::Double(field) => passes.changes(step, codes, field),
             Values::Zero | Values::Codes { .. } => vec![Change::default(); usize::from(Pyramid::PARTS)],
         }
     }
@@ -252,14 +254,17 @@ fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }
 
-fn refined<'a, R: Real + Pooled>(
+fn refined<'a, R: Real>(
     pyramid: &Pyramid,
     shape: [usize; 4],
     step: f64,
-    (codes, wanted): (&[i32], &[bool]),
+    (codes, wanted): (&SparseCodes, &[bool]),
     values: fn(Buffer<R>) -> Values<'a>,
 ) -> (Values<'a>, Vec<bool>) {
-    let mut field = Buffer::of(codes.len());
+    if codes.count() == 0 {
+        return (Values::Zero, vec![false; shape[3]]);
+    }
+    let mut field = Buffer::of(shape.iter().product());
     let marked = PredictionPasses::new(pyramid, shape).decode_some(wanted, step, codes, &mut field);
     (values(field), marked)
 }

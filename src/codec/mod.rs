@@ -9,6 +9,7 @@ pub(crate) mod bound;
 pub(crate) mod buffer;
 mod check;
 pub(crate) mod coarse;
+pub(crate) mod codes;
 pub(crate) mod decode;
 pub(crate) mod encode;
 mod error_weights;

@@ -50,7 +50,7 @@ impl Source<'_> {
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
-        [field, rest]: &mut [Vec<R>; 2],
+        [field, split]: &mut [Vec<R>; 2],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
         let weighing = QuantizerSetup::of(self.codec, self.samples, self.missing.magnitude)?;
@@ -58,16 +58,16 @@ impl Source<'_> {
         self.load(&weighing, field);
         codes.resize(field.len(), 0);
         let passes = PredictionPasses::new(pyramid, self.codec.shape(self.size));
-        if !passes.encode(step, field, codes) {
+        if !passes.encode(step, field, split, codes) {
             return None;
         }
         let mut tally = if self.plain() {
             self.check_samples(field)?
         } else {
-            self.check_series(&weighing, field, &passes.marked(codes))?
+            self.check_series(&weighing, field, &passes.marked_of(codes))?
         };
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let changes = Some(passes.changes_of_coded(codes, field, rest));
+        let changes = Some(passes.changes_of_coded(step, codes, field));
         Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
     }
 

@@ -3,65 +3,55 @@
 use super::real::Real;
 use crate::wavelet::{LANES, Lane};
 
-/// p = w0 a + w1 b
+/// p = w0 a + w1 b + 0: adding 0 turns -0 into 0.
 #[inline(always)]
 pub(super) fn sum2<R: Real>(rows: [&[R]; 2], w: [R; 2], out: &mut [R]) {
     let [a, b] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
-        *p = w[0] * a[i] + w[1] * b[i];
+        *p = (w[0] * a[i] + w[1] * b[i]) + R::default();
     }
 }
 
-/// p = (w0 a + w1 b) + w2 c
+/// p = (w0 a + w1 b) + w2 c + 0
 #[inline(always)]
 pub(super) fn sum3<R: Real>(rows: [&[R]; 3], w: [R; 3], out: &mut [R]) {
     let [a, b, c] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
-        *p = (w[0] * a[i] + w[1] * b[i]) + w[2] * c[i];
+        *p = ((w[0] * a[i] + w[1] * b[i]) + w[2] * c[i]) + R::default();
     }
 }
 
-/// p = ((w0 a + w1 b) + w2 c) + w3 d
+/// p = ((w0 a + w1 b) + w2 c) + w3 d + 0
 #[inline(always)]
 pub(super) fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], out: &mut [R]) {
     let [a, b, c, d] = rows.map(|row| &row[..out.len()]);
     for (i, p) in out.iter_mut().enumerate() {
-        *p = ((w[0] * a[i] + w[1] * b[i]) + w[2] * c[i]) + w[3] * d[i];
+        *p = (((w[0] * a[i] + w[1] * b[i]) + w[2] * c[i]) + w[3] * d[i]) + R::default();
     }
 }
 
 /// v = p + code * step
 #[inline(always)]
-pub(super) fn decode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &[i32], step: R) {
-    for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
-        *v = *p + R::of_code(*code) * step;
+pub(super) fn decode<R: Real>(nodes: &mut [R], codes: &[i32], step: R) {
+    for (v, code) in nodes.iter_mut().zip(codes) {
+        *v = *v + R::of_code(*code) * step;
     }
 }
 
-/// Computes the codes of v - p, 0 for NaN, and replaces v by its decoded value. False if a code does not fit.
+/// Computes the codes of v - p, 0 for NaN, and replaces p by the decoded value. False if a code does not fit.
 #[inline(always)]
-pub(super) fn encode<R: Real>(nodes: &mut [R], predicted: &[R], codes: &mut [i32], step: R, inverse: R) -> bool {
+pub(super) fn encode<R: Real>(nodes: &[R], predicted: &mut [R], codes: &mut [i32], [step, inverse]: [R; 2]) -> bool {
     let least = R::default() - R::MOST_CODE;
     let mut fits = true;
-    for ((v, p), code) in nodes.iter_mut().zip(predicted).zip(codes) {
+    for ((v, p), code) in nodes.iter().zip(predicted).zip(codes) {
         let q = (*v - *p) * inverse;
         let small = (q < R::MOST_CODE) & (q > least);
         fits &= small | v.is_nan();
         let rounded = if small { q + R::BIG } else { R::BIG };
         *code = rounded.less_big();
-        *v = *p + (rounded - R::BIG) * step;
+        *p = *p + (rounded - R::BIG) * step;
     }
     fits
-}
-
-/// Copies every `distance`-th node until `out` is full.
-#[inline(always)]
-pub(super) fn gather<R: Real>(nodes: &[R], distance: usize, out: &mut [R]) {
-    if distance == 2 && nodes.len() >= 2 * out.len() {
-        out.iter_mut().zip(nodes.as_chunks::<2>().0).for_each(|(v, [node, _])| *v = *node);
-    } else {
-        out.iter_mut().zip(nodes.iter().step_by(distance)).for_each(|(v, node)| *v = *node);
-    }
 }
 
 /// Whether all nodes are zero.
@@ -72,6 +62,13 @@ pub(super) fn is_zero<R: Real>(nodes: &[R]) -> bool {
 /// Whether all codes are zero.
 pub(super) fn all_zero(codes: &[i32]) -> bool {
     codes.chunks(64).all(|some| some.iter().fold(0, |any, code| any | code) == 0)
+}
+
+/// The number of codes that are not zero.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn count_nonzero(codes: &[i32]) -> usize {
+    let of_run = |run: &[i32]| run.iter().map(|code| u32::from(*code != 0)).sum::<u32>() as usize;
+    codes.chunks(1 << 16).map(of_run).sum()
 }
 
 /// The largest change and the sum of squared changes of some values.
@@ -104,19 +101,15 @@ impl Change {
     }
 }
 
-/// Adds the changes from `nodes` to `others`, and replaces `nodes` by `others`.
-#[inline(always)]
-pub(super) fn replace<R: Real>(change: &mut Change, nodes: &mut [R], others: &[R]) {
-    let (nodes, last_nodes) = nodes.as_chunks_mut::<LANES>();
+/// Adds the changes from `nodes` to `others`.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
+    let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();
-    for (a, b) in nodes.iter_mut().zip(others) {
+    for (a, b) in nodes.iter().zip(others) {
         (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
-        *a = *b;
     }
-    last_nodes.iter_mut().zip(last_others).enumerate().for_each(|(l, (a, b))| {
-        change.add(l, *a, *b);
-        *a = *b;
-    });
+    last_nodes.iter().zip(last_others).enumerate().for_each(|(l, (a, b))| change.add(l, *a, *b));
 }
 
 /// Adds the changes from nodes to zeros.

@@ -22,6 +22,7 @@ pub(crate) struct Trial<'a, R> {
 #[derive(Default)]
 pub(crate) struct Scratch<R> {
     field: Vec<R>,
+    split: Vec<R>,
     codes: Vec<i32>,
 }
 
@@ -52,7 +53,7 @@ impl<'a, R: Real> Trial<'a, R> {
         &self,
         codec: &WindowCodec,
         pyramid: &Pyramid,
-        Scratch { field, codes }: &mut Scratch<R>,
+        Scratch { field, split, codes }: &mut Scratch<R>,
     ) -> Option<usize> {
         let source = Source { codec, size: self.size, samples: self.samples, missing: &self.missing };
         let weighing = self.weighing.as_ref()?;
@@ -60,10 +61,10 @@ impl<'a, R: Real> Trial<'a, R> {
         clear(field).extend_from_slice(&self.nodes);
         codes.resize(field.len(), 0);
         let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
-        if !passes.encode(step, field, codes) {
+        if !passes.encode(step, field, split, codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field, &passes.marked(codes));
+        let outliers = source.estimate_outliers(weighing, field, &passes.marked_of(codes));
         let parts = (0..).zip(codec.part_ranges(self.size));
         let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.

@@ -4,6 +4,7 @@ use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCAL
 use crate::bits::{BitReader, take_varint};
 use crate::bytes::{ParseResult, ensure};
 use crate::segments::unpack_segments;
+use crate::sparse::{CodeBox, SparseCodes};
 
 /// Fills `codes` with the codes of all boxes; returns how many are not zero.
 ///
@@ -14,13 +15,26 @@ use crate::segments::unpack_segments;
 pub fn unpack_cells(raw: &[u8], boxes: &[[usize; 4]], codes: &mut [i32]) -> Result<usize, String> {
     let total = boxes.iter().map(volume).fold(0, usize::saturating_add);
     ensure(total == codes.len(), || format!("boxes of {total} codes instead of {}", codes.len()))?;
-    let mut streams = Streams::parse(raw, boxes.iter().map(cells).sum(), total)?;
-    let mut rest = codes;
-    for &extents in boxes {
-        let (codes, after) = rest.split_at_mut(volume(&extents));
-        streams.fill(codes, extents)?;
-        rest = after;
+    let boxes: Vec<CodeBox> = boxes.iter().copied().map(CodeBox::contiguous).collect();
+    let mut sparse = SparseCodes::default();
+    let count = unpack_sparse_cells(raw, &boxes, &mut sparse)?;
+    sparse.fill(&boxes, codes);
+    Ok(count)
+}
+
+/// Appends the codes of all boxes that are not zero; returns how many they are.
+///
+/// # Errors
+/// The reason if `raw` does not follow the format, or a place does not fit in 32 bits.
+pub fn unpack_sparse_cells(raw: &[u8], boxes: &[CodeBox], codes: &mut SparseCodes) -> Result<usize, String> {
+    let sum = |each: fn(&[usize; 4]) -> usize| boxes.iter().map(|of| each(&of.extents)).fold(0, usize::saturating_add);
+    ensure(boxes.iter().all(CodeBox::fits), || "a box is too large".into())?;
+    let mut streams = Streams::parse(raw, sum(cells), sum(volume))?;
+    let mut out = Found::new(codes, streams.values());
+    for of in boxes {
+        streams.fill(of, &mut out)?;
     }
+    out.finish();
     streams.finish()
 }
 
@@ -38,8 +52,7 @@ static CLASSES_OF: [u64; 32] = {
     table
 };
 
-/// Positions of the ones in each byte, lowest first. The highest is repeated to fill up; values are written from the last to
-/// the first, so the right one is written last.
+/// Positions of the ones in each byte, lowest first, filled up with the highest.
 static PLACES: [[u8; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut byte = 1;
@@ -91,27 +104,38 @@ impl<'a> Streams<'a> {
         let next = self.classes[..CLASSES].iter().chain(&self.scales);
         ensure(next.eq(&self.ends), || "the lengths of the streams do not match their cells".into())?;
         ensure(!self.invalid, || "a code out of range".into())?;
-        let left = self.bits.end()?.len();
+        let (values, left) = (self.values(), self.bits.end()?.len());
         ensure(left == 0, || format!("{left} bytes too many"))?;
-        Ok(self.ends[CLASSES + SCALES - 1] - self.ends[CLASSES - 1])
+        Ok(values)
     }
 
-    /// Fills the codes of a box.
-    fn fill(&mut self, codes: &mut [i32], extents: [usize; 4]) -> ParseResult {
-        let (mut grid, plane) = (Grid::new(extents), extents[0] * extents[1]);
+    /// The number of codes that are not zero.
+    fn values(&self) -> usize {
+        self.ends[CLASSES + SCALES - 1] - self.ends[CLASSES - 1]
+    }
+
+    /// Finds the codes of a box.
+    fn fill(&mut self, of: &CodeBox, out: &mut Found<'_>) -> ParseResult {
+        let mut grid = Grid::new(of.extents);
         let mut significant = vec![0; grid.cells[0]];
-        let ahead = |bit: usize| bit % 2 + extents[0] * (bit / 2 % 2 + extents[1] * (bit / 4));
+        let (first, strides) = (of.first as u32, of.strides.map(|stride| stride as u32));
+        let ahead = |bit: usize| {
+            strides[0] * (bit % 2) as u32 + strides[1] * (bit / 2 % 2) as u32 + strides[2] * (bit / 4) as u32
+        };
         let steps = std::array::from_fn(ahead);
+        let mut frame = 0;
         for row in grid.rows() {
-            if row.y == 0 {
-                let planes = plane * (1 + usize::from(row.whole[1]));
-                codes[row.code..][..planes].fill(0); // here, so that they are in the cache
+            while frame < row.t {
+                out.end_run();
+                frame += 1;
             }
             let (around, counts) = grid.around(row);
             self.mark(around, counts, &mut significant);
-            ensure(inside(&significant, row, extents[0]), || "a code outside its box is not zero".into())?;
-            self.scatter(&mut codes[row.code..], &steps, &significant, around, counts);
+            ensure(inside(&significant, row, of.extents[0]), || "a code outside its box is not zero".into())?;
+            let start = first + strides[1] * 2 * row.y as u32 + strides[2] * 2 * row.z as u32;
+            self.scatter((start, 2 * strides[0]), &steps, &significant, (around, counts), out);
         }
+        (frame..of.extents[3]).for_each(|_| out.end_run());
         Ok(())
     }
 
@@ -143,43 +167,57 @@ impl<'a> Streams<'a> {
         self.classes = next;
     }
 
-    /// Reads the values of a row of cells.
-    fn scatter(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: &[u8], around: &[u8], counts: &[u8]) {
-        let mut before = 0;
-        for (x, ((&byte, &around), &count)) in significant.iter().zip(around).zip(counts).enumerate() {
+    /// Reads the values of a row of cells; the first code of its first cell has the place `start`, that of the next cell
+    /// is `apart` from it.
+    fn scatter(
+        &mut self,
+        (start, apart): (u32, u32),
+        steps: &[u32; 8],
+        significant: &[u8],
+        (around, counts): (&[u8], &[u8]),
+        out: &mut Found<'_>,
+    ) {
+        let (mut before, mut place) = (0, start);
+        for ((&byte, &around), &count) in significant.iter().zip(around).zip(counts) {
             if byte != 0 {
                 let busy = usize::from(2 * count + around.wrapping_add(before) / 2);
                 let scale = usize::from(SCALE_OF[busy % ACTIVITIES]) % SCALES;
-                self.scatter_cell(&mut codes[2 * x..], steps, byte, scale);
+                self.scatter_cell(place, steps, byte, scale, out);
             }
             before = count;
+            place = place.wrapping_add(apart);
         }
     }
 
     /// Reads the values of a cell. Without long values it uses no loop, because a processor could not predict its end.
     #[inline(always)]
-    fn scatter_cell(&mut self, codes: &mut [i32], steps: &[usize; 8], significant: u8, scale: usize) {
+    fn scatter_cell(&mut self, place: u32, steps: &[u32; 8], significant: u8, scale: usize, out: &mut Found<'_>) {
         let next = self.scales[scale];
-        let count = ONES[usize::from(significant)];
+        let count = usize::from(ONES[usize::from(significant)]);
         let ahead = self.symbols.get(next..).and_then(|ahead| ahead.first_chunk::<8>()).unwrap_or(&[0; 8]);
-        self.scales[scale] = next.wrapping_add(usize::from(count));
-        let places = &PLACES[usize::from(significant)];
+        self.scales[scale] = next.wrapping_add(count);
+        let bits = &PLACES[usize::from(significant)];
         let ahead = *ahead;
-        if u64::from_le_bytes(ahead) << (64 - 8 * u32::from(count)) & 0x8080_8080_8080_8080 != 0 {
-            return self.scatter_long(codes, steps, &places[..usize::from(count)], &ahead);
+        let Some((places, values)) = out.next(count) else {
+            self.invalid = true;
+            return;
+        };
+        for i in 0..8 {
+            places[i] = place.wrapping_add(steps[usize::from(bits[i]) % 8]);
+            values[i] = unzigzag(u32::from(ahead[i]) + 1);
         }
-        let mut put = |i: usize| codes[steps[usize::from(places[i]) % 8]] = unzigzag(u32::from(ahead[i]) + 1);
-        if count > 4 {
-            (4..8).rev().for_each(&mut put);
+        if u64::from_le_bytes(ahead) << (64 - 8 * count as u32) & 0x8080_8080_8080_8080 != 0 {
+            self.lengthen(&ahead[..count], values);
         }
-        (0..4).rev().for_each(put);
     }
 
+    /// Replaces values that have low bits.
     #[cold]
-    fn scatter_long(&mut self, codes: &mut [i32], steps: &[usize; 8], places: &[u8], symbols: &[u8]) {
-        for (&place, &symbol) in places.iter().zip(symbols) {
-            let value = if u32::from(symbol) < LONG { u32::from(symbol) } else { self.long(symbol) };
-            codes[steps[usize::from(place) % 8]] = unzigzag(value.wrapping_add(1));
+    fn lengthen(&mut self, symbols: &[u8], values: &mut [i32; 8]) {
+        for (value, &symbol) in values.iter_mut().zip(symbols) {
+            if u32::from(symbol) >= LONG {
+                *value = unzigzag(self.long(symbol).wrapping_add(1));
+            }
         }
     }
 
@@ -194,6 +232,41 @@ impl<'a> Streams<'a> {
         let value = (4 + symbol % 4) << low | self.bits.take(low);
         self.invalid |= value == u32::MAX;
         value
+    }
+}
+
+/// Codes found so far, with room for 8 more than there are: a cell writes 8, and keeps as many as it has.
+struct Found<'a> {
+    codes: &'a mut SparseCodes,
+    count: usize,
+}
+
+impl<'a> Found<'a> {
+    fn new(codes: &'a mut SparseCodes, more: usize) -> Self {
+        let count = codes.values.len();
+        codes.places.resize(count + more + 8, 0);
+        codes.values.resize(count + more + 8, 0);
+        Self { codes, count }
+    }
+
+    /// Where the next codes are written; none if there are more than announced.
+    #[inline(always)]
+    fn next(&mut self, count: usize) -> Option<(&mut [u32; 8], &mut [i32; 8])> {
+        let first = self.count;
+        self.count += count;
+        Some((
+            self.codes.places.get_mut(first..)?.first_chunk_mut()?,
+            self.codes.values.get_mut(first..)?.first_chunk_mut()?,
+        ))
+    }
+
+    fn end_run(&mut self) {
+        self.codes.ends.push(self.count);
+    }
+
+    fn finish(self) {
+        self.codes.places.truncate(self.count);
+        self.codes.values.truncate(self.count);
     }
 }
 

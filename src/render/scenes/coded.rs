@@ -99,16 +99,9 @@ impl BlockPlanes for CodedBlock<'_> {
 
     fn held(&self) -> [u64; 2] {
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let codes = if coded { &self.block.codes[..] } else { &[] };
-        [count_nonzero(codes), self.block.bytes_read]
+        let nonzero = if coded { self.block.codes.nonzero() } else { 0 };
+        [nonzero as u64, self.block.bytes_read]
     }
-}
-
-/// The number of codes that are not zero.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn count_nonzero(codes: &[i32]) -> u64 {
-    let of_run = |run: &[i32]| u64::from(run.iter().map(|code| u32::from(*code != 0)).sum::<u32>());
-    codes.chunks(1 << 16).map(of_run).sum()
 }
 
 /// The coefficients of one k of a block.

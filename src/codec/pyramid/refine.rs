@@ -1,0 +1,142 @@
+//! Kernels that refine a lattice by two along one axis, or split it again. Arrays hold the nodes of one lattice side by
+//! side, without gaps for finer nodes, so that all kernels work on contiguous rows.
+//!
+//! An axis divides an array into `outer` parts, each of `evens` or `evens + odds` rows of `inner` nodes. Refining copies
+//! the rows of even nodes apart from each other, and predicts the odd rows between them (eq 33).
+
+use super::Correction;
+use super::stencil::{predict_line, taps};
+use crate::codec::real::Real;
+use wavesplat_format::Stencil;
+
+/// The rows of a lattice along the refined axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Rows {
+    pub(super) outer: usize,
+    pub(super) inner: usize,
+    pub(super) evens: usize,
+    pub(super) odds: usize,
+}
+
+impl Rows {
+    /// The rows along `axis` of a lattice of `extents` nodes whose axis gains `odds` nodes.
+    pub(super) fn new(extents: [usize; 3], axis: usize, odds: usize) -> Self {
+        let product = |extents: &[usize]| extents.iter().product();
+        let (inner, outer) = (product(&extents[..axis]), product(&extents[axis + 1..]));
+        Self { outer, inner, evens: extents[axis], odds }
+    }
+
+    /// The number of even nodes.
+    pub(super) fn even_nodes(&self) -> usize {
+        self.outer * self.evens * self.inner
+    }
+}
+
+/// Refines along any axis but the fastest, and corrects every odd row. The first node that the pass adds to this array is
+/// the `first`-th that it adds.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn refine_across<R: Real, C: Correction<R>>(
+    stencil: Stencil,
+    rows: &Rows,
+    coarse: &[R],
+    fine: &mut [R],
+    (pass, first, correction): (usize, usize, &mut C),
+) {
+    let &Rows { outer, inner, evens, odds } = rows;
+    for part in 0..outer {
+        let from = &coarse[part * evens * inner..][..evens * inner];
+        let to = &mut fine[part * (evens + odds) * inner..][..(evens + odds) * inner];
+        for i in 0..evens {
+            to[2 * i * inner..][..inner].copy_from_slice(&from[i * inner..][..inner]);
+        }
+        for i in 0..odds {
+            let taps = taps(stencil, i, evens);
+            let row = |t: usize| if t < taps.count { &from[(taps.first + t) * inner..][..inner] } else { &[] };
+            let predicted = &mut to[(2 * i + 1) * inner..][..inner];
+            taps.sum([row(0), row(1), row(2), row(3)], predicted);
+            correction.correct(pass, first + (part * odds + i) * inner, predicted);
+        }
+    }
+}
+
+/// Refines along the fastest axis, and corrects the odd nodes of every line.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn refine_lines<R: Real, C: Correction<R>>(
+    stencil: Stencil,
+    rows: &Rows,
+    coarse: &[R],
+    fine: &mut [R],
+    (pass, first, correction): (usize, usize, &mut C),
+) {
+    let &Rows { outer, evens, odds, .. } = rows;
+    let mut odd = vec![R::default(); odds];
+    for line in 0..outer {
+        let even = &coarse[line * evens..][..evens];
+        predict_line(stencil, even, &mut odd);
+        correction.correct(pass, first + line * odds, &mut odd);
+        let to = &mut fine[line * (evens + odds)..][..evens + odds];
+        for (to, (even, odd)) in to.as_chunks_mut::<2>().0.iter_mut().zip(even.iter().zip(&odd)) {
+            *to = [*even, *odd];
+        }
+        if evens > odds {
+            to[2 * odds] = even[odds];
+        }
+    }
+}
+
+/// Refines along time: predicts the odd slices of `slices` nodes each from the even ones, which are in place.
+///
+/// Only the slices that `wanted` marks are predicted. A few nodes of all slices at a time stay in the cache.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn refine_slices<R: Real>(stencil: Stencil, slice: usize, wanted: &[bool], nodes: &mut [R]) {
+    let evens = wanted.len().div_ceil(2);
+    let mut predicted = [R::default(); NODES];
+    for first in (0..slice).step_by(NODES) {
+        let count = NODES.min(slice - first);
+        for odd in (1..wanted.len()).step_by(2) {
+            if wanted[odd] {
+                let taps = taps(stencil, odd / 2, evens);
+                let row = |t: usize| {
+                    if t < taps.count { &nodes[2 * (taps.first + t) * slice + first..][..count] } else { &[] }
+                };
+                taps.sum([row(0), row(1), row(2), row(3)], &mut predicted[..count]);
+                nodes[odd * slice + first..][..count].copy_from_slice(&predicted[..count]);
+            }
+        }
+    }
+}
+
+/// Nodes of a slice that are predicted together along time.
+const NODES: usize = 1024;
+
+/// Splits a lattice into its even nodes and its odd ones along an axis.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+pub(super) fn split<R: Real>(rows: &Rows, fine: &[R], even: &mut [R], odd: &mut [R]) {
+    let &Rows { outer, inner, evens, odds } = rows;
+    for part in 0..outer {
+        let from = &fine[part * (evens + odds) * inner..][..(evens + odds) * inner];
+        let even = &mut even[part * evens * inner..][..evens * inner];
+        let odd = &mut odd[part * odds * inner..][..odds * inner];
+        if inner == 1 {
+            split_line(from, even, odd);
+            continue;
+        }
+        for i in 0..evens {
+            even[i * inner..][..inner].copy_from_slice(&from[2 * i * inner..][..inner]);
+        }
+        for i in 0..odds {
+            odd[i * inner..][..inner].copy_from_slice(&from[(2 * i + 1) * inner..][..inner]);
+        }
+    }
+}
+
+#[inline(always)]
+fn split_line<R: Real>(line: &[R], even: &mut [R], odd: &mut [R]) {
+    let (pairs, last) = line.as_chunks::<2>();
+    for (pair, (even, odd)) in pairs.iter().zip(even.iter_mut().zip(odd)) {
+        [*even, *odd] = *pair;
+    }
+    if let ([last], Some(even)) = (last, even.get_mut(pairs.len())) {
+        *even = *last;
+    }
+}
