@@ -83,12 +83,12 @@ const DIGESTS: [u64; 13] = [
     0x6f89_f10e_f88d_5963,
     0xf853_f6f1_eee8_03a4,
     0x4b79_6b0c_ce4a_73ce,
-    0x8626_8b49_dc32_53dc,
-    0x321b_b1c0_2892_bda3,
-    0xbff5_0e65_7e72_5a77,
-    0xad09_3c96_7f95_b95d,
-    0xf28e_e0fe_247a_2dad,
-    0x964e_d89d_9097_dfc0,
+    0x3311_c8c2_79a8_2898,
+    0x3a6d_17b8_41d0_c072,
+    0xd9c2_8b2a_905c_7fae,
+    0x981c_6a15_e8e4_dbab,
+    0xe4eb_c41b_3f5e_6c1d,
+    0x821a_8292_1518_e42c,
 ];
 
 #[test]

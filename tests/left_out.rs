@@ -65,7 +65,8 @@ fn codes_too_large_to_decode_exceed_every_stated_value() {
     let mut block = file.block(&codec, entry, &[true; FRAMES]).unwrap();
     assert!(block.largest(&codec).iter().all(|largest| largest.is_finite()));
     block.step = 1e38;
-    block.codes.fill(1 << 20);
+    let codes = vec![1 << 20; block.all_codes(&codec).len()];
+    block.set_codes(&codec, &codes);
     assert!(block.largest(&codec).contains(&f64::INFINITY));
 }
 

@@ -115,29 +115,6 @@ fn an_overview_of_frames_holds_their_samples() {
 }
 
 #[test]
-fn frames_between_coarse_nodes_are_replaced_by_near_ones() {
-    let source = archive(Kind::Wave, SampleType::F32, Mask::None, 9);
-    let all: Vec<usize> = (0..FRAMES).collect();
-    for (basis, window) in windows(16) {
-        let file = stored(&mut source.clone(), &settings(basis, window, 1e-3));
-        let samples = extracted(&file.open());
-        let mut scene = CoefficientScene::new(file.open(), SplatSource::Coefficients);
-        let request = request(&scene, 4, &all);
-        let found = scene.overview(&request, &Silent).unwrap().unwrap();
-        let each = request.samples() / FRAMES;
-        for (frame, found) in found.chunks(each).enumerate() {
-            let near = (0..4).filter_map(|back| frame.checked_sub(back));
-            let is_found = |near: usize| {
-                let near = [near];
-                let expected = picked(&samples, SampleType::F32, None, &OverviewRequest { frames: &near, ..request });
-                expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= 1e-5 * a.abs().max(1.0))
-            };
-            assert!(near.into_iter().any(is_found), "{basis:?} {frame}");
-        }
-    }
-}
-
-#[test]
 fn a_region_reads_its_blocks_alone() {
     let source = archive(Kind::Noise, SampleType::F32, Mask::None, 11);
     let config = ConvertConfig { block: Some(6), ..settings(Basis::Samples, 16, 1e-2) };

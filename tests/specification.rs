@@ -5,7 +5,7 @@ use crate::common::random::Random;
 use crate::common::samples::{append, numbers};
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::{Stored, extracted, report, settings, stored, times};
-use crate::reference::decode::{Pyramid, haar, learned, learned_functions, multi, nodes};
+use crate::reference::decode::{Pyramid, haar, learned, learned_functions, multi, number};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor, Stencil};
@@ -15,8 +15,8 @@ use wavesplat::internal::ErrorBound;
 use wavesplat::internal::Scheme;
 use wavesplat::internal::WindowCodec;
 use wavesplat::internal::{LANES, Lane, basis};
-use wavesplat_format::{Axis, Window};
-use wavesplat_format::{BlockEntry, Outliers, PartKind};
+use wavesplat_format::{Axis, Packing, Window};
+use wavesplat_format::{BlockEntry, PartKind};
 
 const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::T];
 
@@ -24,7 +24,15 @@ const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::T];
 fn spelled_out(pyramid: &wavesplat_format::Pyramid) -> Pyramid {
     let order = pyramid.order.iter().map(|axis| AXES.iter().position(|a| a == axis).unwrap()).collect();
     let cubic = pyramid.stencil == Stencil::Cubic;
-    Pyramid { order, cubic, growth: pyramid.growth, most: pyramid.most, single: pyramid.single }
+    Pyramid {
+        order,
+        cubic,
+        growth: pyramid.growth,
+        most: pyramid.most,
+        single: pyramid.single,
+        nested: pyramid.packing == Packing::Nested,
+        ghosts: pyramid.ghosts,
+    }
 }
 
 /// A random choice of axes in random order.
@@ -38,7 +46,9 @@ fn random_pyramid(random: &mut Random) -> wavesplat_format::Pyramid {
     let growth = [1.0, 1.5, 2.0, 1.0 + random.unit()][random.below(4)];
     let most = [1.0, 3.0, 4.0, 1e6, 1.0 + 9.0 * random.unit()][random.below(5)];
     let order = random_order(random);
-    wavesplat_format::Pyramid { order, stencil, growth, most, single: random.below(2) == 0 }
+    let packing = [Packing::Flat, Packing::Nested][random.below(2)];
+    let ghosts = packing == Packing::Nested && random.below(2) == 0;
+    wavesplat_format::Pyramid { order, stencil, growth, most, single: random.below(2) == 0, packing, ghosts }
 }
 
 /// Random codes: mostly small or zero, sometimes of any magnitude.
@@ -68,22 +78,15 @@ fn pyramids_decode_to_the_specified_bits() {
             1 + random.below(most)
         });
         let step = [1.0, 0.37, 1e-44, 1e20 * random.unit(), random.unit()][random.below(5)];
-        let codes = random_codes(extents.iter().product(), &mut random);
+        let spelled = spelled_out(&pyramid);
+        let count = spelled.passes(extents).into_iter().map(|pass| spelled.added(pass, extents).count()).sum();
+        let codes = random_codes(count, &mut random);
         let expected = spelled_out(&pyramid).decode(extents, step, &codes);
         let what = format!("case {case}: {pyramid:?}, {extents:?}, step {step:e}");
         let scheme = Scheme { pyramid: Some(pyramid), ..Scheme::along_time(Basis::Samples) };
         let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
         let codec = WindowCodec::new(scheme, extents[3], SampleType::F64, bound, 20);
-        let block = Block {
-            size: [extents[0], extents[1], extents[2]],
-            voxels: extents[..3].iter().product(),
-            step,
-            codes: codes.into_iter().collect(),
-            outliers: Outliers::default(),
-            missing: Default::default(),
-            exact: None,
-            bytes_read: 0,
-        };
+        let block = Block::of_codes(&codec, [extents[0], extents[1], extents[2]], step, &codes);
         let field = block.field(&codec);
         for (i, value) in expected.iter().enumerate() {
             assert_same(field.at(i), *value, || format!("{what}, node {i}"));
@@ -154,24 +157,25 @@ fn transforms_along_time_give_the_specified_bits() {
 }
 
 /// The coefficients of a block in 64-bit floats, if it has any.
-fn coefficients(window: &Window, block: &Block) -> Vec<f64> {
+fn coefficients(window: &Window, codes: &[i32], block: &Block) -> Vec<f64> {
     let [x, y, z] = block.size;
     let extents = [x, y, z, window.coefficients as usize];
     match &window.pyramid {
-        None => block.codes.iter().map(|q| f64::from(*q) * block.step).collect(),
-        Some(pyramid) => spelled_out(pyramid).decode(extents, block.step, &block.codes),
+        None => codes.iter().map(|q| f64::from(*q) * block.step).collect(),
+        Some(pyramid) => spelled_out(pyramid).decode(extents, block.step, codes),
     }
 }
 
 /// The samples of a block.
-fn samples(window: &Window, block: &Block, ty: SampleType) -> Vec<u8> {
+fn samples(codec: &WindowCodec, window: &Window, block: &Block, ty: SampleType) -> Vec<u8> {
     if let Some(exact) = &block.exact {
         return exact.clone();
     }
     let (voxels, frames) = (block.voxels, window.frames as usize);
     let mut numbers = vec![0.0; voxels * frames];
-    if !block.codes.is_empty() {
-        let (functions, all) = (learned_functions(&window.functions, frames), coefficients(window, block));
+    let codes = block.all_codes(codec);
+    if !codes.is_empty() {
+        let (functions, all) = (learned_functions(&window.functions, frames), coefficients(window, &codes, block));
         for voxel in 0..voxels {
             let of_voxel: Vec<f64> = all.iter().skip(voxel).step_by(voxels).copied().collect();
             let series = series(window.basis, &functions, &of_voxel, frames);
@@ -190,33 +194,34 @@ fn samples(window: &Window, block: &Block, ty: SampleType) -> Vec<u8> {
 }
 
 /// Calls `visit` with every block of a file and the number of its window.
-fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(u32, &BlockEntry, &Block)) {
+fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&WindowCodec, u32, &BlockEntry, &Block)) {
     for window in 0..file.metadata().windows.len() as u32 {
         let codec = file.codec(window).unwrap();
         let all = vec![true; codec.basis.coefficients()];
         for entry in file.leaves(window).iter().flat_map(|leaf| file.leaf(leaf).unwrap()) {
-            visit(window, &entry, &file.block(&codec, &entry, &all).unwrap());
+            visit(&codec, window, &entry, &file.block(&codec, &entry, &all).unwrap());
         }
     }
 }
 
 /// Checks what the level parts of a block state: their number of codes, and the change when they and all finer ones
 /// are omitted.
-fn check_parts(window: &Window, entry: &BlockEntry, block: &Block) {
+fn check_parts(codec: &WindowCodec, window: &Window, entry: &BlockEntry, block: &Block) {
     let Some(pyramid) = window.pyramid.as_ref().map(spelled_out) else { return };
-    if block.codes.is_empty() {
+    let codes = block.all_codes(codec);
+    if codes.is_empty() {
         return;
     }
     let extents = [block.size[0], block.size[1], block.size[2], window.coefficients as usize];
     let parts: Vec<usize> = pyramid
         .passes(extents)
         .into_iter()
-        .flat_map(|pass| vec![pyramid.part(pass); nodes(extents).filter(|node| pyramid.adds(pass, *node)).count()])
+        .flat_map(|pass| pyramid.added(pass, extents).map(|node| pyramid.part(pass, node)).collect::<Vec<_>>())
         .collect();
-    let whole = pyramid.decode(extents, block.step, &block.codes);
+    let whole = pyramid.decode(extents, block.step, &codes);
     for level in 0..4 {
-        let count = block.codes.iter().zip(&parts).filter(|(code, part)| **code != 0 && **part == level).count();
-        let coarser = block.codes.iter().zip(&parts).map(|(code, part)| if *part < level { *code } else { 0 });
+        let count = codes.iter().zip(&parts).filter(|(code, part)| **code != 0 && **part == level).count();
+        let coarser = codes.iter().zip(&parts).map(|(code, part)| if *part < level { *code } else { 0 });
         let rest = pyramid.decode(extents, block.step, &coarser.collect::<Vec<_>>());
         let largest = whole.iter().zip(rest).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let said = entry.part(PartKind::Level(level as u8)).map(|part| (part.stats.count, part.stats.largest));
@@ -231,12 +236,12 @@ fn check_file(stored: &Stored) -> usize {
     let ty = file.sample();
     let mut expected = vec![0; file.frames() * file.grid.whole().voxels() * ty.size()];
     let [nx, ny, _] = file.grid.dims;
-    for_each_block(&file, |number, entry, block| {
+    for_each_block(&file, |codec, number, entry, block| {
         let window = &file.metadata().windows[number as usize];
-        check_parts(window, entry, block);
-        coded += usize::from(!block.codes.is_empty());
+        check_parts(codec, window, entry, block);
+        coded += usize::from(!block.all_codes(codec).is_empty());
         let start = file.blocks.region(entry.id.block as usize).start;
-        for (i, sample) in samples(window, block, ty).chunks(ty.size()).enumerate() {
+        for (i, sample) in samples(codec, window, block, ty).chunks(ty.size()).enumerate() {
             let (voxel, frame) = (i % block.voxels, i / block.voxels + window.first_frame as usize);
             let [x, y, _] = block.size;
             let place = [start[0] + voxel % x, start[1] + voxel / x % y, start[2] + voxel / x / y];
@@ -257,7 +262,7 @@ const SPACES: [SpatialPredictor; 4] = [
 
 #[test]
 fn files_decode_as_specified() {
-    let (dims, frames) = ([11, 9, 7], 13);
+    let (dims, frames) = ([12, 10, 7], 13);
     let kinds = [Kind::Wave, Kind::Noise, Kind::Ramp, Kind::Steps, Kind::Mixed];
     let types = [SampleType::F32, SampleType::F64, SampleType::I16, SampleType::F16, SampleType::U8];
     let bases = [None, Some(Basis::Haar), Some(Basis::Multi), Some(Basis::Samples), Some(Basis::Learned)];
@@ -307,11 +312,12 @@ fn every_node_is_within_half_a_step_of_its_level() {
             let file = stored(&mut memory, &config).open();
             let source = numbers(ty, &memory.frames);
             let most = source.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-            for_each_block(&file, |number, entry, block| {
-                let window = &file.metadata().windows[number as usize];
+            for_each_block(&file, |_, window, entry, block| {
+                let number_of_window = window;
+                let window = &file.metadata().windows[window as usize];
                 let record = window.pyramid.as_ref().unwrap();
                 assert!(!record.single, "the tolerance is too small for single precision");
-                let (codec, pyramid) = (file.codec(number).unwrap(), spelled_out(record));
+                let (codec, pyramid) = (file.codec(number_of_window).unwrap(), spelled_out(record));
                 let extents = [block.size[0], block.size[1], block.size[2], window.frames as usize];
                 let (start, field) = (file.blocks.region(entry.id.block as usize).start, block.field(&codec));
                 if block.exact.is_some() {
@@ -321,7 +327,8 @@ fn every_node_is_within_half_a_step_of_its_level() {
                     let step = pyramid.step(block.step, pass.level);
                     coarse += usize::from(step < block.step);
                     assert!(step <= 2.0 * window.delta);
-                    for (i, node) in nodes(extents).enumerate().filter(|(_, node)| pyramid.adds(pass, *node)) {
+                    for node in pyramid.added(pass, extents).filter(|node| (0..3).all(|a| node[a] < extents[a])) {
+                        let i = number(extents, node);
                         let [x, y, z, t] = [0, 1, 2, 3].map(|a| node[a] + if a < 3 { start[a] } else { 0 });
                         let frame = t + window.first_frame as usize;
                         let v = source[x + dims[0] * (y + dims[1] * (z + dims[2] * frame))];

@@ -53,7 +53,8 @@ fn kept(values: &[f64], config: &ConvertConfig) -> (Vec<usize>, f64, Matrix) {
     let entry = &file.leaf(&file.leaves(0)[0]).unwrap()[0];
     let block = file.block(&codec, entry, &vec![true; codec.basis.coefficients()]).unwrap();
     assert!(block.exact.is_none() && block.outliers.positions.is_empty(), "the case says nothing about coefficients");
-    let of_voxel = |v| block.codes.iter().skip(v).step_by(VOXELS).filter(|c| **c != 0).count();
+    let codes = block.all_codes(&codec);
+    let of_voxel = |v| codes.iter().skip(v).step_by(VOXELS).filter(|c| **c != 0).count();
     ((0..VOXELS).map(of_voxel).collect(), codec.promise.delta, codec.synthesis)
 }
 

@@ -2,10 +2,11 @@
 
 use crate::block::PartKind;
 use crate::bytes::{ParseResult, ensure};
-use crate::cells::max_packed;
+use crate::codes::sparse::CodeBox;
+use crate::codes::{max_packed, volumes};
 use crate::directory::PartEntry;
 use crate::planes::bitmap_len;
-use crate::pyramid::Pyramid;
+use crate::pyramid::{PassBox, Pyramid};
 use crate::window::Window;
 
 /// The sizes of one block.
@@ -33,17 +34,20 @@ impl BlockGeometry<'_> {
     /// Number of codes in a level part; `None` if the window has no such level.
     pub fn codes(&self, level: u8) -> Option<usize> {
         match &self.window.pyramid {
-            Some(_) => (level < Pyramid::PARTS).then(|| self.boxes(level).iter().map(box_len).sum()),
+            Some(_) => (level < Pyramid::PARTS).then(|| volumes(&self.boxes(level))),
             None => self.window.levels.get(usize::from(level)).map(|&k| (k as usize).saturating_mul(self.voxels())),
         }
     }
 
-    /// Extents along x, y, z, k of the nodes that each pass in a level part adds; empty without a pyramid.
-    pub(crate) fn boxes(&self, level: u8) -> Vec<[usize; 4]> {
+    /// The boxes of codes in a level part, each contiguous; empty without a pyramid.
+    pub(crate) fn boxes(&self, level: u8) -> Vec<CodeBox> {
         let Some(pyramid) = &self.window.pyramid else { return Vec::new() };
-        let [x, y, z] = self.size;
-        let shape = [x, y, z, self.window.coefficients as usize];
-        pyramid.passes(shape).iter().filter(|pass| pass.part == level).map(|pass| pass.extent(shape)).collect()
+        let passes = pyramid.passes(self.size, self.window.coefficients as usize);
+        let contiguous = |of: &PassBox| {
+            let extents = of.extents(passes[of.pass].extent());
+            CodeBox { allowed: of.allowed, ..CodeBox::contiguous(extents) }
+        };
+        pyramid.boxes(&passes).iter().filter(|of| of.part == level).map(contiguous).collect()
     }
 
     /// The largest `count` of a part.
@@ -93,8 +97,4 @@ impl BlockGeometry<'_> {
         };
         ensure(possible, || format!("{kind}: {raw_len} bytes do not fit a count of {count}"))
     }
-}
-
-fn box_len(extent: &[usize; 4]) -> usize {
-    extent.iter().product()
 }

@@ -2,6 +2,7 @@
 
 use crate::bytes::{FieldReader, FieldWriter, ParseResult};
 use crate::file_id::FileId;
+use crate::pyramid::Packing;
 use crate::{Error, Result};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -11,11 +12,17 @@ pub(crate) const HEADER: usize = 128;
 /// The first bytes of every file. As in PNG, they hold a high bit, a name, both line endings and an end-of-file character.
 pub(crate) const MAGIC: [u8; 8] = [0x89, b'W', b'S', b'P', 0x0D, 0x0A, 0x1A, 0x0A];
 
-/// The version that this package writes.
+/// The version of files without features.
 pub(crate) const VERSION: (u16, u16) = (1, 0);
 
-/// The required features that this reader supports, by bit; none are defined yet.
-const REQUIRED: [&str; 0] = [];
+/// The version of files with nested parts.
+const NESTED_VERSION: (u16, u16) = (1, 1);
+
+/// The required features that this reader supports, by bit, as messages for readers that do not.
+const REQUIRED: [&str; 1] = ["nested parts (version 1.1 of the format): wavesplat 0.2 or later"];
+
+/// The bit of [`Packing::Nested`].
+pub(crate) const NESTED: u64 = 1;
 
 /// The fields of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,9 +39,18 @@ pub(crate) struct Header {
 const NEEDS: usize = 72;
 
 impl Header {
-    /// The header of a new file.
-    pub(crate) fn new(id: FileId) -> Self {
-        Self { version: VERSION, required: 0, optional: 0, id, needs: String::new() }
+    /// The header of a new file whose codes may be packed in a way.
+    pub(crate) fn new(id: FileId, packing: Packing) -> Self {
+        let (version, required, needs) = match packing {
+            Packing::Flat => (VERSION, 0, String::new()),
+            Packing::Nested => (NESTED_VERSION, NESTED, REQUIRED[0].into()),
+        };
+        Self { version, required, optional: 0, id, needs }
+    }
+
+    /// How codes may be packed.
+    pub(crate) fn packing(&self) -> Packing {
+        if self.required & NESTED == 0 { Packing::Flat } else { Packing::Nested }
     }
 
     pub(crate) fn encode(&self) -> Vec<u8> {
@@ -135,7 +151,7 @@ mod tests {
 
     #[test]
     fn versions_and_features_are_refused_by_name() {
-        let good = Header::new(FileId([7; 16]));
+        let good = Header::new(FileId([7; 16]), Packing::Flat);
         assert_eq!(decode(&good).expect("valid"), good);
         let newer = decode(&Header { version: (2, 3), ..good.clone() });
         assert!(matches!(newer, Err(Error::Unsupported(what)) if what.contains("2.3")));
@@ -149,7 +165,8 @@ mod tests {
 
     #[test]
     fn reserved_bytes_must_be_zero() {
-        let mut bytes: [u8; HEADER] = Header::new(FileId([7; 16])).encode().try_into().expect("128 bytes");
+        let mut bytes: [u8; HEADER] =
+            Header::new(FileId([7; 16]), Packing::Flat).encode().try_into().expect("128 bytes");
         bytes[12] = 1;
         let checksum = xxh3_64(&bytes[..120]).to_le_bytes();
         bytes[120..].copy_from_slice(&checksum);

@@ -7,7 +7,7 @@
 mod bits;
 mod block;
 mod bytes;
-mod cells;
+mod codes;
 mod directory;
 mod error;
 mod file_id;
@@ -27,7 +27,6 @@ mod recovery;
 mod sample;
 mod section;
 mod segments;
-mod sparse;
 mod storage;
 mod structure;
 #[cfg(test)]
@@ -39,7 +38,8 @@ mod window;
 mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
-pub use cells::{estimate_cells, max_packed, pack_cells, unpack_cells, unpack_sparse_cells};
+pub use codes::max_packed;
+pub use codes::sparse::{CodeBox, DenseCodes, SparseCodes};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use file_id::FileId;
@@ -51,11 +51,10 @@ pub use payload::{
     unpack_outliers,
 };
 pub use prefix::CompletePrefix;
-pub use pyramid::{Axis, Pass, Pyramid, Stencil};
+pub use pyramid::{Axis, Packing, Pass, PassBox, Pyramid, Stencil};
 pub use reader::Reader;
 pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
-pub use sparse::{CodeBox, SparseCodes};
 pub use storage::{ReadAhead, Storage, read_joined};
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

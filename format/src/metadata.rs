@@ -2,8 +2,9 @@
 
 use crate::bytes::{FieldWriter, ParseResult, ensure, finite_amount};
 use crate::file_id::FileId;
-use crate::header::HEADER;
+use crate::header::{HEADER, NESTED};
 use crate::limits::*;
+use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
 use crate::section::section_end;
 use crate::window::{Window, WindowEnd, WindowRecord};
@@ -140,14 +141,24 @@ impl Metadata {
         start
     }
 
+    /// [`Packing::Nested`] if any window has it.
+    pub fn packing(&self) -> Packing {
+        let nested = self.windows.iter().any(|window| window.packing() == Packing::Nested);
+        if nested { Packing::Nested } else { Packing::Flat }
+    }
+
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the
-    /// first window (FORMAT.md, section 3). The same settings and samples give the same id everywhere.
+    /// first window, and with nested parts by the header's required features (FORMAT.md, section 3). The same settings and
+    /// samples give the same id everywhere.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the metadata cannot be encoded.
-    pub fn file_id(&self, first_digest: u64) -> Result<FileId> {
+    pub fn file_id(&self, first_digest: u64, packing: Packing) -> Result<FileId> {
         let mut bytes = self.start().encode()?;
         bytes.put_u64(first_digest);
+        if packing == Packing::Nested {
+            bytes.put_u64(NESTED);
+        }
         Ok(FileId(xxh3_128(&bytes).to_le_bytes()))
     }
 

@@ -8,6 +8,7 @@ use crate::header::HEADER;
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
+use crate::pyramid::Packing;
 use crate::reader::read_header;
 use crate::section::{SectionExtent, SectionId, decompress, section_at};
 use crate::structure::check_padding;
@@ -18,6 +19,8 @@ use crate::{Result, Storage};
 #[derive(Debug, Clone)]
 pub struct CompletePrefix {
     pub(crate) id: FileId,
+    /// How codes may be packed.
+    pub(crate) packing: Packing,
     /// Metadata of the complete windows; without frames if there are none.
     pub(crate) metadata: Metadata,
     /// The offset at which the last complete window ends.
@@ -42,10 +45,11 @@ impl CompletePrefix {
     /// # Errors
     /// The header or the start is not intact, so that nothing can be continued; or the storage fails.
     pub fn read(storage: &impl Storage) -> Result<Self> {
-        let id = read_header(storage)?.id;
+        let header = read_header(storage)?;
+        let (id, packing) = (header.id, header.packing());
         let (extent, record) = plain_at(storage, id, SectionId::Start, HEADER as u64, MAX_METADATA)?;
         let metadata = Metadata::parse_start(&record).map_err(|what| SectionId::Start.corrupt(HEADER as u64, what))?;
-        let mut prefix = Self { id, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
+        let mut prefix = Self { id, packing, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
         loop {
             match prefix.read_window(storage) {
                 Ok(()) => {}
@@ -58,6 +62,11 @@ impl CompletePrefix {
     /// The file's identity.
     pub fn id(&self) -> FileId {
         self.id
+    }
+
+    /// How the codes of further windows may be packed.
+    pub fn packing(&self) -> Packing {
+        self.packing
     }
 
     /// The metadata of the complete windows; without frames if there are none.

@@ -2,7 +2,7 @@
 //! ([Duda](https://arxiv.org/abs/1311.2540)).
 //!
 //! Frequencies F add up to 2^b. Byte value s owns F slots from `start`, the sum of the frequencies of lower values.
-//! Coding s turns a state X into
+//! Packing s turns a state X into
 //!
 //! ```text
 //! X' = 2^b floor(X / F) + start + X mod F                                                                 (eq 40)
@@ -24,8 +24,35 @@ pub(crate) type Frequencies = [u16; 256];
 /// The least value of a state. States start here when packing, so they end here when unpacking.
 const LOWEST: u32 = 1 << 16;
 
-/// The number of states for strings of at least `LONG` symbols; shorter strings have one.
-const LANES: usize = 4;
+/// The states in which symbols take turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum States {
+    /// One, for short strings.
+    One,
+    /// Four.
+    Few,
+    /// Thirty-two, for vector code.
+    Many,
+}
+
+impl States {
+    /// The states of a string of `symbols` symbols that is not coded with many.
+    pub(crate) fn of_length(symbols: usize) -> Self {
+        if symbols < LONG { Self::One } else { Self::Few }
+    }
+
+    fn count(self) -> usize {
+        match self {
+            Self::One => 1,
+            Self::Few => FEW,
+            Self::Many => MANY,
+        }
+    }
+}
+
+const FEW: usize = 4;
+const MANY: usize = 32;
+/// Strings of at least this many symbols have more than one state.
 const LONG: usize = 1024;
 
 /// Scales counts to frequencies whose sum is `1 << bits`. Every symbol that occurs gets at least 1.
@@ -131,11 +158,11 @@ impl Encode {
 }
 
 /// Appends the coded symbols: states, then words of 16 bits. The frequency of every symbol must be above 0.
-pub(crate) fn encode(symbols: &[u8], frequencies: &Frequencies, bits: u32, out: &mut Vec<u8>) {
-    if symbols.len() < LONG {
-        encode_lanes::<1>(symbols, frequencies, bits, out);
-    } else {
-        encode_lanes::<LANES>(symbols, frequencies, bits, out);
+pub(crate) fn encode(symbols: &[u8], frequencies: &Frequencies, (bits, states): (u32, States), out: &mut Vec<u8>) {
+    match states {
+        States::One => encode_lanes::<1>(symbols, frequencies, bits, out),
+        States::Few => encode_lanes::<FEW>(symbols, frequencies, bits, out),
+        States::Many => encode_lanes::<MANY>(symbols, frequencies, bits, out),
     }
 }
 
@@ -172,21 +199,39 @@ fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
 }
 
 /// Reads what [`encode`] appended and fills `symbols`.
-pub(crate) fn decode(bytes: &mut &[u8], frequencies: &Frequencies, bits: u32, symbols: &mut [u8]) -> ParseResult {
-    let count = take_varint(bytes)?;
-    let lanes = if symbols.len() < LONG { 1 } else { LANES };
-    let (states, words) = take_bytes(bytes, count.saturating_mul(2).saturating_add(4 * lanes))?.split_at(4 * lanes);
-    let words = words.as_chunks().0;
-    match (bits, states.as_chunks::<4>().0) {
-        (12, [state]) => decode_lanes(&Slots::<4096>::new(frequencies), &[*state], words, symbols),
-        (12, states) => decode_lanes(&Slots::<4096>::new(frequencies), first::<LANES>(states)?, words, symbols),
-        (_, [state]) => decode_lanes(&Slots::<16384>::new(frequencies), &[*state], words, symbols),
-        (_, states) => decode_lanes(&Slots::<16384>::new(frequencies), first::<LANES>(states)?, words, symbols),
+pub(crate) fn decode(
+    bytes: &mut &[u8],
+    frequencies: &Frequencies,
+    (bits, lanes): (u32, States),
+    symbols: &mut [u8],
+) -> ParseResult {
+    let (count, states) = (take_varint(bytes)?, 4 * lanes.count());
+    let (states, words) = take_bytes(bytes, count.saturating_mul(2).saturating_add(states))?.split_at(states);
+    let coded = Coded { states: states.as_chunks().0, words: words.as_chunks().0 };
+    match bits {
+        12 => coded.decode(lanes, &Slots::<4096>::new(frequencies), symbols),
+        _ => coded.decode(lanes, &Slots::<16384>::new(frequencies), symbols),
     }
 }
 
-fn first<const N: usize>(states: &[[u8; 4]]) -> ParseResult<&[[u8; 4]; N]> {
-    states.first_chunk().ok_or_else(|| "states are missing".into())
+/// A coded string.
+struct Coded<'a> {
+    states: &'a [[u8; 4]],
+    words: &'a [[u8; 2]],
+}
+
+impl Coded<'_> {
+    fn decode<const S: usize>(&self, states: States, slots: &Slots<S>, symbols: &mut [u8]) -> ParseResult {
+        match states {
+            States::One => decode_lanes(slots, self.first::<1>()?, self.words, symbols),
+            States::Few => decode_lanes(slots, self.first::<FEW>()?, self.words, symbols),
+            States::Many => decode_lanes(slots, self.first::<MANY>()?, self.words, symbols),
+        }
+    }
+
+    fn first<const N: usize>(&self) -> ParseResult<&[[u8; 4]; N]> {
+        self.states.first_chunk().ok_or_else(|| "states are missing".into())
+    }
 }
 
 /// Tables for unpacking: the symbol of each of `S` slots, and `frequency * 65536 + first slot` of each symbol.
@@ -279,6 +324,7 @@ mod tests {
         fn symbols_round_trip(
             symbols in prop::collection::vec(prop_oneof![9 => 0u8..4, 1 => any::<u8>()], 2..3000),
             bits in prop::sample::select(vec![12u32, 14]),
+            states in prop::sample::select(vec![States::One, States::Few, States::Many]),
         ) {
             let mut counts = [0; 256];
             [0, 1].iter().chain(&symbols).for_each(|&symbol| counts[usize::from(symbol)] += 1);
@@ -286,10 +332,10 @@ mod tests {
             prop_assert_eq!(sum(&frequencies), 1 << bits);
             let mut out = Vec::new();
             put_frequencies(&frequencies, bits, &mut out);
-            encode(&symbols, &frequencies, bits, &mut out);
+            encode(&symbols, &frequencies, (bits, states), &mut out);
             let (mut rest, mut back) = (&out[..], vec![0; symbols.len()]);
             prop_assert_eq!(take_frequencies(&mut rest, bits).expect("packed"), frequencies);
-            decode(&mut rest, &frequencies, bits, &mut back).expect("packed");
+            decode(&mut rest, &frequencies, (bits, states), &mut back).expect("packed");
             prop_assert!(rest.is_empty() && back == symbols);
         }
     }

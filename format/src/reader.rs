@@ -3,7 +3,7 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, ParseResult, ensure};
-use crate::cells::{unpack_cells, unpack_sparse_cells};
+use crate::codes::sparse::{CodeBox, SparseCodes};
 use crate::directory::{BlockEntry, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
@@ -13,8 +13,8 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
+use crate::pyramid::check_packing;
 use crate::section::{FRAME, SectionId, decompress, read_section};
-use crate::sparse::{CodeBox, SparseCodes};
 use crate::{Error, ReadAhead, Result, Storage};
 use std::sync::Arc;
 
@@ -40,9 +40,11 @@ impl<S: Storage> Reader<S> {
     /// [`Error::Foreign`], [`Error::Unsupported`] or [`Error::Corrupt`] if the file is not valid, [`Error::Io`] if the
     /// storage fails.
     pub fn open(storage: S) -> Result<Self> {
-        let id = read_header(&storage)?.id;
-        let footer = read_footer(&storage, id)?;
+        let header = read_header(&storage)?;
+        let footer = read_footer(&storage, header.id)?;
         let metadata = read_metadata(&storage, &footer)?;
+        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, header.packing()));
+        packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
         let leaves = read_root(&storage, &footer, &metadata)?;
         Ok(Self { storage, index: Arc::new(Index { footer, metadata, leaves }) })
     }
@@ -191,7 +193,7 @@ impl<S: Storage> Reader<S> {
         codes: &mut SparseCodes,
     ) -> Result<()> {
         let geometry = self.geometry(block.id)?;
-        if !boxes.iter().map(|of| of.extents).eq(geometry.boxes(level)) {
+        if !boxes.iter().map(|of| of.extents).eq(geometry.boxes(level).iter().map(|of| of.extents)) {
             return Err(Error::Invalid(format!("{}: other passes in level {level}", block.id)));
         }
         self.check_present(block)?;
@@ -200,7 +202,7 @@ impl<S: Storage> Reader<S> {
             return Ok(());
         };
         let raw = self.part(block, part)?;
-        let found = unpack_sparse_cells(&raw, boxes, codes);
+        let found = geometry.window.packing().unpack(&raw, boxes, codes);
         unpacked(block, part, found, |&count| count).map(|_| ())
     }
 
@@ -279,7 +281,7 @@ fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResu
 
 fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut [i32]) -> ParseResult<usize> {
     match &geometry.window.pyramid {
-        Some(_) => unpack_cells(raw, &geometry.boxes(level), codes),
+        Some(pyramid) => pyramid.packing.unpack_all(raw, &geometry.boxes(level), codes),
         None => unpack_codes(raw, codes),
     }
 }

@@ -2,16 +2,37 @@
 
 use crate::bits::{put_varint, take_bytes, take_varint};
 use crate::bytes::{ParseResult, ensure};
-use crate::rans::{decode, encode, normalise, put_frequencies, take_frequencies};
+use crate::rans::{States, decode, encode, normalise, put_frequencies, take_frequencies};
 
 /// Frequencies can change after this many symbols of a stream.
 const PIECE: usize = 1 << 12;
 
-/// The encoding of a segment: the lowest two bits of its head.
+/// The encoding of a segment: the lowest bits of its head.
 const RAW: usize = 0;
 const CONSTANT: usize = 1;
 const COARSE: usize = 2;
 const FINE: usize = 3;
+/// As the two before, with 32 states.
+const WIDE: usize = 2;
+
+/// The heads of segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Heads {
+    /// Two bits for the encoding: as in version 1.0.
+    Narrow,
+    /// Three bits for the encoding, with one for 32 states.
+    Wide,
+}
+
+impl Heads {
+    /// Bits for the encoding.
+    fn bits(self) -> u32 {
+        if self == Self::Narrow { 2 } else { 3 }
+    }
+}
+
+/// Segments of at least this many coded bytes have 32 states, whose bytes are less than a hundredth of them.
+const LONG: usize = 1 << 13;
 
 /// Precision of the frequencies in bits.
 const COARSE_BITS: u32 = 12;
@@ -26,11 +47,11 @@ pub(crate) fn max_segments(symbols: usize, streams: usize) -> usize {
 }
 
 /// Packs streams. `symbols` holds them one after another; `lengths` is the length of each.
-pub(crate) fn pack_segments(symbols: &[u8], lengths: &[usize], out: &mut Vec<u8>) {
+pub(crate) fn pack_segments(symbols: &[u8], lengths: &[usize], heads: Heads, out: &mut Vec<u8>) {
     let mut rest = symbols;
     for segment in Segment::split(symbols, lengths) {
         let (symbols, after) = rest.split_at(segment.length);
-        segment.pack(symbols, out);
+        segment.pack(symbols, heads, out);
         rest = after;
     }
 }
@@ -42,14 +63,15 @@ pub(crate) fn estimate_segments(symbols: &[u8], lengths: &[usize]) -> usize {
 }
 
 /// Fills `symbols` from the segments at the front of `bytes`, and advances `bytes` past them.
-pub(crate) fn unpack_segments(bytes: &mut &[u8], symbols: &mut [u8]) -> ParseResult {
+pub(crate) fn unpack_segments(bytes: &mut &[u8], heads: Heads, symbols: &mut [u8]) -> ParseResult {
     let mut rest = symbols;
     while !rest.is_empty() {
         let head = take_varint(bytes)?;
-        let fits = 0 < head >> 2 && head >> 2 <= rest.len();
-        ensure(fits, || format!("a segment of {} symbols where {} are left", head >> 2, rest.len()))?;
-        let (segment, after) = rest.split_at_mut(head >> 2);
-        unpack_segment(bytes, head & 3, segment)?;
+        let (length, kind) = (head >> heads.bits(), head & ((1 << heads.bits()) - 1));
+        let fits = 0 < length && length <= rest.len();
+        ensure(fits, || format!("a segment of {length} symbols where {} are left", rest.len()))?;
+        let (segment, after) = rest.split_at_mut(length);
+        unpack_segment(bytes, kind, segment)?;
         rest = after;
     }
     Ok(())
@@ -60,9 +82,11 @@ fn unpack_segment(bytes: &mut &[u8], kind: usize, symbols: &mut [u8]) -> ParseRe
         RAW => symbols.copy_from_slice(take_bytes(bytes, symbols.len())?),
         CONSTANT => symbols.fill(take_bytes(bytes, 1)?[0]),
         _ => {
-            let bits = if kind == COARSE { COARSE_BITS } else { FINE_BITS };
+            ensure(kind <= FINE + WIDE, || format!("a segment of kind {kind}"))?;
+            let bits = if kind.is_multiple_of(2) { COARSE_BITS } else { FINE_BITS };
             let frequencies = take_frequencies(bytes, bits)?;
-            decode(bytes, &frequencies, bits, symbols)?;
+            let states = if kind > FINE { States::Many } else { States::of_length(symbols.len()) };
+            decode(bytes, &frequencies, (bits, states), symbols)?;
         }
     }
     Ok(())
@@ -111,18 +135,21 @@ impl Segment {
         None
     }
 
-    fn pack(&self, symbols: &[u8], out: &mut Vec<u8>) {
-        let head = |kind, out: &mut Vec<u8>| put_varint(self.length << 2 | kind, out);
+    fn pack(&self, symbols: &[u8], heads: Heads, out: &mut Vec<u8>) {
+        let head = |kind, out: &mut Vec<u8>| put_varint(self.length << heads.bits() | kind, out);
         let start = out.len();
         if self.counts.iter().filter(|&&count| count > 0).count() == 1 {
             head(CONSTANT, out);
             return out.push(symbols[0]);
         }
         let bits = self.bits();
-        head(if bits == COARSE_BITS { COARSE } else { FINE }, out);
+        let wide = heads == Heads::Wide && self.coded(bits) >> 19 >= LONG as u64;
+        let kind = if bits == COARSE_BITS { COARSE } else { FINE };
+        head(if wide { kind + WIDE } else { kind }, out);
         let frequencies = normalise(&self.counts, bits);
         put_frequencies(&frequencies, bits, out);
-        encode(symbols, &frequencies, bits, out);
+        let states = if wide { States::Many } else { States::of_length(symbols.len()) };
+        encode(symbols, &frequencies, (bits, states), out);
         if out.len() - start > symbols.len() {
             out.truncate(start);
             head(RAW, out);
@@ -214,10 +241,10 @@ mod tests {
     fn packed(streams: &[&[u8]]) -> Vec<u8> {
         let lengths: Vec<usize> = streams.iter().map(|stream| stream.len()).collect();
         let (symbols, mut out) = (streams.concat(), Vec::new());
-        pack_segments(&symbols, &lengths, &mut out);
+        pack_segments(&symbols, &lengths, Heads::Narrow, &mut out);
         assert!(out.len() <= max_segments(symbols.len(), streams.len()));
         let (mut rest, mut back) = (&out[..], vec![0; symbols.len()]);
-        unpack_segments(&mut rest, &mut back).expect("packed");
+        unpack_segments(&mut rest, Heads::Narrow, &mut back).expect("packed");
         assert!(rest.is_empty() && back == symbols);
         out
     }

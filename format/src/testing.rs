@@ -85,7 +85,8 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
     let exact = random.below(5) == 0;
     let scale = if exact { 1 } else { [1, 5, 9_000, 100_000_000][random.below(4) as usize] };
     let mut code = || (random.below(scale) as i32).wrapping_sub(scale as i32 / 2);
-    let codes = |level: u8| (0..geometry.codes(level).unwrap_or(0)).map(|_| code()).collect();
+    let codes =
+        |level: u8| own(&geometry.boxes(level), (0..geometry.codes(level).unwrap_or(0)).map(|_| code()).collect());
     found.levels = (0..geometry.window.parts() as u8).map(codes).collect();
     if exact {
         found.exact = Some(bytes(total));
@@ -94,6 +95,12 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
         found.outliers = Outliers { samples: bytes(positions.len()), positions };
     }
     found
+}
+
+/// Codes of boxes, with zeros where they belong to another box.
+fn own(boxes: &[CodeBox], codes: Vec<i32>) -> Vec<i32> {
+    let of_boxes = DenseCodes::one_after_another(&codes, boxes);
+    if boxes.is_empty() { codes } else { of_boxes.iter().flat_map(|of| of.contiguous().into_owned()).collect() }
 }
 
 /// Packs and compresses a block's content.
@@ -113,7 +120,10 @@ pub(crate) fn encode(
         let largest = codes.iter().map(|&code| f64::from(code).abs()).fold(0.0, f64::max);
         let mut raw = Vec::new();
         match &geometry.window.pyramid {
-            Some(_) => pack_cells(codes, &geometry.boxes(level), &mut raw),
+            Some(pyramid) => {
+                let boxes = geometry.boxes(level);
+                pyramid.packing.pack(&DenseCodes::one_after_another(codes, &boxes), &mut raw);
+            }
             None => pack_codes(codes, &mut raw),
         }
         let count = codes.iter().filter(|&&code| code != 0).count();

@@ -2,6 +2,7 @@
 
 use crate::bytes::{ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::limits::*;
+use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
 use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
 use bincode::{Decode, Encode};
@@ -180,6 +181,11 @@ impl Window {
         Self { reached, share, squared_error, min, max, missing, coded, outliers, ..self.clone() }
     }
 
+    /// How its codes are packed; without a pyramid, in the way of version 1.0.
+    pub fn packing(&self) -> Packing {
+        self.pyramid.as_ref().map_or(Packing::Flat, |pyramid| pyramid.packing)
+    }
+
     /// Number of level parts that a block can have.
     pub fn parts(&self) -> usize {
         if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }
@@ -196,7 +202,9 @@ impl Window {
         ensure(samples <= MAX_BLOCK_SAMPLES, || format!("blocks of {samples} samples, at most {MAX_BLOCK_SAMPLES}"))?;
         self.check_coding()?;
         let counted = voxels_in_all.saturating_mul(frames.into());
-        let coded = voxels_in_all.saturating_mul(coefficients.into());
+        // With ghost nodes, a block of 2 x 2 x 2 voxels has 27 nodes.
+        let nodes = if self.pyramid.as_ref().is_some_and(|pyramid| pyramid.ghosts) { 4 } else { 1 };
+        let coded = voxels_in_all.saturating_mul(coefficients.into()).saturating_mul(nodes);
         let possible = self.missing.max(self.outliers) <= counted && self.coded <= coded;
         ensure(possible, || "more missing samples, outliers or coefficients than there are samples".into())?;
         let errors = finite_amount(self.delta) && finite_amount(self.reached) && is_amount(self.squared_error);

@@ -10,6 +10,7 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::prefix::CompletePrefix;
+use crate::pyramid::{Packing, check_packing};
 use crate::section::{SectionExtent, SectionId, compress_directory, frame};
 use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
@@ -33,6 +34,7 @@ pub struct Summary {
 pub struct Writer<W: Write> {
     out: W,
     id: FileId,
+    packing: Packing,
     /// Bytes written so far.
     position: u64,
     /// Whether the last call succeeded.
@@ -54,15 +56,24 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
+    /// Starts a file whose codes are packed like those of the windows in `metadata`.
+    ///
+    /// # Errors
+    /// As [`Self::with_packing`].
+    pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
+        Self::with_packing(out, id, metadata, metadata.packing())
+    }
+
     /// Starts a file: writes its header and its start, which is the metadata that does not depend on frames.
     ///
     /// # Errors
     /// [`Error::Invalid`] or [`Error::TooLarge`] if the metadata cannot be encoded, [`Error::Io`] if writing fails.
-    pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
+    pub fn with_packing(out: W, id: FileId, metadata: &Metadata, packing: Packing) -> Result<Self> {
         let (start, leaves) = (metadata.start(), Vec::new());
         let record = start.encode()?;
-        let mut writer = Self::continue_from(out, CompletePrefix { id, metadata: start, end: 0, leaves, stored: 0 });
-        writer.write(&Header::new(id).encode())?;
+        let nothing = CompletePrefix { id, packing, metadata: start, end: 0, leaves, stored: 0 };
+        let mut writer = Self::continue_from(out, nothing);
+        writer.write(&Header::new(id, packing).encode())?;
         writer.write_section(SectionId::Start, &record, record.len())?;
         writer.ended = writer.position;
         Ok(writer)
@@ -74,11 +85,12 @@ impl<W: Write> Writer<W> {
     }
 
     fn continue_from(out: W, begun: CompletePrefix) -> Self {
-        let CompletePrefix { id, metadata, end, leaves, stored } = begun;
+        let CompletePrefix { id, packing, metadata, end, leaves, stored } = begun;
         let (intact, window, last, leaf, entries) = (true, None, None, None, Vec::new());
         Self {
             out,
             id,
+            packing,
             position: end,
             intact,
             metadata,
@@ -114,7 +126,8 @@ impl<W: Write> Writer<W> {
         let bytes = record.encode().map_err(Error::Invalid)?;
         let next = WindowRecord::parse(&bytes).and_then(|record| {
             let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
-            ensure(next, || format!("window {} out of order", record.number))
+            ensure(next, || format!("window {} out of order", record.number))?;
+            check_packing(&record.window, self.packing)
         });
         next.map_err(Error::Invalid)?;
         self.count_record(bytes.len())?;

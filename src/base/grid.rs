@@ -78,6 +78,11 @@ impl Region {
         (0..3).all(|a| self.start[a] <= other.start[a] && other.end[a] <= self.end[a])
     }
 
+    /// The voxels of the region on the lattice of every n-th voxel along each axis, numbered on that lattice.
+    pub fn every(&self, n: usize) -> Self {
+        Self { start: self.start.map(|i| i.div_ceil(n)), end: self.end.map(|i| i.div_ceil(n)) }
+    }
+
     /// The same box moved by `offset`.
     pub(crate) fn moved_by(&self, offset: [usize; 3]) -> Self {
         Self {

@@ -7,6 +7,7 @@ pub mod error;
 pub mod progress;
 pub(crate) mod memory;
 pub(crate) mod zeroed;
+pub(crate) mod spread;
 pub(crate) mod half;
 pub mod sample;
 pub mod grid;

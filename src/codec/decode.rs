@@ -8,18 +8,20 @@ use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Field, Plane};
-use super::pyramid::PredictionPasses;
 use super::rows::Change;
-use crate::base::sample;
+use crate::base::sample::{self, SampleType};
+use std::collections::HashMap;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
 pub struct Block {
-    /// The number of voxels along x, y, z.
+    /// The number of decoded voxels along x, y, z.
     pub size: [usize; 3],
-    /// The number of voxels.
+    /// The number of decoded voxels.
     pub voxels: usize,
+    /// All voxels of the block; more than are decoded if the codec leaves out detail.
+    of: [usize; 3],
     /// The quantisation step.
     pub step: f64,
     /// The codes of the level parts that were read.
@@ -40,12 +42,14 @@ impl Block {
         reader: &Reader<S>,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        size: [usize; 3],
+        of: [usize; 3],
         wanted: &[bool],
     ) -> Result<Self> {
+        let size = codec.decoded_size(of);
         let mut block = Self {
             size,
             voxels: size.iter().product(),
+            of,
             step: entry.stats.step,
             codes: Codes::default(),
             outliers: reader.outliers(entry)?,
@@ -53,6 +57,7 @@ impl Block {
             exact: reader.exact(entry)?,
             bytes_read: 0,
         };
+        block.thin_samples(codec);
         block.read_codes(reader, codec, entry, wanted)?;
         block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
         Ok(block)
@@ -70,15 +75,23 @@ impl Block {
         })
     }
 
+    /// A block with these codes, as [`Self::all_codes`] returns them.
+    pub fn of_codes(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
+        let mut block = Self { missing: Default::default(), step, ..Self::of_missing(codec, size) };
+        block.set_codes(codec, codes);
+        block
+    }
+
     /// A block with every sample missing: NaN for float types, else the declared value, or 0 without one.
-    pub(crate) fn of_missing(codec: &WindowCodec, size: [usize; 3]) -> Self {
+    pub(crate) fn of_missing(codec: &WindowCodec, of: [usize; 3]) -> Self {
+        let size = codec.decoded_size(of);
         let voxels: usize = size.iter().product();
         let samples = codec.frames() * voxels;
         let number = if codec.sample.is_float() { f64::NAN } else { codec.missing_value.unwrap_or(0.0) };
         let mut bytes = vec![0; samples * codec.sample.size()];
         sample::store(codec.sample, &vec![number; samples], &mut bytes);
         let (outliers, missing) = (Outliers::default(), (vec![true; samples], bytes));
-        Self { size, voxels, step: 0.0, codes: Codes::default(), outliers, missing, exact: None, bytes_read: 0 }
+        Self { size, voxels, of, step: 0.0, codes: Codes::default(), outliers, missing, exact: None, bytes_read: 0 }
     }
 
     /// Reads the level parts that exist and that `wanted` needs; the codes of others are zero.
@@ -97,7 +110,7 @@ impl Block {
         let needed = |level: u8| parts.iter().any(|part| part.kind == PartKind::Level(level));
         self.codes = match &codec.scheme.pyramid {
             Some(pyramid) => {
-                let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
+                let passes = codec.passes(pyramid, self.of);
                 Codes::Sparse(passes.read(reader, entry, needed)?)
             }
             None => Codes::Dense(self.read_dense(reader, codec, entry, needed)?),
@@ -112,20 +125,82 @@ impl Block {
         entry: &BlockEntry,
         needed: impl Fn(u8) -> bool,
     ) -> Result<Buffer<i32>> {
-        let mut codes = Buffer::of(codec.basis.coefficients() * self.voxels);
-        for (level, range) in (0..).zip(codec.part_ranges(self.size)) {
+        let all: usize = self.of.iter().product();
+        let mut codes = Buffer::of(codec.basis.coefficients() * all);
+        for level in 0..codec.parts() as u8 {
+            let range = codec.level_range(level, self.of);
             if needed(level) {
                 reader.codes(entry, level, &mut codes[range])?;
             } else {
                 codes[range].fill(0);
             }
         }
-        Ok(codes)
+        if codec.lod == 0 {
+            return Ok(codes);
+        }
+        let decoded = self.decoded_voxels(codec);
+        Ok(codes.chunks_exact(all).flat_map(|of_k| decoded.iter().map(|voxel| of_k[*voxel])).collect())
+    }
+
+    /// The numbers of the voxels that are decoded, among all.
+    fn decoded_voxels(&self, codec: &WindowCodec) -> Vec<usize> {
+        let [x, y, _] = self.of;
+        let along = |a: usize| (0..self.of[a]).step_by(1 << codec.lod);
+        along(2).flat_map(|z| along(1).flat_map(move |y_| along(0).map(move |x_| x_ + x * (y_ + y * z)))).collect()
+    }
+
+    /// Leaves out the stored samples of voxels that are not decoded.
+    fn thin_samples(&mut self, codec: &WindowCodec) {
+        if codec.lod == 0 || (self.exact.is_none() && !self.overrides()) {
+            return;
+        }
+        let (all, size) = (self.of.iter().product::<usize>(), codec.sample.size());
+        let decoded = self.decoded_voxels(codec);
+        let samples = || (0..codec.frames()).flat_map(|frame| decoded.iter().map(move |voxel| frame * all + voxel));
+        if let Some(exact) = &mut self.exact {
+            *exact = samples().flat_map(|at| exact[at * size..(at + 1) * size].to_vec()).collect();
+        }
+        let stored = |positions: &mut dyn Iterator<Item = usize>, bytes: &[u8]| -> HashMap<usize, Vec<u8>> {
+            positions.zip(bytes.chunks_exact(size).map(<[u8]>::to_vec)).collect()
+        };
+        let Outliers { positions, samples: bytes } = std::mem::take(&mut self.outliers);
+        let outliers = stored(&mut positions.iter().map(|at| *at as usize), &bytes);
+        let (mask, bytes) = std::mem::take(&mut self.missing);
+        let missing = stored(&mut (0..mask.len()).filter(|at| mask[*at]), &bytes);
+        for (number, at) in samples().enumerate() {
+            if let Some(bytes) = outliers.get(&at) {
+                self.outliers.positions.push(number as u32);
+                self.outliers.samples.extend(bytes);
+            }
+            if !mask.is_empty() {
+                self.missing.0.push(mask[at]);
+                self.missing.1.extend(missing.get(&at).into_iter().flatten());
+            }
+        }
+        if !self.missing.0.contains(&true) {
+            self.missing.0.clear();
+        }
+    }
+
+    /// All codes, including zeros: `codes[k * voxels + voxel]`, or with a pyramid pass after pass. Empty if no code is held.
+    pub fn all_codes(&self, codec: &WindowCodec) -> Vec<i32> {
+        match (&codec.scheme.pyramid, &self.codes) {
+            (Some(pyramid), Codes::Sparse(codes)) => codec.passes(pyramid, self.of).dense(codes),
+            _ => self.codes.dense().to_vec(),
+        }
+    }
+
+    /// Replaces the codes; `codes` are all of them, as [`Self::all_codes`] returns them.
+    pub fn set_codes(&mut self, codec: &WindowCodec, codes: &[i32]) {
+        self.codes = match &codec.scheme.pyramid {
+            Some(pyramid) => Codes::Sparse(codec.passes(pyramid, self.of).list(codes)),
+            None => Codes::Dense(codes.iter().copied().collect()),
+        };
     }
 
     /// Decodes the codes to coefficients.
     pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
-        Field::decode(codec, self.size, self.step, &self.codes)
+        Field::decode(codec, self.of, self.step, &self.codes)
     }
 
     /// Decodes every k that `wanted` marks of a pyramid, if that is needed at once: because one k cannot be decoded
@@ -133,7 +208,7 @@ impl Block {
     pub(crate) fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
-        at_once.then(|| Field::refined(codec, self.size, self.step, (self.codes.sparse(), wanted)))
+        at_once.then(|| Field::refined(codec, self.of, self.step, (self.codes.sparse(), wanted)))
     }
 
     /// Whether any sample is stored exactly, and overrides the coefficients.
@@ -148,7 +223,7 @@ impl Block {
         k: usize,
         scratch: (&'a mut Vec<f32>, &'a mut Vec<f64>),
     ) -> Plane<'a> {
-        Plane::decode(codec, self.size, self.step, (&self.codes, k), scratch)
+        Plane::decode(codec, self.of, self.step, (&self.codes, k), scratch)
     }
 
     /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
@@ -156,10 +231,10 @@ impl Block {
     pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
-            let ranges = codec.part_ranges(self.size).into_iter();
-            return ranges.map(|part| self.codes.dense().get(part).map_or(0.0, of_codes)).collect();
+            let of_level = |level| self.codes.dense().get(codec.level_range(level, self.of)).map_or(0.0, of_codes);
+            return (0..codec.parts() as u8).map(of_level).collect();
         };
-        let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
+        let passes = codec.passes(pyramid, self.of);
         self.field(codec).changes(&passes, self.step, self.codes.sparse()).iter().map(Change::largest).collect()
     }
 
@@ -186,7 +261,23 @@ impl Block {
 
     /// All samples of the block in their own type, little-endian, `frame * voxels + voxel`.
     pub fn samples(&self, codec: &WindowCodec) -> Buffer<u8> {
+        if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
+            let field = self.field(codec);
+            if let Some(values) = field.singles() {
+                return self.stored_singles(values);
+            }
+        }
         self.decode(codec, |_, _| {})
+    }
+
+    /// Samples whose nodes already have their type.
+    fn stored_singles(&self, values: &[f32]) -> Buffer<u8> {
+        let mut out = Buffer::of(4 * values.len());
+        for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {
+            *bytes = value.to_le_bytes();
+        }
+        self.put_overrides(4, &mut out);
+        out
     }
 
     /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.

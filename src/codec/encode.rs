@@ -15,23 +15,22 @@ use super::buffer::clear;
 use super::check::Tally;
 use super::error_weights::QuantizerSetup;
 use super::load::{Missing, load_group};
-use super::pyramid::PredictionPasses;
 use super::refine::{Coded, Source};
-use super::rows::Change;
+use super::sampled_box::SampledBox;
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
-use wavesplat_format::{pack_cells, pack_codes, pack_exact, pack_missing, pack_outliers};
+use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
 /// The encoder of one worker; its scratch is reused from block to block.
 #[derive(Debug)]
 pub struct Encoder {
     compressor: Compressor,
     codes: Vec<i32>,
-    /// The coefficients that a pyramid refines, in either precision, and scratch of the same size.
-    single: [Vec<f32>; 2],
-    double: [Vec<f64>; 2],
+    /// The coefficients that a pyramid refines, in either precision, and scratch.
+    single: [Vec<f32>; 3],
+    double: [Vec<f64>; 3],
     raw: Vec<u8>,
 }
 
@@ -51,26 +50,32 @@ impl Encoder {
         Ok(Self { compressor: Compressor::new(level)?, codes, single, double, raw })
     }
 
-    /// Encodes a block of `size` voxels. `samples` are little-endian, frame by frame: `frames * voxels * sample size`
-    /// bytes.
+    /// Encodes a block of some voxels. `samples` are little-endian, frame by frame.
     pub fn block(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
-        size: [usize; 3],
+        of: impl Into<SampledBox>,
         samples: &[u8],
     ) -> wavesplat_format::Result<Encoded> {
+        let of: SampledBox = of.into();
+        let (size, around) = (of.size, codec.outer_size(of.size));
+        let (own, outer) = (of.own(codec, samples), of.extended(codec, around, samples));
+        let samples = &own[..];
         let missing = Missing::find(codec, samples);
+        let missing_around = (around != size).then(|| Missing::find(codec, &outer));
         let block = Source { codec, size, samples, missing: &missing };
+        let missing_around = missing_around.as_ref().unwrap_or(&missing);
+        let outer = Source { codec, size: around, samples: &outer, missing: missing_around };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
                 self.double = Default::default(); // an earlier window may have used it
-                block.refine(pyramid, &mut self.single, &mut self.codes)
+                block.refine(pyramid, &outer, &mut self.single, &mut self.codes)
             }
             Some(pyramid) => {
                 self.single = Default::default();
-                block.refine(pyramid, &mut self.double, &mut self.codes)
+                block.refine(pyramid, &outer, &mut self.double, &mut self.codes)
             }
         };
         let coded = match coded {
@@ -105,7 +110,7 @@ impl Encoder {
             dropped += self.keep_codes(&group, step, voxels, first, count);
             block.check(&group, (first, count), &mut tally)?;
         }
-        Some(Coded { step, changes: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
+        Some(Coded { step, parts: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
     }
 
     /// Writes a group's kept codes, k-major. Returns the energy lost by dropping and rounding.
@@ -125,19 +130,23 @@ impl Encoder {
     /// The parts of a block coded by coefficients.
     fn coded_parts(&mut self, block: &Source<'_>, coded: &Coded) -> wavesplat_format::Result<Parts> {
         let codec = block.codec;
-        let passes = codec.scheme.pyramid.as_ref().map(|p| PredictionPasses::new(p, codec.shape(block.size)));
+        let pyramid = codec.scheme.pyramid.as_ref();
+        let passes = pyramid.map(|p| (p.packing, codec.passes(p, block.size)));
         let mut parts = Vec::new();
-        for (level, range) in (0..).zip(codec.part_ranges(block.size)) {
-            let codes = &self.codes[range];
-            let stats = match &coded.changes {
-                Some(changes) => change_stats(&changes[usize::from(level)], codes),
-                None => code_stats(codes, coded.step),
+        for level in 0..codec.parts() as u8 {
+            clear(&mut self.raw);
+            let stats = match (&coded.parts, &passes) {
+                (Some(parts), Some((packing, passes))) => {
+                    packing.pack(&passes.part_of(level, &self.codes), &mut self.raw);
+                    parts[usize::from(level)]
+                }
+                _ => {
+                    let codes = &self.codes[codec.level_range(level, block.size)];
+                    pack_codes(codes, &mut self.raw);
+                    code_stats(codes, coded.step)
+                }
             };
             if stats.count > 0 {
-                match &passes {
-                    Some(passes) => pack_cells(codes, &passes.boxes(level), clear(&mut self.raw)),
-                    None => pack_codes(codes, clear(&mut self.raw)),
-                }
                 parts.push(self.compressor.part(PartKind::Level(level), stats, &self.raw)?);
             }
         }
@@ -210,10 +219,4 @@ fn code_stats(codes: &[i32], step: f64) -> PartStats {
         stats.largest = stats.largest.max(c.abs());
     }
     stats
-}
-
-/// The count of codes, with the energy and the largest of the changes from leaving out this part and all finer ones.
-fn change_stats(change: &Change, codes: &[i32]) -> PartStats {
-    let count = codes.iter().filter(|c| **c != 0).count() as u64;
-    PartStats { count, energy: change.energy(), largest: change.largest() }
 }

@@ -47,7 +47,7 @@ pub enum Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
-    /// Decodes one k of a block of `size` voxels. Each k must be coded by itself.
+    /// Decodes one k of a block. Each k must be coded by itself.
     pub(super) fn decode(
         codec: &WindowCodec,
         size: [usize; 3],
@@ -56,10 +56,10 @@ impl<'a> Plane<'a> {
         (single, double): (&'a mut Vec<f32>, &'a mut Vec<f64>),
     ) -> Self {
         let Some(pyramid) = &codec.scheme.pyramid else {
-            let voxels: usize = size.iter().product();
+            let voxels: usize = codec.decoded_size(size).iter().product();
             return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
         };
-        let (passes, codes) = (PredictionPasses::new(pyramid, codec.shape(size)), codes.sparse());
+        let (passes, codes) = (codec.passes(pyramid, size), codes.sparse());
         match pyramid.single {
             true if passes.decode_one(k, step, codes, single) => Self::Single(single),
             false if passes.decode_one(k, step, codes, double) => Self::Double(double),
@@ -78,17 +78,18 @@ impl<'a> Plane<'a> {
 }
 
 impl Field<'static> {
-    /// Decodes the codes of a block of `size` voxels that a pyramid refines, of every k that `wanted` marks.
+    /// Decodes the codes of a block that a pyramid refines, of every k that `wanted` marks.
     pub(super) fn refined(
         codec: &WindowCodec,
         size: [usize; 3],
         step: f64,
         (codes, wanted): (&SparseCodes, &[bool]),
     ) -> Self {
-        let shape = codec.shape(size);
         let (values, marked) = match &codec.scheme.pyramid {
-            Some(pyramid) if pyramid.single => refined(pyramid, shape, step, (codes, wanted), Values::Single),
-            Some(pyramid) => refined(pyramid, shape, step, (codes, wanted), Values::Double),
+            Some(pyramid) if pyramid.single => {
+                refined(&codec.passes(pyramid, size), step, (codes, wanted), Values::Single)
+            }
+            Some(pyramid) => refined(&codec.passes(pyramid, size), step, (codes, wanted), Values::Double),
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
         };
         Self { values, marked }
@@ -96,7 +97,7 @@ impl Field<'static> {
 }
 
 impl<'a> Field<'a> {
-    /// Decodes all codes of a block of `size` voxels. Without codes, all coefficients are zero.
+    /// Decodes all codes of a block. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a Codes) -> Self {
         match codes {
             Codes::Dense(codes) if !codes.is_empty() => {
@@ -115,6 +116,11 @@ impl<'a> Field<'a> {
             Values::Single(values) => values[index].into(),
             Values::Double(values) => values[index],
         }
+    }
+
+    /// All coefficients, if they are 32-bit floats.
+    pub(super) fn singles(&self) -> Option<&[f32]> {
+        if let Values::Single(values) = &self.values { Some(values) } else { None }
     }
 
     /// The change from leaving out each level part of a pyramid and all finer ones.
@@ -255,16 +261,15 @@ fn widen(values: &[f32], out: &mut [f64]) {
 }
 
 fn refined<'a, R: Real>(
-    pyramid: &Pyramid,
-    shape: [usize; 4],
+    passes: &PredictionPasses<'_>,
     step: f64,
     (codes, wanted): (&SparseCodes, &[bool]),
     values: fn(Buffer<R>) -> Values<'a>,
 ) -> (Values<'a>, Vec<bool>) {
     if codes.count() == 0 {
-        return (Values::Zero, vec![false; shape[3]]);
+        return (Values::Zero, vec![false; passes.nodes()[3]]);
     }
-    let mut field = Buffer::of(shape.iter().product());
-    let marked = PredictionPasses::new(pyramid, shape).decode_some(wanted, step, codes, &mut field);
+    let mut field = Buffer::of(passes.nodes().iter().product());
+    let marked = passes.decode_some(wanted, step, codes, &mut field);
     (values(field), marked)
 }

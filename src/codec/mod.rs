@@ -20,6 +20,7 @@ pub(crate) mod pyramid;
 pub(crate) mod real;
 mod refine;
 mod rows;
+pub(crate) mod sampled_box;
 pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
@@ -30,7 +31,7 @@ use crate::wavelet::{self, LANES, TimeBasis};
 use pyramid::PredictionPasses;
 use scheme::Scheme;
 use std::ops::Range;
-use wavesplat_format::{Metadata, Pyramid, Window};
+use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 
 /// What coding and decoding share for all blocks of one window.
 #[derive(Debug)]
@@ -51,6 +52,8 @@ pub struct WindowCodec {
     pub missing_value: Option<f64>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
+    /// The level of detail: blocks are decoded on the lattice of every 2^lod-th voxel along each axis.
+    pub lod: u32,
 }
 
 impl WindowCodec {
@@ -71,7 +74,7 @@ impl WindowCodec {
         let synthesis = wavelet::synthesis(basis.as_ref());
         let gain = wavelet::gain(&synthesis);
         let levels = wavelet::ranges(levels);
-        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, levels }
+        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, levels, lod: 0 }
     }
 
     /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
@@ -98,24 +101,33 @@ impl WindowCodec {
     pub(crate) fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
         match &self.scheme.pyramid {
             None => wanted[self.levels[part].clone()].contains(&true),
+            Some(pyramid) if part > coarsest_part(pyramid, self.lod) => false,
             // The last pass, along time, adds only the odd frames.
             Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
             Some(_) => true,
         }
     }
 
-    /// The numbers of nodes along x, y, z and k in a block of `size` voxels.
-    pub(crate) fn shape(&self, [x, y, z]: [usize; 3]) -> [usize; 4] {
-        [x, y, z, self.basis.coefficients()]
+    /// The voxels of a block that are decoded.
+    pub(crate) fn decoded_size(&self, size: [usize; 3]) -> [usize; 3] {
+        size.map(|n| n.div_ceil(1 << self.lod))
     }
 
-    /// The range of codes in each level part of a block of `size` voxels.
-    fn part_ranges(&self, size: [usize; 3]) -> Vec<Range<usize>> {
-        let voxels: usize = size.iter().product();
-        match &self.scheme.pyramid {
-            Some(pyramid) => wavelet::ranges(&PredictionPasses::new(pyramid, self.shape(size)).part_lengths()),
-            None => self.levels.iter().map(|k| k.start * voxels..k.end * voxels).collect(),
-        }
+    /// The voxels along x, y, z that coding a block takes: its own, and those of following blocks that predict them.
+    pub fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let ghosts = self.scheme.pyramid.as_ref().map_or([0; 3], |pyramid| pyramid.ghost_nodes(size));
+        std::array::from_fn(|a| size[a] + ghosts[a])
+    }
+
+    /// The passes over a block, of which some voxels may not be decoded.
+    pub(crate) fn passes<'a>(&self, pyramid: &'a Pyramid, size: [usize; 3]) -> PredictionPasses<'a> {
+        PredictionPasses::with_detail(pyramid, size, self.basis.coefficients(), self.lod)
+    }
+
+    /// Without a pyramid: the range of codes in a level part of a block of `size` voxels.
+    fn level_range(&self, level: u8, size: [usize; 3]) -> Range<usize> {
+        let (voxels, k) = (size.iter().product::<usize>(), &self.levels[usize::from(level)]);
+        k.start * voxels..k.end * voxels
     }
 
     /// The number of frames in the window.
@@ -134,6 +146,17 @@ impl WindowCodec {
         let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
         if lost { f64::INFINITY } else { a.max(b) }
+    }
+}
+
+/// The last level part that a level of detail needs.
+fn coarsest_part(pyramid: &Pyramid, lod: u32) -> usize {
+    // In one piece, passes along time hold codes of every lattice.
+    let divided = pyramid.packing == Packing::Nested || !pyramid.order.contains(&Axis::T);
+    match lod {
+        1 if divided => 1,
+        2.. if divided => 0,
+        _ => ODD_FRAMES,
     }
 }
 

@@ -9,7 +9,6 @@ use super::check::{Compared, Tally};
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::load::{Missing, load_group};
-use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
@@ -17,13 +16,13 @@ use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use crate::codec::bound::Measure;
 use crate::wavelet::LANES;
-use wavesplat_format::{Basis, Outliers, Pyramid};
+use wavesplat_format::{Basis, Outliers, PartStats, Pyramid};
 
 /// The result of coding the series of a block.
 pub(super) struct Coded {
     pub(super) step: f64,
-    /// With a pyramid: the change from leaving out each level part and all finer ones, for parts that have codes.
-    pub(super) changes: Option<Vec<Change>>,
+    /// With a pyramid, for each level part the number of its codes, and the change from leaving out it and all finer ones.
+    pub(super) parts: Option<Vec<PartStats>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
     pub(super) tally: Tally,
@@ -45,30 +44,37 @@ impl Source<'_> {
         self.size.iter().product()
     }
 
-    /// Encodes the block by a pyramid. `codes` is the result; the fields are scratch. None if the block must be stored
-    /// exactly.
+    /// Encodes the block by a pyramid, from the samples of `outer`, which also has nodes that only predict. `codes` is the result; the fields are scratch. None if the block must be stored exactly.
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
-        [field, split]: &mut [Vec<R>; 2],
+        outer: &Source<'_>,
+        [source, field, split]: &mut [Vec<R>; 3],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
         let weighing = QuantizerSetup::of(self.codec, self.samples, self.missing.magnitude)?;
         let step = self.step::<R>(pyramid, &weighing)?;
-        self.load(&weighing, field);
-        codes.resize(field.len(), 0);
-        let passes = PredictionPasses::new(pyramid, self.codec.shape(self.size));
-        if !passes.encode(step, field, split, codes) {
+        outer.load(&weighing, source);
+        let passes = self.codec.passes(pyramid, self.size);
+        codes.resize(passes.codes(), 0);
+        field.resize(passes.nodes().iter().product(), R::default());
+        if !passes.encode(step, (source, outer.size), (field, split), codes) {
             return None;
         }
+        let listed = passes.list(codes);
         let mut tally = if self.plain() {
             self.check_samples(field)?
         } else {
-            self.check_series(&weighing, field, &passes.marked_of(codes))?
+            self.check_series(&weighing, field, &passes.marked(&listed))?
         };
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let changes = Some(passes.changes_of_coded(step, codes, field));
-        Some(Coded { step, changes, dropped: tally.squared_error, outliers, tally })
+        let changes = passes.changes_of_coded(step, &listed, field);
+        let of_part = |(part, change): (u8, &Change)| {
+            let count = passes.count(part, &listed) as u64;
+            PartStats { count, energy: change.energy(), largest: change.largest() }
+        };
+        let parts = Some((0..).zip(&changes).map(of_part).collect());
+        Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
     }
 
     /// The step of the finest level. None if the block must be stored exactly.

@@ -30,14 +30,6 @@ pub(super) fn sum4<R: Real>(rows: [&[R]; 4], w: [R; 4], out: &mut [R]) {
     }
 }
 
-/// v = p + code * step
-#[inline(always)]
-pub(super) fn decode<R: Real>(nodes: &mut [R], codes: &[i32], step: R) {
-    for (v, code) in nodes.iter_mut().zip(codes) {
-        *v = *v + R::of_code(*code) * step;
-    }
-}
-
 /// Computes the codes of v - p, 0 for NaN, and replaces p by the decoded value. False if a code does not fit.
 #[inline(always)]
 pub(super) fn encode<R: Real>(nodes: &[R], predicted: &mut [R], codes: &mut [i32], [step, inverse]: [R; 2]) -> bool {

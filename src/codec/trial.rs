@@ -1,21 +1,24 @@
 //! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
-use super::buffer::clear;
 use super::error_weights::QuantizerSetup;
 use super::load::Missing;
-use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::refine::Source;
-use wavesplat_format::{Pyramid, estimate_cells};
+use super::sampled_box::SampledBox;
+use std::borrow::Cow;
+use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
 pub(crate) struct Trial<'a, R> {
     size: [usize; 3],
-    samples: &'a [u8],
+    samples: Cow<'a, [u8]>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
+    /// The nodes of the box, and of those behind it that may predict its own.
     nodes: Vec<R>,
+    /// The voxels of these nodes along x, y, z.
+    outer: [usize; 3],
 }
 
 /// Scratch that trials reuse.
@@ -27,14 +30,18 @@ pub(crate) struct Scratch<R> {
 }
 
 impl<'a, R: Real> Trial<'a, R> {
-    pub(crate) fn new(codec: &WindowCodec, size: [usize; 3], samples: &'a [u8]) -> Self {
-        let missing = Missing::find(codec, samples);
-        let weighing = QuantizerSetup::of(codec, samples, missing.magnitude);
+    /// Pyramids may use the nodes of `outer` voxels.
+    pub(crate) fn new(codec: &WindowCodec, (of, outer): (SampledBox, [usize; 3]), samples: &'a [u8]) -> Self {
+        let size = of.size;
+        let (own, extended) = (of.own(codec, samples), of.extended(codec, outer, samples));
+        let around = Missing::find(codec, &extended);
+        let missing = Missing::find(codec, &own);
+        let weighing = QuantizerSetup::of(codec, &own, missing.magnitude);
         let mut nodes = Vec::new();
         if let Some(weighing) = &weighing {
-            Source { codec, size, samples, missing: &missing }.load(weighing, &mut nodes);
+            Source { codec, size: outer, samples: &extended, missing: &around }.load(weighing, &mut nodes);
         }
-        Self { size, samples, missing, weighing, nodes }
+        Self { size, samples: own, missing, weighing, nodes, outer }
     }
 
     /// The number of voxels in the box.
@@ -55,18 +62,18 @@ impl<'a, R: Real> Trial<'a, R> {
         pyramid: &Pyramid,
         Scratch { field, split, codes }: &mut Scratch<R>,
     ) -> Option<usize> {
-        let source = Source { codec, size: self.size, samples: self.samples, missing: &self.missing };
+        let source = Source { codec, size: self.size, samples: &self.samples, missing: &self.missing };
         let weighing = self.weighing.as_ref()?;
         let step = source.step::<R>(pyramid, weighing)?;
-        clear(field).extend_from_slice(&self.nodes);
-        codes.resize(field.len(), 0);
-        let passes = PredictionPasses::new(pyramid, codec.shape(self.size));
-        if !passes.encode(step, field, split, codes) {
+        let passes = codec.passes(pyramid, self.size);
+        field.resize(passes.nodes().iter().product(), R::default());
+        codes.resize(passes.codes(), 0);
+        if !passes.encode(step, (&self.nodes, self.outer), (field, split), codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field, &passes.marked_of(codes));
-        let parts = (0..).zip(codec.part_ranges(self.size));
-        let packed: usize = parts.map(|(part, range)| estimate_cells(&codes[range], &passes.boxes(part))).sum();
+        let outliers = source.estimate_outliers(weighing, field, &passes.marked(&passes.list(codes)));
+        let packed = |part| pyramid.packing.estimate(&passes.part_of(part, codes));
+        let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.
         let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
         Some(rest + outliers * (GAP + codec.sample.size()))
@@ -83,7 +90,7 @@ mod tests {
     use crate::codec::bound::{Bound, ErrorBound};
     use crate::codec::encode::Encoder;
     use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
-    use wavesplat_format::BlockId;
+    use wavesplat_format::{BlockId, Packing};
 
     const SIZE: [usize; 3] = [20, 18, 16];
     const FRAMES: usize = 16;
@@ -105,14 +112,22 @@ mod tests {
         let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
         for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
             let (order, stencil) = (order.to_vec(), Stencil::Cubic);
-            let pyramid = Pyramid { order, stencil, growth: 1.5, most: 3.0, single: true };
+            let pyramid = Pyramid {
+                order,
+                stencil,
+                growth: 1.5,
+                most: 3.0,
+                single: true,
+                packing: Packing::Nested,
+                ghosts: true,
+            };
             let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
             let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, promise, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
             let id = BlockId { window: 0, block: 0, channel: 0 };
             let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
-            let trial = Trial::<f32>::new(&codec, SIZE, &samples);
+            let trial = Trial::<f32>::new(&codec, (SIZE.into(), codec.outer_size(SIZE)), &samples);
             let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
             assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
         }

@@ -3,21 +3,24 @@
 //! Candidates are a learned basis along time (eq 20) with a pyramid in space, and a pyramid in space and time (eq 32).
 //! The first suits slow change and noise, the second fronts and moving things. The promising candidates are tuned:
 //! first the step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33) and the growth of steps (eq
-//! 34). Box positions follow the sequence of [Roberts](crate::bibliography), which spreads any number of them evenly.
+//! 34).
 
 use super::learn::learned_functions;
 use super::{ConvertConfig, Pool};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::sample::SampleType;
+use crate::base::spread::evenly;
 use crate::codec::WindowCodec;
 use crate::codec::bound::{ErrorBound, Measure};
 use crate::codec::real::Real;
+use crate::codec::sampled_box::SampledBox;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use crate::codec::trial::{Scratch, Trial};
 use crate::source::{Archive, FrameWindow, read_frames};
 use crate::wavelet::Basis;
 use rayon::prelude::*;
+use wavesplat_format::Packing;
 
 /// The fixed parts of a scheme; the rest is chosen for each window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,13 +80,17 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) magnitude: f64,
     /// [`most_samples`]
     pub(super) most: usize,
+    /// How the file's codes are packed.
+    pub(super) packing: Packing,
     /// The scheme of the window before, if the choice may begin with it.
     pub(super) before: Option<&'a Scheme>,
 }
 
 /// A box of samples, frame by frame.
 struct Sampled {
-    size: [usize; 3],
+    size: SampledBox,
+    /// The voxels that pyramids may use.
+    outer: [usize; 3],
     samples: Vec<u8>,
 }
 
@@ -133,7 +140,7 @@ impl SchemeSelector<'_> {
         }
         let tuned = promising.map(|f| self.coarsest(f, &trials));
         let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
-        for variants in [Self::orders, Self::stencils, Self::growths] {
+        for variants in [Self::orders, Self::stencils, Self::growths, Self::ghosts] {
             let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
             best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
@@ -150,7 +157,7 @@ impl SchemeSelector<'_> {
         for scheme in schemes {
             if found.iter().all(|f| f.basis != scheme.basis) {
                 let codec = self.codec(scheme);
-                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, &b.samples);
+                let trial = |b: &'a Sampled| Trial::new(&codec, (b.size, b.outer), &b.samples);
                 found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
             }
         }
@@ -215,14 +222,22 @@ impl SchemeSelector<'_> {
     /// channels take turns.
     fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
         let dims = self.archive.grid.dims;
-        let start: [usize; 3] = std::array::from_fn(|axis| {
-            let position = (0.5 + GOLDEN[axis] * number as f64).fract();
-            (position * (dims[axis] - size[axis] + 1) as f64) as usize
-        });
-        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + size[axis]) };
+        // Blocks at far faces are followed by no other voxels. They are taken for every second box.
+        let outer = self.outer_size(size);
+        let ends = if number.is_multiple_of(2) { size } else { outer };
+        let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
+        let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
+        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
+        let size = SampledBox { size, known };
         let window = self.channels[number % self.channels.len()];
         let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
-        Ok(Sampled { size, samples })
+        Ok(Sampled { size, outer, samples })
+    }
+
+    /// The voxels that coding a box by any pyramid takes.
+    fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let ghosts = self.pyramid(&ORDERS[0], Stencil::Cubic).ghost_nodes(size);
+        std::array::from_fn(|axis| size[axis] + ghosts[axis])
     }
 
     /// One scheme of each allowed kind.
@@ -268,8 +283,8 @@ impl SchemeSelector<'_> {
     }
 
     fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
-        let (growth, most) = GROWTHS[0];
-        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single() }
+        let ((growth, most), ghosts) = (GROWTHS[0], self.packing == Packing::Nested);
+        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single(), packing: self.packing, ghosts }
     }
 
     /// Whether 32-bit floats are precise enough.
@@ -304,6 +319,11 @@ impl SchemeSelector<'_> {
     fn growths(&self, best: &Scheme) -> Vec<Scheme> {
         let others = &GROWTHS[1..];
         variants(best, |p| others.iter().map(|&(growth, most)| Pyramid { growth, most, ..p.clone() }).collect())
+    }
+
+    fn ghosts(&self, best: &Scheme) -> Vec<Scheme> {
+        let other = |p: &Pyramid| if p.ghosts { vec![Pyramid { ghosts: false, ..p.clone() }] } else { Vec::new() };
+        variants(best, other)
     }
 
     /// Estimates the bytes of the window.
@@ -366,9 +386,6 @@ const PROMISING: f64 = 1.3;
 /// A variant is used only if it makes boxes smaller by this factor: smaller gains do not carry over to blocks, which
 /// are larger.
 const CLEARLY: f64 = 0.99;
-
-/// Fractions with evenly spread multiples: powers of the inverse of the root of x^4 = x + 1.
-const GOLDEN: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_2];
 
 /// The orders of passes to try. Orders with x first keep rows of x contiguous in all other passes.
 const ORDERS: [[Axis; 4]; 3] =

@@ -1,23 +1,28 @@
 //! Estimates the size of a coefficient file by coding some blocks of some windows.
 
-use super::{ConvertConfig, Plan, Task, convert};
+use super::gather::{Batch, WindowReader};
+use super::record::Recorder;
+use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Task, WindowJob, WindowsDone, encode_batch};
 use crate::base::error::{Error, Result};
-use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::base::grid::BlockGrid;
 use crate::base::output::STANDARD;
-use crate::base::progress::{Progress, Silent};
-use crate::base::sample::join_ranges;
+use crate::base::progress::Progress;
+use crate::base::sample::{self, join_ranges};
+use crate::base::spread::evenly;
+use crate::codec::encode::Encoded;
 use crate::source::scan::{Scan, scan_frame};
-use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, open_stream};
+use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::io::{self, Cursor};
+use std::io;
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// The largest number of blocks coded in a window, and of windows.
 const BLOCKS: usize = 24;
 const WINDOWS: usize = 3;
-/// The samples of these blocks take at most one part in this many of the allowed memory.
-const SHARE: usize = 4;
 
 /// The estimated size of an archive's coefficient file.
 #[derive(Debug, Clone, Serialize)]
@@ -42,123 +47,157 @@ pub struct Estimate {
 /// # Errors
 /// Those of a conversion; also an error if the source is a stream.
 pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
-    let archive = source.archive().clone();
-    let Some(frames) = archive.frames.filter(|frames| *frames > 0) else {
+    let source_archive = source.archive().clone();
+    let Some(frames) = source_archive.frames.filter(|frames| *frames > 0) else {
         return Err(Error::path(
             STANDARD,
             "an estimate needs frames that can be read more than once, not standard input",
         ));
     };
-    let task = Task::new(config, &archive);
-    let plan = Plan::new(&task.config, &task.archive, None)?;
-    let block = plan.blocks.region(0).voxels() * archive.sample.size() * config.window;
-    let most = (config.memory / SHARE / block).clamp(1, BLOCKS);
-    let regions = spread(plan.blocks.len(), most).map(|block| whole_block(&plan, block)).collect::<Vec<_>>();
-    let firsts = windows(frames, config.window);
-    progress.start(Some(firsts.len() as u64));
-    let frames_read = FramesRead { archive: &archive, missing_value: task.config.missing_value, regions: &regions };
-    let range = config.range.map_or_else(|| frames_read.range(source, config.window, &firsts), Ok)?;
-    let config = ConvertConfig { range: Some(range), block: Some(plan.blocks.edges[0]), ..task.config };
-    let (mut coded, mut samples) = (0, 0);
-    for first in &firsts {
-        let window = source.window(*first, config.window.min(frames - first))?;
-        let mut stack = stacked(window.as_ref(), &archive, &regions)?;
-        samples += stack.archive().grid.whole().voxels() * window.frames();
-        coded += convert(stack.as_mut(), &config, Path::new("estimate"), io::sink(), &Silent)?.output_bytes;
-        progress.advance(1);
-    }
+    let Task { config, archive, colour_transform } = Task::new(config, &source_archive);
+    let plan = Plan::new(&config, &archive, colour_transform.as_ref())?;
+    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, config.window));
+    progress.start(Some(windows.len() as u64));
+    let read =
+        FramesRead { archive: &source_archive, missing_value: config.missing_value, plan: &plan, blocks: &blocks };
+    let range = config.range.map_or_else(|| read.range(source, &windows), Ok)?;
+    let config = ConvertConfig { range: Some(range), ..config };
+    let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks };
+    let bytes = coded.bytes(source, &windows, progress)?;
     progress.finish();
+    let voxels = blocks.iter().map(|block| plan.blocks.region(*block).voxels()).sum::<usize>();
+    let samples = voxels * windows.iter().map(|window| window.len()).sum::<usize>();
     let all = archive.grid.whole().voxels() as f64 * frames as f64;
-    let bytes = coded as f64 * all / samples as f64;
-    let ratio = all * archive.sample.size() as f64 / bytes.max(1.0);
-    let (blocks, windows) = (regions.len(), firsts.len());
+    let bytes = bytes as f64 * all / samples as f64;
+    let ratio = all * source_archive.sample.size() as f64 / bytes.max(1.0);
+    let (blocks, windows) = (blocks.len(), windows.len());
     Ok(Estimate { bytes: bytes as u64, ratio, tolerance: config.tolerance, range, blocks, windows })
 }
 
-/// Up to `most` indices below `all`, evenly spaced.
-fn spread(all: usize, most: usize) -> impl Iterator<Item = usize> {
-    let count = all.min(most);
-    (0..count).map(move |i| (2 * i + 1) * all / (2 * count))
+/// All blocks if they are few, else some, spread evenly over the volume.
+fn some_blocks(blocks: &BlockGrid) -> Vec<usize> {
+    if blocks.len() <= BLOCKS {
+        return (0..blocks.len()).collect();
+    }
+    let [nx, ny, nz] = blocks.counts();
+    let block = |number| {
+        let [x, y, z] = evenly(number, [nx, ny, nz]);
+        x + nx * (y + ny * z)
+    };
+    (0..BLOCKS).map(block).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// The first frames of some windows: of all windows if they are few, else only of full ones.
-fn windows(frames: usize, window: usize) -> Vec<usize> {
+/// The frames of all windows if they are few, else of some full ones, evenly spaced.
+fn some_windows(frames: usize, window: usize) -> Vec<Range<usize>> {
     let all = frames.div_ceil(window);
-    spread(if all <= WINDOWS { all } else { frames / window }, WINDOWS).map(|index| index * window).collect()
+    let full = if all <= WINDOWS { all } else { frames / window };
+    let count = full.min(WINDOWS);
+    let firsts = (0..count).map(|i| (2 * i + 1) * full / (2 * count) * window);
+    firsts.map(|first| first..frames.min(first + window)).collect()
 }
 
 /// The frames that are read to find a value range.
 struct FramesRead<'a> {
     archive: &'a Archive,
     missing_value: Option<f64>,
+    plan: &'a Plan<'a>,
     /// The coded blocks.
-    regions: &'a [Region],
+    blocks: &'a [usize],
 }
 
 impl FramesRead<'_> {
     /// The value range of the last frame and, in each window, of the first frame and of those with the least and the
     /// largest sample of the coded blocks.
-    fn range(&self, source: &mut dyn FrameSource, window: usize, firsts: &[usize]) -> Result<(f64, f64)> {
-        let frames = self.archive.frames.unwrap_or(0);
+    fn range(&self, source: &mut dyn FrameSource, windows: &[Range<usize>]) -> Result<(f64, f64)> {
         let mut range = Scan::NOTHING.range;
-        for first in firsts {
-            let window = source.window(*first, window.min(frames - first))?;
+        for frames in windows {
+            let window = source.window(frames.start, frames.len())?;
             for frame in self.extreme_frames(window.as_ref())? {
-                range = join_ranges(range, self.scan(window.as_ref(), frame, &self.archive.grid)?);
+                range = join_ranges(range, self.of_frame(window.as_ref(), frame)?);
             }
         }
-        let last = source.window(frames - 1, 1)?;
-        range = join_ranges(range, self.scan(last.as_ref(), 0, &self.archive.grid)?);
+        let last = source.window(self.archive.frames.unwrap_or(1) - 1, 1)?;
+        range = join_ranges(range, self.of_frame(last.as_ref(), 0)?);
         Ok(if range.0 <= range.1 { range } else { (0.0, 0.0) })
     }
 
     /// The first frame of a window, and the frames with the least and the largest sample of the coded blocks.
     fn extreme_frames(&self, window: &dyn FrameWindow) -> Result<BTreeSet<usize>> {
-        let mut stack = stacked(window, self.archive, self.regions)?;
-        let grid = stack.archive().grid;
-        let stack = stack.window(0, window.frames())?;
-        let ranges = (0..window.frames()).map(|frame| self.scan(stack.as_ref(), frame, &grid));
-        let ranges: Vec<(f64, f64)> = ranges.collect::<Result<_>>()?;
+        let mut ranges = vec![Scan::NOTHING.range; window.frames()];
+        let mut samples = Vec::new();
+        for block in self.blocks {
+            let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
+            read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
+            for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
+                *range = join_ranges(*range, sample::range_of_present(ty, frame, self.missing_value, |_| {}));
+            }
+        }
         let least = (0..ranges.len()).min_by(|a, b| ranges[*a].0.total_cmp(&ranges[*b].0));
         let largest = (0..ranges.len()).max_by(|a, b| ranges[*a].1.total_cmp(&ranges[*b].1));
         Ok([0].into_iter().chain(least).chain(largest).collect())
     }
 
-    fn scan(&self, window: &dyn FrameWindow, frame: usize, grid: &Grid) -> Result<(f64, f64)> {
-        Ok(scan_frame(Scan::NOTHING, window, frame, grid, self.archive.sample, self.missing_value)?.range)
+    fn of_frame(&self, window: &dyn FrameWindow, frame: usize) -> Result<(f64, f64)> {
+        let Archive { grid, sample, .. } = self.archive;
+        Ok(scan_frame(Scan::NOTHING, window, frame, grid, *sample, self.missing_value)?.range)
     }
 }
 
-/// A block, moved inwards if a far face cuts it, so that all blocks have the same size.
-fn whole_block(plan: &Plan<'_>, block: usize) -> Region {
-    let (Region { start, .. }, BlockGrid { dims, edges: [edge, ..] }) = (plan.blocks.region(block), plan.blocks);
-    let start: [usize; 3] = std::array::from_fn(|axis| start[axis].min(dims[axis].saturating_sub(edge)));
-    Region { start, end: std::array::from_fn(|axis| (start[axis] + edge).min(dims[axis])) }
+/// The blocks that are coded, as if they were all of a file.
+struct BlocksCoded<'a> {
+    config: &'a ConvertConfig,
+    /// The archive of the coded samples.
+    archive: &'a Archive,
+    plan: &'a Plan<'a>,
+    blocks: &'a [usize],
 }
 
-/// Some blocks of a window as an archive of their own, side by side along the volume's longest axis.
-fn stacked(window: &dyn FrameWindow, archive: &Archive, blocks: &[Region]) -> Result<Box<dyn FrameSource>> {
-    let (dims, size) = (blocks[0].dims(), archive.sample.size());
-    let axis = (0..3).max_by_key(|axis| archive.grid.dims[*axis]).unwrap_or_default();
-    let mut grid = Grid::unit(dims);
-    grid.dims[axis] *= blocks.len();
-    let (whole, block) = (grid.whole(), Grid::unit(dims).whole());
-    let frame_bytes = whole.voxels() * size;
-    let mut samples = vec![0; frame_bytes * window.frames()];
-    let mut of_block = vec![0; block.voxels() * size];
-    for (frame, samples) in samples.chunks_exact_mut(frame_bytes).enumerate() {
-        for (number, region) in blocks.iter().enumerate() {
-            window.read_box(frame, region, &mut of_block)?;
-            for ((y, z), row) in block.rows().zip(of_block.chunks_exact(dims[0] * size)) {
-                let mut voxel = [0, y, z];
-                voxel[axis] += number * dims[axis];
-                samples[whole.index(voxel) * size..][..row.len()].copy_from_slice(row);
+impl BlocksCoded<'_> {
+    /// The bytes of a file of these blocks in these windows.
+    fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
+        let started = Instant::now();
+        let plan = self.plan.of_blocks(self.blocks.len());
+        let mut file = Recorder::new(self.config, &plan, Path::new("estimate"), io::sink(), None);
+        let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
+        let mut reader = WindowReader::new((self.config, self.archive), self.plan, &done, &idle);
+        for (index, frames) in windows.iter().enumerate() {
+            let window = source.window(frames.start, frames.len())?;
+            let range = self.config.range.unwrap_or_default();
+            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range, ..Scan::NOTHING })?);
+            for batch in self.batches(&reader, window.as_ref(), &job) {
+                let encoded = encode_batch(self.config.level, self.plan, (&encoders, &idle), batch?)?;
+                file.append(&self.renumbered(encoded))?;
             }
+            progress.advance(1);
         }
+        Ok(file.finish(started, Duration::ZERO, Duration::ZERO)?.output_bytes)
     }
-    let dims = grid.dims.into_iter().chain([window.frames()]).collect();
-    let options = OpenOptions { dims: Some(dims), sample: Some(archive.sample), memory: 0, ..OpenOptions::default() };
-    open_stream(Cursor::new(samples), &options)
+
+    /// The samples of the coded blocks of all channels, in batches.
+    fn batches<'b>(
+        &'b self,
+        reader: &'b WindowReader<'_>,
+        window: &'b dyn FrameWindow,
+        job: &'b Arc<WindowJob>,
+    ) -> impl Iterator<Item = Result<Batch>> + 'b {
+        let (all, some) = (self.plan.blocks.len(), self.blocks.len());
+        let numbers: Vec<usize> =
+            (0..some * self.plan.channels()).map(|i| i / some * all + self.blocks[i % some]).collect();
+        (0..numbers.len()).step_by(self.plan.batch).map(move |first| {
+            let end = numbers.len().min(first + self.plan.batch);
+            let blocks = numbers[first..end].iter().map(|block| reader.gather(window, job, *block));
+            Ok(Batch { window: job.clone(), blocks: blocks.collect::<Result<_>>()?, last: end == numbers.len() })
+        })
+    }
+
+    /// Numbers blocks as if there were no others.
+    fn renumbered(&self, mut batch: EncodedBatch) -> EncodedBatch {
+        for Encoded { block, .. } in &mut batch.blocks {
+            let position = self.blocks.binary_search(&(block.id.block as usize));
+            block.id.block = position.unwrap_or_else(|next| next) as u32;
+        }
+        batch
+    }
 }
 
 #[cfg(test)]
@@ -167,11 +206,11 @@ mod tests {
 
     #[test]
     fn places_spread_evenly() {
-        assert_eq!(spread(3, 12).collect::<Vec<_>>(), [0, 1, 2]);
-        assert_eq!(spread(100, 4).collect::<Vec<_>>(), [12, 37, 62, 87]);
-        assert_eq!(
-            [windows(70, 32), windows(100, 32), windows(640, 32)],
-            [vec![0, 32, 64], vec![0, 32, 64], vec![96, 320, 512]]
-        );
+        assert_eq!(some_blocks(&BlockGrid::cubes([30, 20, 10], 10)), [0, 1, 2, 3, 4, 5]);
+        let blocks = some_blocks(&BlockGrid::cubes([100, 100, 100], 10));
+        assert!((20..=BLOCKS).contains(&blocks.len()) && blocks.is_sorted() && blocks[0] < 250 && blocks[19] >= 750);
+        assert_eq!(some_windows(70, 32), [0..32, 32..64, 64..70]);
+        assert_eq!(some_windows(100, 32), [0..32, 32..64, 64..96]);
+        assert_eq!(some_windows(640, 32), [96..128, 320..352, 512..544]);
     }
 }

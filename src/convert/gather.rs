@@ -1,10 +1,11 @@
 //! The reader stage: reads windows of frames and sends batches of blocks.
 
-use super::choose::{SchemeSelector, most_samples};
+use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
 use super::sampled::{self, Pixel};
 use super::task::BRIGHTNESS;
 use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
 use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::grid::Region;
 use crate::base::sample::{self, join_ranges};
 use crate::codec::WindowCodec;
 use crate::codec::bound::{self, Bound, ErrorBound};
@@ -14,7 +15,7 @@ use crate::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use wavesplat_format::{BlockId, FileId, Window};
+use wavesplat_format::{BlockId, FileId, Packing, Window};
 
 /// Blocks of one window with their samples, frame by frame.
 #[derive(Debug)]
@@ -35,12 +36,7 @@ pub(super) fn read(
     idle: &Pool<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<Duration> {
-    let pixels = match config.bound {
-        Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
-        _ => Vec::new(),
-    };
-    let (id, range, scheme) = (done.id, None, None);
-    let mut reader = WindowReader { config, plan, idle, archive, pixels, range, id, scheme, frames: 0, before: 0 };
+    let mut reader = WindowReader::new((config, archive), plan, done, idle);
     done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
     let mut busy = Duration::ZERO;
@@ -71,7 +67,7 @@ pub(super) fn read(
     Ok(busy)
 }
 
-struct WindowReader<'a> {
+pub(super) struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// Buffers for the samples of blocks.
@@ -83,6 +79,8 @@ struct WindowReader<'a> {
     /// The range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
+    /// How the file's codes are packed.
+    packing: Packing,
     /// The scheme of the window before.
     scheme: Option<Scheme>,
     /// The number of frames in the file so far.
@@ -91,7 +89,24 @@ struct WindowReader<'a> {
     before: u64,
 }
 
-impl WindowReader<'_> {
+impl<'a> WindowReader<'a> {
+    pub(super) fn new(
+        (config, archive): (&'a ConvertConfig, &'a Archive),
+        plan: &'a Plan<'a>,
+        done: &WindowsDone,
+        idle: &'a Pool<Vec<u8>>,
+    ) -> Self {
+        let pixels = match config.bound {
+            Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
+            _ => Vec::new(),
+        };
+        // Without a pyramid, readers of version 1.0 suffice.
+        let plain = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0;
+        let packing = if done.id.is_none() && plain { Packing::Flat } else { done.packing };
+        let (id, range, scheme) = (done.id, None, None);
+        Self { config, plan, idle, archive, pixels, range, id, packing, scheme, frames: 0, before: 0 }
+    }
+
     /// The next frames of the source, at most `count`; none at its end.
     fn next(&self, source: &mut dyn FrameSource, count: usize) -> Result<Option<Box<dyn FrameWindow>>> {
         let first = self.first();
@@ -144,7 +159,8 @@ impl WindowReader<'_> {
 
     /// The file's id: that of the continued file, or a new one from the first window's digest.
     fn id(&mut self, digest: u64) -> Result<FileId> {
-        let new = || self.plan.start.file_id(digest).map_err(|e| Error::setting("settings", e.to_string()));
+        let new =
+            || self.plan.start.file_id(digest, self.packing).map_err(|e| Error::setting("settings", e.to_string()));
         let id = self.id.map_or_else(new, Ok)?;
         self.id = Some(id);
         Ok(id)
@@ -157,11 +173,16 @@ impl WindowReader<'_> {
         scan(window, &self.archive.grid, ty, missing_value)
     }
 
-    /// Scans a window, fixes its error bound and chooses its scheme.
+    /// Scans a window and prepares its coding.
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
-        let (config, ty, first) = (self.config, self.archive.sample, self.first());
         let scan = self.scan(window)?;
-        self.refuse_missing(window, first, &scan)?;
+        self.refuse_missing(window, self.first(), &scan)?;
+        self.job(window, index, &scan)
+    }
+
+    /// Fixes the error bound of a window and chooses its scheme, from what a scan saw.
+    pub(super) fn job(&mut self, window: &dyn FrameWindow, index: usize, scan: &Scan) -> Result<WindowJob> {
+        let (config, ty, first) = (self.config, self.archive.sample, self.first());
         let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { scan.range };
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
@@ -176,8 +197,16 @@ impl WindowReader<'_> {
         let magnitude = sample::magnitude(of_window);
         let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
         let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
-        let scheme =
-            SchemeSelector { config, archive: self.archive, channels: &channels, promise, magnitude, most, before };
+        let scheme = SchemeSelector {
+            config,
+            archive: self.archive,
+            channels: &channels,
+            promise,
+            magnitude,
+            most,
+            packing: self.packing,
+            before,
+        };
         let scheme = scheme.choose()?;
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edges[0]);
@@ -188,7 +217,7 @@ impl WindowReader<'_> {
         let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        Ok(WindowJob { index, first_frame, id, codec, range, digest: scan.digest, times })
+        Ok(WindowJob { index, first_frame, id, packing: self.packing, codec, range, digest: scan.digest, times })
     }
 
     /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.
@@ -251,10 +280,12 @@ impl WindowReader<'_> {
         Ok(true)
     }
 
-    /// Reads the samples of one block, frame by frame. Block numbers run through all channels.
-    fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
+    /// Reads the samples that coding one block takes, frame by frame. Block numbers run through all channels.
+    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
-        let region = self.plan.blocks.region(block);
+        let Region { start, .. } = self.plan.blocks.region(block);
+        let known = self.plan.sampled_box(&job.codec, block).known;
+        let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
         let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;

@@ -33,6 +33,7 @@ use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
 pub use crate::codec::bound::{Bound, range_bound};
 use crate::codec::encode::{Encoded, Encoder};
+use crate::codec::sampled_box::SampledBox;
 use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, CHANNELS, ColourTransform, FrameSource};
@@ -51,7 +52,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use task::Task;
 pub use to_file::convert_to_file;
-pub use wavesplat_format::{Basis, Stencil};
+pub use wavesplat_format::{Basis, Packing, Stencil};
 use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
@@ -249,27 +250,42 @@ struct Plan<'a> {
 }
 
 /// The default block edge in voxels. Without a pyramid at most 32, less for long windows, so that a block stays near 4
-/// MiB. With a pyramid up to 48, because larger blocks compress better, and such that the blocks along the longest axis
-/// have equal sizes.
+/// MiB. With a pyramid up to 48, because larger blocks compress better, even beside small ones at the far faces; and a
+/// multiple of 16 allows coarse lattices.
 fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usize {
     let (largest, samples) =
         if coding.space == SpatialPredictor::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
     let fits = |e: &usize| e * e * e * window <= samples;
     let edge = [largest, largest / 2, largest / 4, 4, 2].into_iter().find(fits).unwrap_or(1);
     let longest = dims.into_iter().max().unwrap_or(1);
-    if coding.space == SpatialPredictor::Alone { edge } else { longest.div_ceil(longest.div_ceil(edge)) }
+    if coding.space == SpatialPredictor::Alone { edge } else { longest.min(edge) }
 }
 
 impl<'a> Plan<'a> {
+    /// Whether blocks may have `edge` voxels a side.
+    fn takes(config: &ConvertConfig, edge: usize) -> bool {
+        let coefficients = most_coefficients(config) as u64;
+        edge > 0
+            && (edge as u64).saturating_pow(3).saturating_mul(coefficients)
+                <= wavesplat_format::limits::MAX_BLOCK_SAMPLES
+    }
+
+    /// A block, with the voxels around it that help to code it.
+    fn sampled_box(&self, codec: &WindowCodec, block: usize) -> SampledBox {
+        let region = self.blocks.region(block);
+        let (start, size) = (region.start, region.dims());
+        let outer = codec.outer_size(size);
+        SampledBox { size, known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]) }
+    }
+
     fn new(config: &ConvertConfig, archive: &Archive, colour_transform: Option<&'a ColourTransform>) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         if !(0.0..=1.0).contains(&config.tolerance) {
             return Err(Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
         }
         let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
-        let coefficients = most_coefficients(config) as u64;
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
-        if edge == 0 || (edge as u64).saturating_pow(3).saturating_mul(coefficients) > most {
+        if !Self::takes(config, edge) {
             return Err(Error::setting(
                 "block",
                 format!("holds 1 to {most} samples over a window, not {edge} voxels a side"),
@@ -284,6 +300,14 @@ impl<'a> Plan<'a> {
         }
         let batch = batch_len(config, blocks, archive, colour_transform)?;
         Ok(Self { start: start(config, archive, colour_transform, edge), colour_transform, blocks, batch })
+    }
+
+    /// The plan of a file that has `count` blocks, side by side.
+    fn of_blocks(&self, count: usize) -> Self {
+        let edge = self.blocks.edges[0];
+        let blocks = BlockGrid::cubes([edge * count, edge, edge], edge);
+        let start = Metadata { dims: blocks.dims.map(|n| n as u64), ..self.start.clone() };
+        Self { start, blocks, ..*self }
     }
 
     fn channels(&self) -> usize {
@@ -325,6 +349,7 @@ fn start(
 #[derive(Debug, Default)]
 struct WindowsDone {
     id: Option<FileId>,
+    packing: Packing,
     windows: Vec<Window>,
     /// [`PartialFile::first_window`]
     first_window: usize,
@@ -343,6 +368,7 @@ impl WindowsDone {
         }
         Ok(Self {
             id: Some(complete.id()),
+            packing: complete.packing(),
             windows: held.windows.clone(),
             first_window: *first_window,
             name: name.into(),
@@ -406,27 +432,39 @@ fn encode(
     batches: &Receiver<Batch>,
     out: &Sender<EncodedBatch>,
 ) -> Result<Duration> {
-    let idle = Pool::default();
+    let encoders = Encoders::default();
     let mut busy = Duration::ZERO;
-    for Batch { window, blocks, last } in batches {
+    for batch in batches {
         let started = Instant::now();
-        let encode = |(id, samples): (BlockId, Vec<u8>)| {
-            let mut encoder = idle.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-            let size = plan.blocks.region(id.block as usize).dims();
-            let samples = to_channel(plan.colour_transform, id, samples, read);
-            let encoded = encoder.block(&window.codec, id, size, &samples).map_err(bug);
-            idle.put(encoder);
-            read.put(samples);
-            encoded
-        };
-        let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
+        let encoded = encode_batch(level, plan, (&encoders, read), batch)?;
         busy += started.elapsed();
-        let encoded = EncodedBatch { window, blocks: blocks?, last };
         if out.send(encoded).is_err() {
             break; // the writer failed and reports why
         }
     }
     Ok(busy)
+}
+
+type Encoders = Pool<Encoder>;
+
+/// Encodes a batch on all workers.
+fn encode_batch(
+    level: i32,
+    plan: &Plan<'_>,
+    (encoders, read): (&Encoders, &Pool<Vec<u8>>),
+    Batch { window, blocks, last }: Batch,
+) -> Result<EncodedBatch> {
+    let encode = |(id, samples): (BlockId, Vec<u8>)| {
+        let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+        let of = plan.sampled_box(&window.codec, id.block as usize);
+        let samples = to_channel(plan.colour_transform, id, samples, read);
+        let encoded = encoder.block(&window.codec, id, of, &samples).map_err(bug);
+        encoders.put(encoder);
+        read.put(samples);
+        encoded
+    };
+    let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
+    Ok(EncodedBatch { window: window.clone(), blocks: blocks?, last })
 }
 
 /// Converts the samples of a block to those of its channel.
@@ -485,6 +523,8 @@ struct WindowJob {
     index: u32,
     first_frame: u64,
     id: FileId,
+    /// How the file's codes are packed.
+    packing: Packing,
     codec: WindowCodec,
     /// The range that the tolerance refers to: the given one, or that of all samples up to the window's end.
     range: (f64, f64),

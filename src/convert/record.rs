@@ -50,10 +50,13 @@ impl<'a, W: Write> Recorder<'a, W> {
         Ok(())
     }
 
-    fn append(&mut self, batch: &EncodedBatch) -> Result<()> {
+    /// Appends a batch; after the last of a window, the window's end.
+    pub(super) fn append(&mut self, batch: &EncodedBatch) -> Result<()> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         if let Some(out) = self.out.take() {
-            self.writer = Some(Writer::new(out, batch.window.id, &self.plan.start).map_err(failed)?);
+            self.writer = Some(
+                Writer::with_packing(out, batch.window.id, &self.plan.start, batch.window.packing).map_err(failed)?,
+            );
         }
         let writer = self.writer.as_mut().expect("created with the first batch");
         if self.window.is_none() {

@@ -5,9 +5,10 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::{SampleType, join_ranges};
 use crate::codec::WindowCodec;
-use crate::codec::coarse::Lattice;
+use crate::codec::coarse;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
+use crate::file::detail;
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,6 +28,8 @@ pub struct CoefficientFile {
     pub grid: Grid,
     /// How it is cut into blocks.
     pub blocks: BlockGrid,
+    /// The level of detail: the lattice has every 2^lod-th voxel along each axis.
+    lod: u32,
     /// What made samples into channels, if there are several.
     colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
@@ -83,11 +86,36 @@ impl CoefficientFile {
         let failed = |source| Error::CoefficientFile { path: path.clone(), source };
         let reader = Reader::open(Counted::new(Box::new(storage))).map_err(failed)?;
         let m = reader.metadata();
-        let dims = m.dims.map(|n| n as usize);
-        let grid = Grid { dims, spacing: m.spacing, origin: m.origin };
-        let blocks = BlockGrid::cubes(dims, m.block_edge as usize);
+        let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
-        Ok(Self { path, grid, blocks, colour_transform, reader, state: None, skipped: None })
+        Ok(Self { path, grid, blocks, lod: 0, colour_transform, reader, state: None, skipped: None })
+    }
+
+    /// The file as a coarser lattice: every 2^lod-th voxel along each axis, with all frames and the same first voxel.
+    /// Decoding reads the coarse levels alone, so it takes about 8^lod times less work and fewer bytes. Samples are those
+    /// of the file; what lies between them is left out.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if blocks do not begin on the lattice, or a window's pyramid does not refine all three axes.
+    pub fn with_detail(mut self, lod: u32) -> Result<Self> {
+        let (grid, blocks) = detail::coarse(self.metadata(), lod)?;
+        (self.grid, self.blocks, self.lod) = (grid, blocks, lod);
+        Ok(self)
+    }
+
+    /// The coarsest level of detail that [`Self::with_detail`] takes.
+    pub fn coarsest_detail(&self) -> u32 {
+        (0..32).take_while(|lod| detail::coarse(self.metadata(), *lod).is_ok()).last().unwrap_or(0)
+    }
+
+    /// The lattice of all voxels, whatever the level of detail.
+    pub fn whole_grid(&self) -> Grid {
+        detail::whole(self.metadata()).0
+    }
+
+    /// The level of detail of [`Self::with_detail`]; 0 for all voxels.
+    pub fn lod(&self) -> u32 {
+        self.lod
     }
 
     /// Its path, or the name of its storage.
@@ -182,6 +210,11 @@ impl CoefficientFile {
     /// What decoding a window's blocks takes.
     #[doc(hidden)]
     pub fn codec(&self, window: u32) -> Result<WindowCodec> {
+        Ok(WindowCodec { lod: self.lod, ..self.codec_of_all(window)? })
+    }
+
+    /// As [`Self::codec`], for all voxels.
+    fn codec_of_all(&self, window: u32) -> Result<WindowCodec> {
         WindowCodec::of_file(self.metadata(), &self.metadata().windows[window as usize]).map_err(|e| self.failed(e))
     }
 
@@ -287,7 +320,7 @@ impl CoefficientFile {
         entry: &BlockEntry,
         wanted: &[bool],
     ) -> Result<Block> {
-        let size = self.blocks.region(entry.id.block as usize).dims();
+        let size = self.all_voxels(entry)?;
         if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::of_missing(codec, size));
@@ -295,16 +328,28 @@ impl CoefficientFile {
         Block::read(reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
-    /// Every n-th sample along each axis of a block, in some frames of its window (n, frames), as [`Lattice::new`] says: frame after frame, x fastest. NaN
-    /// stands for missing samples, and for those of lost and damaged blocks that are skipped.
+    /// All voxels of a block, decoded or not.
+    fn all_voxels(&self, entry: &BlockEntry) -> Result<[usize; 3]> {
+        self.reader.geometry(entry.id).map(|of| of.size).map_err(|e| self.failed(e))
+    }
+
+    /// The codec for [`Self::coarse`] of every `stride`-th voxel.
+    pub(crate) fn coarse_codec(&self, window: u32, stride: usize) -> Result<WindowCodec> {
+        let refined = detail::refines_space(&self.metadata().windows[window as usize]);
+        let lod = if refined { coarse::level_of(stride << self.lod) } else { 0 };
+        Ok(WindowCodec { lod, ..self.codec_of_all(window)? })
+    }
+
+    /// Every n-th sample along each axis of a block, in some frames of its window (n, frames): frame after frame, x
+    /// fastest. NaN stands for missing samples, and for those of lost and damaged blocks that are skipped.
     pub(crate) fn coarse(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        thinned: (usize, &[usize]),
+        (stride, frames): (usize, &[usize]),
     ) -> Result<Vec<f32>> {
-        let size = self.blocks.region(entry.id.block as usize).dims();
-        Lattice::new(codec, size, thinned).decode(&self.reader, codec, entry).map_err(|e| self.failed(e))
+        let (size, stride) = (self.all_voxels(entry)?, stride << self.lod);
+        coarse::thinned(&self.reader, codec, entry, size, (stride, frames)).map_err(|e| self.failed(e))
     }
 
     /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.

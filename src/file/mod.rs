@@ -4,6 +4,7 @@
 //! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
 
 mod counted;
+mod detail;
 mod batch;
 mod coefficient_file;
 pub mod report;

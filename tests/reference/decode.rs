@@ -11,6 +11,10 @@ pub(crate) struct Pyramid {
     pub(crate) growth: f64,
     pub(crate) most: f64,
     pub(crate) single: bool,
+    /// Whether parts are nested.
+    pub(crate) nested: bool,
+    /// Whether there are ghost nodes.
+    pub(crate) ghosts: bool,
 }
 
 /// A pass: its level, and the axis along which it adds nodes (none for the first pass).
@@ -21,8 +25,20 @@ pub(crate) struct Pass {
 }
 
 impl Pyramid {
-    /// The passes over nodes of these extents, coarse to fine.
+    /// The extents with ghost nodes.
+    pub(crate) fn outer(&self, extents: [usize; 4]) -> [usize; 4] {
+        let ghost = |a: usize| self.ghosts && a < 3 && self.order.contains(&a) && extents[a].is_multiple_of(2);
+        std::array::from_fn(|a| extents[a] + usize::from(ghost(a)))
+    }
+
+    /// All nodes that a pass adds, in the order of their codes.
+    pub(crate) fn added(&self, pass: Pass, extents: [usize; 4]) -> impl Iterator<Item = [usize; 4]> {
+        nodes(self.outer(extents)).filter(move |node| self.adds(pass, extents, *node))
+    }
+
+    /// The passes over a block of these extents, coarse to fine.
     pub(crate) fn passes(&self, extents: [usize; 4]) -> Vec<Pass> {
+        let extents = self.outer(extents);
         let mut top = 0;
         while self.order.iter().any(|&axis| extents[axis] > 1 << top) {
             top += 1;
@@ -38,10 +54,13 @@ impl Pyramid {
         passes
     }
 
-    /// The level part that holds a pass.
-    pub(crate) fn part(&self, pass: Pass) -> usize {
+    /// The level part that holds the code of a node that a pass adds.
+    pub(crate) fn part(&self, pass: Pass, node: [usize; 4]) -> usize {
+        let multiples = |of: usize| (0..3).all(|a| !self.order.contains(&a) || node[a].is_multiple_of(of));
         match (pass.axis, pass.level) {
             (None, _) => 0,
+            (Some(3), _) if self.nested && multiples(4) => 0,
+            (Some(3), _) if self.nested && multiples(2) => 1,
             (Some(3), 0) if self.order.last() == Some(&3) => 3,
             (_, 0) => 2,
             (_, 1) => 1,
@@ -49,11 +68,20 @@ impl Pyramid {
         }
     }
 
-    /// Whether a pass adds the node.
-    pub(crate) fn adds(&self, pass: Pass, node: [usize; 4]) -> bool {
-        let Some(axis) = pass.axis else { return self.order.iter().all(|&a| node[a] == 0) };
+    /// Whether a pass adds the node. Ghost nodes are in lattices of more than distance 1.
+    fn adds(&self, pass: Pass, extents: [usize; 4], node: [usize; 4]) -> bool {
         let place = |a: usize| self.order.iter().position(|&b| b == a);
         let stride = 1 << pass.level;
+        let distance = |a: usize| match (place(a), pass.axis) {
+            (None, _) => 1,
+            (Some(_), None) => stride,
+            (earlier, Some(axis)) if earlier <= place(axis) => stride,
+            _ => 2 * stride,
+        };
+        if (0..4).any(|a| node[a] >= extents[a] && distance(a) == 1) {
+            return false;
+        }
+        let Some(axis) = pass.axis else { return self.order.iter().all(|&a| node[a] == 0) };
         let along = |a: usize| match place(a) {
             None => true,
             Some(_) if a == axis => node[a] % (2 * stride) == stride,
@@ -100,20 +128,21 @@ impl Pyramid {
         sum.unwrap()
     }
 
-    /// Computes all nodes from all codes of a block, pass after pass.
+    /// Computes all nodes of a block from all of its codes, pass after pass.
     pub(crate) fn decode(&self, extents: [usize; 4], step: f64, codes: &[i32]) -> Vec<f64> {
-        let mut values = vec![f64::NAN; nodes(extents).count()];
+        let outer = self.outer(extents);
+        let mut values = vec![f64::NAN; nodes(outer).count()];
         let mut codes = codes.iter();
         for pass in self.passes(extents) {
             let step = self.round(self.step(step, pass.level));
-            for node in nodes(extents).filter(|node| self.adds(pass, *node)) {
+            for node in self.added(pass, extents) {
                 let q = self.round(f64::from(*codes.next().unwrap()));
-                let p = self.prediction(pass, extents, node, &values);
-                values[number(extents, node)] = self.round(p + self.round(q * step));
+                let p = self.prediction(pass, outer, node, &values);
+                values[number(outer, node)] = self.round(p + self.round(q * step));
             }
         }
         assert!(codes.next().is_none(), "codes are left");
-        values
+        nodes(extents).map(|node| values[number(outer, node)]).collect()
     }
 }
 
@@ -264,19 +293,29 @@ mod tests {
 
     #[test]
     fn five_nodes_by_hand() {
-        let pyramid = Pyramid { order: vec![0], cubic: true, growth: 2.0, most: 4.0, single: false };
+        let pyramid = Pyramid {
+            order: vec![0],
+            cubic: true,
+            growth: 2.0,
+            most: 4.0,
+            single: false,
+            nested: false,
+            ghosts: false,
+        };
         let extents = [5, 1, 1, 1];
         assert_eq!(pyramid.decode(extents, 1.0, &[8, 4, 2, 1, -1]), [2.0, 4.0, 3.5, 2.5, 3.0]);
-        let parts: Vec<usize> = pyramid.passes(extents).into_iter().map(|pass| pyramid.part(pass)).collect();
+        let parts: Vec<usize> = pyramid.passes(extents).into_iter().map(|pass| pyramid.part(pass, [0; 4])).collect();
         assert_eq!(parts, [0, 0, 1, 2]);
     }
 
     #[test]
     fn every_node_is_added_once() {
         for order in [vec![0, 1, 2, 3], vec![3, 1], vec![2], vec![]] {
-            let pyramid = Pyramid { order, cubic: false, growth: 1.0, most: 1.0, single: false };
+            let pyramid =
+                Pyramid { order, cubic: false, growth: 1.0, most: 1.0, single: false, nested: false, ghosts: false };
             for extents in [[1, 1, 1, 1], [5, 3, 2, 9], [4, 8, 1, 2]] {
-                let added = |node| pyramid.passes(extents).iter().filter(|pass| pyramid.adds(**pass, node)).count();
+                let added =
+                    |node| pyramid.passes(extents).iter().filter(|pass| pyramid.adds(**pass, extents, node)).count();
                 assert!(nodes(extents).all(|node| added(node) == 1), "{pyramid:?} {extents:?}");
             }
         }

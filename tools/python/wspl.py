@@ -1,4 +1,4 @@
-"""Reader of coefficient files (.wspl), version 1.0, written from format/FORMAT.md alone.
+"""Reader of coefficient files (.wspl), versions 1.0 and 1.1, written from format/FORMAT.md alone.
 
     python wspl.py info FILE              metadata as JSON
     python wspl.py check FILE             everything in the file is as the format says
@@ -186,7 +186,7 @@ class Pyramid:
     stencil: str
     growth: float
     most: float
-    single: int
+    flags: int
 
     @staticmethod
     def read(r: Record) -> "Pyramid":
@@ -194,8 +194,21 @@ class Pyramid:
         p = Pyramid(order, r.variant(STENCILS), *r.get("ddB"))
         need(len(set(order)) == len(order), r.place, "an axis is refined twice")
         need(1 <= p.growth <= 1e6 and 1 <= p.most <= 1e6, r.place, "growth or most is not in 1 .. 10^6")
-        need(p.single <= 1, r.place, "single is neither 0 nor 1")
+        need(p.flags <= 7 and p.flags & 6 != 4, r.place, "unknown flags")
         return p
+
+    @property
+    def single(self) -> bool:
+        return bool(self.flags & 1)
+
+    @property
+    def nested(self) -> bool:
+        return bool(self.flags & 2)
+
+    def ghosts(self, extents: tuple[int, ...]) -> tuple[int, ...]:
+        """1 along axes with ghost nodes."""
+        axes = [a for a in range(3) if self.flags & 4 and AXES[a] in self.order and extents[a] % 2 == 0]
+        return tuple(int(a in axes) for a in range(4))
 
 
 @dataclass(frozen=True, eq=False)  # eq=False: hashed by identity, for the caches below
@@ -435,9 +448,9 @@ def check_part(p, w: Window, size: tuple[int, ...], s: int, place: str) -> None:
     samples = voxels * w.frames
     most = samples
     if p.kind == LEVEL and w.pyramid:
-        boxes = [q.counts for q in passes((*size, w.coefficients), w.pyramid.order) if q.part == p.level]
-        most = sum(map(math.prod, boxes))
-        fits = p.raw <= lattice_most(sum(math.prod(cells_of(b)) for b in boxes), most)
+        mine = [b.counts for b in boxes((*size, w.coefficients), w.pyramid) if b.part == p.level]
+        most = sum(map(math.prod, mine))
+        fits = p.raw <= lattice_most(sum(math.prod(cells_of(b)) for b in mine), most)
     elif p.kind == LEVEL:
         most = w.levels[p.level] * voxels
         fits = p.raw in [1 + -(-most // 8) + width * p.count for width in (1, 2, 3, 4)]
@@ -559,14 +572,14 @@ def lattice_most(cells: int, codes: int) -> int:
     return 45 + s + 5 * (9 + s // 4096) + -(-29 * codes // 8)
 
 
-def read_lattice(data: bytes, boxes: list, count: int, place: str) -> list[np.ndarray]:
-    """The codes of each box, as arrays [t, z, y, x]."""
+def read_lattice(data: bytes, boxes: list, nested: bool, count: int, place: str) -> list[np.ndarray]:
+    """The codes of boxes with these extents, as arrays [t, z, y, x]."""
     r = Record(data, place)
     lengths = [take_number(r) for _ in range(9)]
     cells = [math.prod(cells_of(b)) for b in boxes]
     need(sum(lengths[:5]) == sum(cells), place, "significance streams do not fit the cells")
     need(sum(lengths[5:]) == count, place, "value streams do not fit the count")
-    symbols = read_segments(r, sum(lengths))
+    symbols = read_segments(r, nested, sum(lengths))
     ends = np.cumsum([0] + lengths)
     streams = [symbols[a:b] for a, b in zip(ends, ends[1:])]
     significance, activity = read_significance(streams[:5], boxes, place)
@@ -639,18 +652,20 @@ def uncell(codes: np.ndarray, box, place: str) -> np.ndarray:
     return inside
 
 
-def read_segments(r: Record, total: int) -> bytes:
+def read_segments(r: Record, nested: bool, total: int) -> bytes:
     """One string of `total` symbols."""
     out = bytearray()
     while len(out) < total:
-        length, kind = divmod(take_number(r), 4)
+        length, kind = divmod(take_number(r), 8 if nested else 4)
+        need(kind <= 5, r.place, "there is no such kind of segment")
         need(1 <= length <= total - len(out), r.place, "a segment is empty or ends after the string")
         if kind == 0:
             out += r.take(length)
         elif kind == 1:
             out += r.take(1) * length
         else:
-            out += read_coded(r, length, 12 if kind == 2 else 14)
+            usual = 4 if length >= 1024 else 1
+            out += read_coded(r, length, 14 if kind % 2 else 12, 32 if kind >= 4 else usual)
     return bytes(out)
 
 
@@ -676,8 +691,8 @@ def read_frequencies(r: Record, b: int) -> np.ndarray:
     return frequencies
 
 
-def read_coded(r: Record, length: int, b: int) -> bytearray:
-    """A segment of kind 2 or 3, after its number."""
+def read_coded(r: Record, length: int, b: int, lanes: int) -> bytearray:
+    """A segment of kind 2 to 5, after its number."""
     frequencies = read_frequencies(r, b)
     symbol = np.repeat(np.arange(256), frequencies)  # of every slot
     begin = np.cumsum(frequencies) - frequencies
@@ -685,7 +700,6 @@ def read_coded(r: Record, length: int, b: int) -> bytearray:
     frequency = frequencies[symbol].tolist()
     symbol = symbol.tolist()
     words = take_number(r)
-    lanes = 4 if length >= 1024 else 1
     states = list(struct.unpack(f"<{lanes}I", r.take(4 * lanes)))
     need(min(states) >= 65536, r.place, "a state is below 65536")
     next_word = iter(np.frombuffer(r.take(2 * words), "<u2").tolist())
@@ -720,27 +734,60 @@ class Pass:
 
 
 @lru_cache(256)
-def passes(extents: tuple[int, ...], order: tuple[str, ...]) -> list[Pass]:
-    """The passes of a block in their order, each with the part that its codes are in."""
-    axes = [AXES.index(a) for a in order]
-    top = max([(extents[a] - 1).bit_length() for a in axes], default=0)
+def passes(extents: tuple[int, ...], p: Pyramid) -> list[Pass]:
+    """The passes of a block in their order, each with the part that its codes are in without nested parts."""
+    axes = [AXES.index(a) for a in p.order]
+    outer = tuple(n + g for n, g in zip(extents, p.ghosts(extents)))
+    top = max([(outer[a] - 1).bit_length() for a in axes], default=0)
 
     def one(part: int, level: int, axis: int | None, along: dict) -> Pass:
         first, stride = zip(*[along.get(a, (0, 1)) for a in range(4)])
-        counts = tuple(-(-(n - f) // d) for n, f, d in zip(extents, first, stride))
+        apart = [d // 2 if a == axis else d for a, d in enumerate(stride)]  # the distance of all nodes so far
+        ends = [o if d > 1 else n for n, o, d in zip(extents, outer, apart)]
+        counts = tuple(-(-(n - f) // d) for n, f, d in zip(ends, first, stride))
         return Pass(part, level, axis, first, stride, counts)
 
     out = [one(0, top, None, {a: (0, 1 << top) for a in axes})]
     for level in range(top - 1, -1, -1):
         near, far = 1 << level, 2 << level
         for at, axis in enumerate(axes):
-            if extents[axis] <= near:
+            if outer[axis] <= near:
                 continue
             along = {a: (0, near if i < at else far) for i, a in enumerate(axes)}
             along[axis] = (near, far)
             last_t = axis == 3 and at == len(axes) - 1
             part = 0 if level >= 2 else 1 if level == 1 else 3 if last_t else 2
             out.append(one(part, level, axis, along))
+    return out
+
+
+@dataclass(frozen=True)
+class Box:
+    part: int
+    number: int  # of its pass
+    steps: tuple[int, int, int]  # s along x, y, z
+    counts: tuple[int, ...]  # codes along x, y, z, t
+    others: tuple[int, ...]  # nodes at even numbers along all of these axes belong to another box; empty: no such nodes
+
+
+def boxes(extents: tuple[int, ...], p: Pyramid) -> list[Box]:
+    """The boxes of a block's codes, in the order of their passes."""
+    out = []
+    for number, q in enumerate(passes(extents, p)):
+        if not (p.nested and q.axis == 3):
+            out.append(Box(q.part, number, (1, 1, 1), q.counts, ()))
+            continue
+
+        def steps(n: int) -> tuple[int, ...]:
+            return tuple(max(1, (1 << n) // q.stride[a]) if AXES[a] in p.order else 1 for a in range(3))
+
+        for n in (2, 1, 0):
+            s, coarser = steps(n), steps(n + 1)
+            others = tuple(a for a in range(3) if s[a] != coarser[a]) if n < 2 else ()
+            if n == 2 or others:
+                part = 0 if n == 2 else 1 if n == 1 else q.part
+                counts = (*(-(-c // e) for c, e in zip(q.counts, s)), q.counts[3])
+                out.append(Box(part, number, s, counts, others))
     return out
 
 
@@ -774,10 +821,10 @@ def level_step(step: float, level: int, p: Pyramid) -> float:
 def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid) -> np.ndarray:
     """The coefficients [k, voxel] from the codes of the passes; a pass without codes has zeros."""
     precision = np.float32 if p.single else np.float64
-    nodes = np.zeros(extents[::-1], precision)
-    for number, q in enumerate(passes(extents, p.order)):
+    nodes = np.zeros([n + g for n, g in zip(extents, p.ghosts(extents))][::-1], precision)
+    for number, q in enumerate(passes(extents, p)):
         s = precision(level_step(step, q.level, p))
-        part = [slice(f, None, d) for f, d in zip(q.first, q.stride)][::-1]
+        part = [slice(f, f + n * d, d) for f, n, d in zip(q.first, q.counts, q.stride)][::-1]
         base = precision(0)
         if q.axis is not None:
             lines = list(part)
@@ -786,7 +833,8 @@ def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid) -> n
             base = np.moveaxis(predict(e, q.counts[q.axis], p.stencil), 0, 3 - q.axis)
         amount = codes[number].astype(precision) * s if number in codes else precision(0)
         nodes[tuple(part)] = base + amount
-    return nodes.reshape(extents[3], -1).astype(np.float64)
+    own = nodes[tuple(slice(0, n) for n in extents[::-1])]
+    return own.reshape(extents[3], -1).astype(np.float64)
 
 
 # ---------------------------------------------------------------- along time (section 8)
@@ -931,6 +979,8 @@ class Archive:
         f = self.footer
         place = (f.metadata_offset, f.metadata_stored, f.metadata_raw, f.metadata_checksum)
         self.metadata = Metadata.read(self._section(b"META", *place, place="metadata", cap=MAX_METADATA))
+        for w in self.metadata.windows:
+            need(self.nested or not (w.pyramid and w.pyramid.nested), "metadata", "nested parts are not announced")
         place = (f.root_offset, f.root_stored, f.root_raw, f.root_checksum)
         root = self._section(b"ROOT", *place, place="root", cap=MAX_ROOT_RAW)
         root = decompress(root, f.root_raw, "root", f.root_offset)
@@ -947,11 +997,11 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required:
+        if head.required > 1:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
-        self.id = head.id
+        self.id, self.nested = head.id, bool(head.required)
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1103,9 +1153,15 @@ class Archive:
         if w.pyramid:
             extents, codes = (*size, w.coefficients), {}
             for level, (p, data) in levels.items():
-                mine = [(i, q.counts) for i, q in enumerate(passes(extents, w.pyramid.order)) if q.part == level]
-                boxes = read_lattice(data, [c for _, c in mine], p.count, f"{b.place}, level {level}")
-                codes.update(zip([i for i, _ in mine], boxes))
+                mine = [box for box in boxes(extents, w.pyramid) if box.part == level]
+                place = f"{b.place}, level {level}"
+                read = read_lattice(data, [box.counts for box in mine], w.pyramid.nested, p.count, place)
+                for box, found in zip(mine, read):
+                    even = tuple(slice(None, None, 2 if a in box.others else 1) for a in (2, 1, 0))
+                    need(not box.others or not found[(slice(None), *even)].any(), place, "a code of another box")
+                    whole = passes(extents, w.pyramid)[box.number].counts[::-1]
+                    of_pass = codes.setdefault(box.number, np.zeros(whole, np.int64))
+                    of_pass[(slice(None), *(slice(None, None, e) for e in box.steps[::-1]))] += found
             return rebuild(codes, b.step, extents, w.pyramid)
         voxels = math.prod(size)
         rows = []

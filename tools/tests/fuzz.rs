@@ -174,12 +174,18 @@ fn payloads(corpus: &mut Corpus) {
     pack_codes(&codes, &mut raw);
     corpus.push(("codes", "packed".into(), [&[48, 0][..], &raw].concat()));
     raw.clear();
-    pack_cells(&codes, &[[4, 3, 2, 2]], &mut raw);
-    corpus.push(("cells", "packed".into(), [&[4, 3, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0][..], &raw].concat()));
-    raw.clear();
-    pack_cells(&[1; 12 * 12 * 12 + 5], &[[12, 12, 12, 1], [5, 1, 1, 1]], &mut raw);
-    corpus.push(("cells", "long".into(), [&[12, 12, 12, 1, 5, 1, 1, 1, 0, 0, 0, 0][..], &raw].concat()));
-    raw.clear();
+    let few = [CodeBox::contiguous([4, 3, 2, 2])];
+    let many = [CodeBox::contiguous([12, 12, 12, 1]), CodeBox::contiguous([5, 1, 1, 1])];
+    for (name, packing, byte) in [("flat", Packing::Flat, 0), ("nested", Packing::Nested, 1)] {
+        packing.pack(&DenseCodes::one_after_another(&codes, &few), &mut raw);
+        let head = [4, 3, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, byte];
+        corpus.push(("cells", format!("packed-{name}"), [&head[..], &raw].concat()));
+        raw.clear();
+        packing.pack(&DenseCodes::one_after_another(&[1; 12 * 12 * 12 + 5], &many), &mut raw);
+        let head = [12, 12, 12, 1, 5, 1, 1, 1, 0, 0, 0, 0, byte];
+        corpus.push(("cells", format!("long-{name}"), [&head[..], &raw].concat()));
+        raw.clear();
+    }
     pack_outliers(&Outliers { positions: vec![0, 3, 4], samples: vec![1, 2, 3, 4, 5, 6] }, 2, &mut raw);
     corpus.push(("payloads", "outliers".into(), [&[1, 9, 0][..], &raw].concat()));
     raw.clear();

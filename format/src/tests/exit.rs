@@ -9,7 +9,7 @@ use crate::*;
 type Times = (u64, Vec<f64>, Option<String>);
 type Grid = ([u64; 3], [f64; 3], [f64; 3], u32, u32, u16);
 type Tolerance<B> = (B, f64, Option<f64>);
-type Refined = Option<(Vec<u32>, u32, f64, f64, bool)>;
+type Refined = Option<(Vec<u32>, u32, f64, f64, u8)>;
 type Coded = (u32, u32, Vec<u32>, Vec<i16>, Refined, f64, (f64, f64), u64);
 type Reached = (f64, f64, f64, f64, f64, f64, u64, u64, u64);
 type Record<B> = (Grid, Times, Tolerance<B>, Vec<(u64, u32, Coded, Reached)>, Vec<(String, String)>, String);
@@ -28,15 +28,24 @@ fn record<B>(m: &Metadata, bound: B) -> Record<B> {
     (grid, times, tolerance, m.windows.iter().map(window).collect(), m.settings.clone(), m.program.clone())
 }
 
-fn refined(p: &Pyramid) -> (Vec<u32>, u32, f64, f64, bool) {
-    (p.order.iter().map(|axis| *axis as u32).collect(), p.stencil as u32, p.growth, p.most, p.single)
+fn refined(p: &Pyramid) -> (Vec<u32>, u32, f64, f64, u8) {
+    let flags = u8::from(p.single) + 2 * u8::from(p.packing == Packing::Nested) + 4 * u8::from(p.ghosts);
+    (p.order.iter().map(|axis| *axis as u32).collect(), p.stencil as u32, p.growth, p.most, flags)
 }
 
 /// Metadata that uses every field: the first window has no pyramid, the second has a pyramid and a learned basis.
 fn every_field() -> Metadata {
     let mut metadata = Metadata { times: (0..7).map(f64::from).collect(), ..metadata() };
     let order = vec![Axis::Z, Axis::X];
-    let pyramid = Pyramid { order, stencil: Stencil::Cubic, growth: 1.5, most: 3.0, single: true };
+    let pyramid = Pyramid {
+        order,
+        stencil: Stencil::Cubic,
+        growth: 1.5,
+        most: 3.0,
+        single: true,
+        packing: Packing::Flat,
+        ghosts: false,
+    };
     let coded = Window { basis: Basis::Learned, coefficients: 3, ..metadata.windows[1].clone() };
     let functions = vec![1, -2, 3, -32768, 5, 32767];
     metadata.windows[1] = Window { levels: Vec::new(), functions, pyramid: Some(pyramid), ..coded };

@@ -87,6 +87,10 @@ pub(crate) struct Cli {
     /// tolerance, at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     pub(crate) splat_error: Option<f64>,
+    /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes as much as
+    /// keeps voxels within a pixel. The picture is that of the coarser lattice; no error bound relates it to the whole one
+    #[arg(long, value_name = "N", default_value = "0", value_parser = parse_detail, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Kernel")]
+    pub(crate) lod: Detail,
     /// A quick look: twice as fast, with a splat error that is estimated and not bounded
     #[arg(long, conflicts_with_all = ["splat_error", "error_image"], help_heading = "Kernel")]
     pub(crate) fast: bool,
@@ -136,6 +140,20 @@ pub(crate) struct Cli {
     pub(crate) input: InputArgs,
     #[command(flatten)]
     pub(crate) common: CommonArgs,
+}
+
+/// The level of detail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Detail {
+    /// The coarsest with voxels no larger than a pixel.
+    Auto,
+    /// Every 2^N-th voxel.
+    Level(u32),
+}
+
+fn parse_detail(text: &str) -> std::result::Result<Detail, String> {
+    let level = || text.parse().ok().filter(|level| *level < 32).map(Detail::Level);
+    if text == "auto" { Ok(Detail::Auto) } else { level().ok_or_else(|| "auto, or 0, 1, 2, ...".into()) }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -2,33 +2,47 @@
 
 use crate::args::{Cli, ErrorName, MethodName, QuantityName};
 use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::range_bound;
+use wavesplat::file::CoefficientFile;
 use wavesplat::render::{Quantity, RenderConfig, Scene, default_splat_error};
+use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
 use wavesplat_format::Metadata;
+
+/// The views with the scale and the centre that they have for a grid.
+fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
+    let fixed = |view: &View| {
+        let camera = Camera::new(view, grid)?;
+        Ok(View { scale: Some(camera.scale), center: Some(camera.beside(0.0)), ..*view })
+    };
+    views.iter().map(fixed).collect()
+}
 
 impl Cli {
     pub(crate) fn config(
         &self,
         scene: &dyn Scene,
-        file: Option<&Metadata>,
+        file: Option<&CoefficientFile>,
         colours: Option<&TransferFunction>,
     ) -> Result<RenderConfig> {
         let grid = scene.grid();
+        let (whole, lod) = file.map_or((*grid, 0), |file| (file.whole_grid(), file.lod()));
+        let file = file.map(CoefficientFile::metadata);
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
         let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
         let all = scene.frames().unwrap_or(0);
         Ok(RenderConfig {
-            views: self.views(grid)?,
+            views: if lod == 0 { self.views(grid)? } else { fixed(&self.views(&whole)?, &whole)? },
             kernel: Kernel::new(self.sigma, self.tau, grid)?,
             quantity: match self.quantity {
                 QuantityName::Mean => Quantity::Mean,
                 QuantityName::Emission => Quantity::Emission,
             },
             frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
-            region: self.region.map(|r| r.resolve(grid)).transpose()?,
+            region: self.region.map(|r| r.resolve(&whole)).transpose()?.map(|region| region.every(1 << lod)),
             splat_error,
             quick: self.fast,
             allowed,

@@ -32,8 +32,7 @@ impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
         let Opened { mut scene, file, annotation, colours } = self.scene()?;
-        let metadata = file.as_ref().map(|file| file.metadata());
-        let mut config = self.config(scene.as_ref(), metadata, colours.as_ref())?;
+        let mut config = self.config(scene.as_ref(), file.as_deref(), colours.as_ref())?;
         let targets = self.targets(&config)?;
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;

@@ -1,6 +1,6 @@
 //! The scene to render: a coefficient file, or frames.
 
-use crate::args::{Cli, MethodName};
+use crate::args::{Cli, Detail, MethodName};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat::base::error::{Error, Result};
@@ -11,6 +11,7 @@ use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::render::annotate::Annotation;
 use wavesplat::render::{CoefficientScene, FrameScene, Scene, SplatSource};
 use wavesplat::source::Archive;
+use wavesplat::view::camera::Camera;
 
 /// The scene to render.
 pub(crate) struct Opened {
@@ -42,6 +43,8 @@ impl Cli {
         self.input.refuse_for_coefficients()?;
         self.along.check(false, self.colour.is_asked())?;
         let file = CoefficientFile::open_with(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
+        let lod = self.level_of_detail(&file)?;
+        let file = file.with_detail(lod)?;
         let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
         let what = match self.method {
             MethodName::Coefficients => SplatSource::Coefficients,
@@ -52,6 +55,19 @@ impl Cli {
         let colours = self.along.of_file(self.colour.range, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), what));
         Ok(Opened { scene, file: Some(file), annotation, colours })
+    }
+
+    /// The level of detail: as given, or the coarsest whose voxels are no larger than a pixel of any view.
+    fn level_of_detail(&self, file: &CoefficientFile) -> Result<u32> {
+        if let Detail::Level(level) = self.lod {
+            return Ok(level);
+        }
+        let grid = file.whole_grid();
+        let scales =
+            self.views(&grid)?.iter().map(|view| Ok(Camera::new(view, &grid)?.scale)).collect::<Result<Vec<_>>>()?;
+        let voxel = scales.into_iter().fold(0.0, f64::max) * grid.largest_spacing();
+        let fits = |lod: &u32| voxel * f64::from(1_u32 << lod) <= 1.0;
+        Ok((0..=file.coarsest_detail()).take_while(fits).last().unwrap_or(0))
     }
 
     /// Frames of an archive.
@@ -81,6 +97,9 @@ impl Cli {
     fn refuse_for_frames(&self) -> Result<()> {
         if self.skip_damaged {
             return Err(Error::usage("--skip-damaged: is for a coefficient file"));
+        }
+        if self.lod != Detail::Level(0) {
+            return Err(Error::usage("--lod: is for a coefficient file"));
         }
         if self.method == MethodName::Coefficients {
             return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));

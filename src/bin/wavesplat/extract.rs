@@ -4,6 +4,7 @@ use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Region;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
@@ -20,6 +21,7 @@ Examples:
   wavesplat extract run.wspl --frames 10:20 --region 0:32,:,5:6 -o part.npy
   wavesplat extract run.wspl -o - --format raw | python analyse.py
   wavesplat extract run.wspl -o run.pvd
+  wavesplat extract run.wspl --lod 2 -o coarse.nc
   wavesplat extract run.wspl -o run.nc
   wavesplat extract coloured.wspl --channel red -o red.npy",
     after_help = "\
@@ -49,6 +51,9 @@ pub(crate) struct ExtractArgs {
     /// Extract only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX")]
     region: Option<RegionSpec>,
+    /// Extract every 2^N-th voxel along each axis, from fewer bytes. --region counts all voxels
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    lod: u32,
     /// Channel of a file of colours: red, green or blue
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
@@ -78,13 +83,13 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
     let access = Access::unless(args.no_mmap);
-    let mut file = CoefficientFile::open_with(&args.file, access)?;
+    let mut file = CoefficientFile::open_with(&args.file, access)?.with_detail(args.lod)?;
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }
     let config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
-        region: args.region.map_or(Ok(file.grid.whole()), |r| r.resolve(&file.grid))?,
+        region: args.region(&file)?,
         channel: args.channel(&file)?,
         memory: args.common.memory.0,
     };
@@ -104,6 +109,16 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
 }
 
 impl ExtractArgs {
+    /// The chosen voxels.
+    fn region(&self, file: &CoefficientFile) -> Result<Region> {
+        let Some(region) = &self.region else { return Ok(file.grid.whole()) };
+        let region = region.resolve(&file.whole_grid())?.every(1 << self.lod);
+        if region.is_empty() {
+            return Err(Error::usage(format!("--region: holds no voxel with --lod {}", self.lod)));
+        }
+        Ok(region)
+    }
+
     /// The chosen channel; for a file of colours one must be named.
     fn channel(&self, file: &CoefficientFile) -> Result<usize> {
         let name = self.file.display();

@@ -15,6 +15,10 @@
 //! 25). If nodes are coefficients of a transform along time, each k has its own pyramid in space, and eq 25 gives the
 //! step.
 //!
+//! A block is coded by itself, so its last nodes may have a neighbour on one side only. If their number along an axis is even,
+//! the coarse lattices have a ghost node behind the last voxel, with codes of its own, so that the last voxel is interpolated
+//! and not extrapolated. The finest passes drop it again.
+//!
 //! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So one
 //! k can be decoded and splatted without the others.
 
@@ -29,9 +33,10 @@ use super::codes::PooledCodes;
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::wavelet;
-use stages::Stages;
+use refine::gather;
+use stages::{Stages, Step};
 use std::ops::Range;
-use wavesplat_format::{Axis, BlockEntry, CodeBox, Pass, Pyramid, Reader, SparseCodes, Storage};
+use wavesplat_format::{Axis, BlockEntry, CodeBox, DenseCodes, Pass, PassBox, Pyramid, Reader, SparseCodes, Storage};
 
 /// The number of level parts of a block.
 const PARTS: usize = Pyramid::PARTS as usize;
@@ -45,27 +50,115 @@ pub(crate) struct PredictionPasses<'a> {
     /// The number of pyramids.
     pyramids: usize,
     passes: Vec<Pass>,
+    /// The passes as the lattices that they refine.
+    steps: Vec<Step>,
+    /// The boxes of a block's codes, part after part.
+    boxes: Vec<PlacedBox>,
     stages: Stages,
 }
 
+/// A box of codes, and what becomes of them.
+#[derive(Debug)]
+struct PlacedBox {
+    /// The pass that adds its nodes, and which of the pass's; none if the level of detail has none of them.
+    of: Option<PassBox>,
+    part: u8,
+    /// Where its codes lie in the slices of the pass.
+    at: CodeBox,
+    /// Takes every n-th code along x, y, z, which then lie contiguously.
+    every: [usize; 3],
+}
+
 impl<'a> PredictionPasses<'a> {
-    pub(crate) fn new(pyramid: &'a Pyramid, [x, y, z, k]: [usize; 4]) -> Self {
-        let apart = !pyramid.order.contains(&Axis::T);
-        let (shape, pyramids) = if apart { ([x, y, z, 1], k) } else { ([x, y, z, k], 1) };
-        let passes = pyramid.passes(shape);
-        let stages = Stages::new(pyramid.stencil, &passes, shape);
-        Self { pyramid, shape, pyramids, passes, stages }
+    /// The passes over a block with `k` coefficients for each voxel.
+    pub(crate) fn new(pyramid: &'a Pyramid, size: [usize; 3], k: usize) -> Self {
+        let (own, pyramids) = if pyramid.order.contains(&Axis::T) { (k, 1) } else { (1, k) };
+        let [x, y, z] = size;
+        let passes = pyramid.passes(size, own);
+        let steps: Vec<Step> = passes.iter().map(Step::from).collect();
+        let stages = Stages::new(pyramid.stencil, &steps);
+        let mut new = Self { pyramid, shape: [x, y, z, own], pyramids, passes, steps, boxes: Vec::new(), stages };
+        let place = |of: &PassBox| PlacedBox { of: Some(*of), part: of.part, at: new.placed(of), every: [1; 3] };
+        new.boxes = pyramid.boxes(&new.passes).iter().map(place).collect();
+        new
     }
 
-    /// The passes down to a level, over its nodes alone: those at multiples of `2^level` along refined axes. Their codes
-    /// are the first of the block.
-    pub(crate) fn down_to(pyramid: &'a Pyramid, shape: [usize; 4], level: u32) -> Self {
-        let of_axis = |axis: Axis| if pyramid.order.contains(&axis) { level } else { 0 };
-        let apart = [Axis::X, Axis::Y, Axis::Z, Axis::T].map(of_axis);
-        let coarsest = pyramid.passes(shape).first().map_or(0, |first| first.level);
-        let mut coarse = Self::new(pyramid, std::array::from_fn(|a| shape[a].div_ceil(1 << apart[a])));
-        coarse.passes.iter_mut().for_each(|pass| pass.level = (pass.level + level).min(coarsest));
-        coarse
+    /// The passes over every 2^lod-th node along the axes x, y and z, and over all along k, of a block.
+    ///
+    /// Of the passes in space, those of finer levels add none of them, but the finest drop what only predicts. Passes along
+    /// time add some in every level.
+    pub(crate) fn with_detail(pyramid: &'a Pyramid, size: [usize; 3], k: usize, lod: u32) -> Self {
+        let whole = Self::new(pyramid, size, k);
+        if lod == 0 {
+            return whole;
+        }
+        let every = |pass: &Pass, a: usize| if a < 3 { pass.strides[a].max(1 << lod) } else { pass.strides[a] };
+        let step = |pass: &Pass| {
+            let lattice: [usize; 4] = std::array::from_fn(|a| pass.limits[a].div_ceil(every(pass, a)));
+            let [_, _, _, added] = pass.extent();
+            match pass.axis {
+                Some(Axis::T) => Step { axis: pass.axis, lattice, added: [lattice[0], lattice[1], lattice[2], added] },
+                _ if has_nodes(pass, lod) => Step { lattice, ..Step::from(pass) },
+                axis => Step { axis, lattice, added: [0; 4] },
+            }
+        };
+        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, lod)).collect();
+        let steps: Vec<Step> = kept.iter().map(|pass| step(pass)).collect();
+        let coarse = |pass: &&Pass| Pass {
+            strides: std::array::from_fn(|a| every(pass, a) >> if a < 3 { lod } else { 0 }),
+            ..**pass
+        };
+        let passes: Vec<Pass> = kept.iter().map(coarse).collect();
+        let stages = Stages::new(pyramid.stencil, &steps);
+        let [x, y, z] = size.map(|n| n.div_ceil(1 << lod));
+        let shape = [x, y, z, whole.shape[3]];
+        let mut new = Self { pyramid, shape, pyramids: whole.pyramids, passes, steps, boxes: Vec::new(), stages };
+        new.boxes = whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod)).collect();
+        new
+    }
+
+    /// A box of all nodes, as it is read for these.
+    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32) -> PlacedBox {
+        let (pass, part) = (whole.passes[of.pass], of.part);
+        let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
+        let left_out = PlacedBox { of: None, part, at, every: [1; 3] };
+        if !has_nodes(&pass, lod) {
+            return left_out;
+        }
+        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, lod)).count();
+        let apart: [usize; 3] = std::array::from_fn(|a| of.every[a] * pass.strides[a]);
+        let every = apart.map(|apart| (1_usize << lod).div_ceil(apart));
+        if every == [1; 3] {
+            let every = std::array::from_fn(|a| (apart[a] >> lod) / self.passes[number].strides[a]);
+            let own = PassBox { pass: number, every: every.map(|n: usize| n.max(1)), ..*of };
+            at = self.placed(&own);
+            return PlacedBox { of: Some(own), part, at, every: [1; 3] };
+        }
+        if of.allowed != 0xFF {
+            return left_out; // the coarser nodes are in another box
+        }
+        PlacedBox { of: Some(PassBox { pass: number, every: [1; 3], ..*of }), part, at, every }
+    }
+
+    /// Leaves out codes of finer nodes, and puts the others in their places.
+    fn thin(&self, codes: &mut SparseCodes) {
+        if self.boxes.iter().all(|of| of.of.is_some() && of.every == [1; 3]) {
+            return;
+        }
+        let of_runs: Vec<&PlacedBox> =
+            self.boxes.iter().flat_map(|of| std::iter::repeat_n(of, of.at.extents[3])).collect();
+        codes.map_places(|run, place| {
+            let PlacedBox { of, at, every, .. } = of_runs[run];
+            let of = of.as_ref()?;
+            if *every == [1; 3] {
+                return Some(place);
+            }
+            let ([x, y, _, _], place) = (at.extents, place as usize);
+            let node = [place % x, place / x % y, place / (x * y)];
+            let (first, strides) = self.stages.places(of.pass);
+            let kept = (0..3).all(|a| node[a].is_multiple_of(every[a]));
+            kept.then(|| (first + (0..3).map(|a| node[a] / every[a] * strides[a]).sum::<usize>()) as u32)
+        });
     }
 
     /// The number of nodes along x, y, z and k.
@@ -74,22 +167,77 @@ impl<'a> PredictionPasses<'a> {
         [x, y, z, k * self.pyramids]
     }
 
-    /// The number of codes in each level part.
-    pub(crate) fn part_lengths(&self) -> Vec<usize> {
-        let of_one = |part| self.passes.iter().filter(|p| p.part == part).map(|p| p.codes(self.shape)).sum::<usize>();
-        (0..Pyramid::PARTS).map(|part| self.pyramids * of_one(part)).collect()
-    }
-
-    /// The nodes that the passes of a level part add.
-    pub(crate) fn boxes(&self, part: u8) -> Vec<[usize; 4]> {
-        let of_all = |[x, y, z, k]: [usize; 4]| [x, y, z, k * self.pyramids];
-        self.passes.iter().filter(|p| p.part == part).map(|p| of_all(p.extent(self.shape))).collect()
-    }
-
-    /// As [`Self::boxes`], with the places of their codes in the slices that the passes refine.
+    /// The boxes of a level part, as a reader needs them.
     fn placed_boxes(&self, part: u8) -> Vec<CodeBox> {
-        let passes = (0..self.passes.len()).filter(|n| self.passes[*n].part == part);
-        passes.zip(self.boxes(part)).map(|(n, extents)| self.stages.placed(n, extents)).collect()
+        self.boxes.iter().filter(|of| of.part == part).map(|of| of.at).collect()
+    }
+
+    /// The boxes of a level part, each of nodes that a pass adds.
+    fn boxes_of(&self, part: u8) -> impl Iterator<Item = &PassBox> {
+        self.boxes.iter().filter(move |of| of.part == part).filter_map(|of| of.of.as_ref())
+    }
+
+    fn placed(&self, of: &PassBox) -> CodeBox {
+        let (first, strides) = self.stages.places(of.pass);
+        of.placed(self.extent(of.pass), first, strides)
+    }
+
+    /// The codes that a pass adds to all pyramids along x, y, z, k.
+    fn extent(&self, pass: usize) -> [usize; 4] {
+        let [x, y, z, k] = self.steps[pass].added;
+        [x, y, z, k * self.pyramids]
+    }
+
+    /// The codes of a level part, from all codes, pass after pass.
+    pub(crate) fn part_of<'c>(&self, part: u8, codes: &'c [i32]) -> Vec<DenseCodes<'c>> {
+        let mut start = 0;
+        let of_pass = |pass: &Pass| {
+            let first = start;
+            start += self.pyramids * pass.codes();
+            &codes[first..start]
+        };
+        let of_passes: Vec<&[i32]> = self.passes.iter().map(of_pass).collect();
+        let of_box = |of: &PassBox| {
+            let [x, y, z, k] = self.extent(of.pass);
+            let at = of.placed([x, y, z, k], 0, [1, x, x * y]);
+            DenseCodes { codes: of_passes[of.pass], slice: x * y * z, at }
+        };
+        self.boxes_of(part).map(of_box).collect()
+    }
+
+    /// Lists the codes that are not zero, from all codes, pass after pass.
+    pub(crate) fn list(&self, codes: &[i32]) -> PooledCodes {
+        let mut listed = PooledCodes::new();
+        for part in 0..Pyramid::PARTS {
+            let places = self.placed_boxes(part);
+            self.part_of(part, codes).iter().zip(&places).for_each(|(of, places)| listed.list(of, places));
+        }
+        listed
+    }
+
+    /// All codes, pass after pass, from those that are not zero: the opposite of [`Self::list`].
+    pub(crate) fn dense(&self, codes: &SparseCodes) -> Vec<i32> {
+        let mut all = vec![0; self.codes()];
+        let starts =
+            wavelet::ranges(&(0..self.passes.len()).map(|n| self.extent(n).iter().product()).collect::<Vec<_>>());
+        for (of, runs) in self.boxes.iter().filter_map(|of| of.of).zip(self.runs()) {
+            let [x, y, z, _] = self.extent(of.pass);
+            for (slice, run) in runs.enumerate() {
+                let (places, values) = codes.run(run);
+                for (place, value) in places.iter().zip(values) {
+                    let number = self.stages.number(of.pass, *place as usize);
+                    all[starts[of.pass].start + slice * x * y * z + number] = *value;
+                }
+            }
+        }
+        all
+    }
+
+    /// The number of codes of a level part that are not zero.
+    pub(crate) fn count(&self, part: u8, codes: &SparseCodes) -> usize {
+        let runs = self.runs();
+        let of_part = self.boxes.iter().zip(&runs).filter(|(of, _)| of.part == part);
+        of_part.flat_map(|(_, runs)| runs.clone()).map(|run| codes.run(run).1.len()).sum()
     }
 
     /// Reads the codes of a block's level parts that `needed` chooses; those of others are zero.
@@ -108,16 +256,13 @@ impl<'a> PredictionPasses<'a> {
                 codes.skip(&boxes);
             }
         }
+        self.thin(&mut codes);
         Ok(codes)
     }
 
-    /// Decodes codes to the field; `codes` are all codes of the block, as [`Self::placed_boxes`] places them. Returns for
-    /// each k whether some node is not zero; where k is refined, true for all or none.
-    pub(crate) fn decode<R: Real>(&self, step: f64, codes: &SparseCodes, field: &mut [R]) -> Vec<bool> {
-        self.decode_some(&vec![true; self.nodes()[3]], step, codes, field)
-    }
-
-    /// As [`Self::decode`], of every k that `wanted` marks. The nodes of others are 0 or unspecified.
+    /// Decodes codes to the field, of every k that `wanted` marks; `codes` are all codes of the block, as
+    /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; where k is refined, true for
+    /// all or none. The nodes of others are 0 or unspecified.
     pub(crate) fn decode_some<R: Real>(
         &self,
         wanted: &[bool],
@@ -139,19 +284,17 @@ impl<'a> PredictionPasses<'a> {
 
     /// For each k, whether some code is not zero; if k is refined, the same for all of them.
     pub(crate) fn marked(&self, codes: &SparseCodes) -> Vec<bool> {
-        let some = |number| self.runs(number).any(|run| !codes.run(run).1.is_empty());
-        (0..self.pyramids).flat_map(|number| std::iter::repeat_n(some(number), self.shape[3])).collect()
+        let mut some = vec![false; self.pyramids];
+        for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()) {
+            let each = (of.at.extents[3] / self.pyramids).max(1);
+            runs.enumerate().for_each(|(n, run)| some[n / each] |= !codes.run(run).1.is_empty());
+        }
+        some.iter().flat_map(|some| std::iter::repeat_n(*some, self.shape[3])).collect()
     }
 
-    /// As [`Self::marked`], from all codes, pass after pass.
-    pub(crate) fn marked_of(&self, codes: &[i32]) -> Vec<bool> {
-        let some = |number| self.code_ranges(number).into_iter().any(|range| !rows::all_zero(&codes[range]));
-        (0..self.pyramids).flat_map(|number| std::iter::repeat_n(some(number), self.shape[3])).collect()
-    }
-
-    /// As [`Self::decode`], for one k that is not refined with others. False if all its nodes are zero.
+    /// As [`Self::decode_some`], for one k that is not refined with others. False if all its nodes are zero.
     pub(crate) fn decode_one<R: Real>(&self, k: usize, step: f64, codes: &SparseCodes, nodes: &mut Vec<R>) -> bool {
-        let some = self.runs(k).any(|run| !codes.run(run).1.is_empty());
+        let some = self.marked(codes)[k];
         if some {
             nodes.resize(self.pyramid_nodes(), R::default());
             self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, PARTS));
@@ -159,14 +302,27 @@ impl<'a> PredictionPasses<'a> {
         some
     }
 
-    /// Encodes the field and replaces it by the decoded field; `split` is scratch. NaN nodes get the code 0. False if a
-    /// code does not fit. `codes` are in order, pass after pass.
-    pub(crate) fn encode<R: Real>(&self, step: f64, field: &mut [R], split: &mut Vec<R>, codes: &mut [i32]) -> bool {
+    /// The number of codes of a block.
+    pub(crate) fn codes(&self) -> usize {
+        self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
+    }
+
+    /// Encodes the source's nodes, `size` along x, y, z of which there may be more than are needed, and fills the field with
+    /// the decoded ones; `split` is scratch. NaN nodes get the code 0. False
+    /// if a code does not fit. `codes` are in order, pass after pass.
+    pub(crate) fn encode<R: Real>(
+        &self,
+        step: f64,
+        (source, size): (&[R], [usize; 3]),
+        (field, split): (&mut [R], &mut Vec<R>),
+        codes: &mut [i32],
+    ) -> bool {
         let mut fits = true;
-        split.resize(self.pyramid_nodes(), R::default());
         let ranges: Vec<_> = (0..self.pyramids).map(|number| self.code_ranges(number)).collect();
-        for (nodes, ranges) in field.chunks_exact_mut(self.pyramid_nodes()).zip(&ranges) {
-            self.stages.split(nodes, split);
+        split.resize(self.codes() / self.pyramids, R::default());
+        let sources = source.chunks_exact(size.iter().product::<usize>() * self.shape[3]);
+        for ((nodes, source), ranges) in field.chunks_exact_mut(self.pyramid_nodes()).zip(sources).zip(&ranges) {
+            self.split((source, size), split);
             let codes = apart(codes, ranges);
             let mut encoding = Encoding { split, codes, passes: self.inverses(step), fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);
@@ -175,17 +331,32 @@ impl<'a> PredictionPasses<'a> {
         fits
     }
 
+    /// Sorts the source's nodes of a pyramid by the passes that add them.
+    fn split<R: Real>(&self, (source, [nx, ny, nz]): (&[R], [usize; 3]), split: &mut [R]) {
+        let mut rest = split;
+        for pass in &self.passes {
+            let [x, y, z, t] = pass.extent();
+            let at = |axis: usize, i: usize| pass.nodes(axis).0 + pass.nodes(axis).1 * i;
+            for (t, z, y) in (0..t).flat_map(|t| (0..z).flat_map(move |z| (0..y).map(move |y| (t, z, y)))) {
+                let start = at(0, 0) + nx * (at(1, y) + ny * (at(2, z) + nz * at(3, t)));
+                let (row, after) = std::mem::take(&mut rest).split_at_mut(x);
+                if x > 0 {
+                    gather(&source[start..], pass.nodes(0).1, row);
+                }
+                rest = after;
+            }
+        }
+    }
+
     /// The change of a decoded field from leaving out each level part and all finer ones.
     pub(crate) fn changes<R: Real>(&self, step: f64, codes: &SparseCodes, field: &[R]) -> Vec<Change> {
         self.changes_without(&[true; PARTS], field, |number, parts| self.sparse(number, step, codes, parts))
     }
 
-    /// As [`Self::changes`], from all codes, pass after pass, and only for parts with a code that is not zero: the
-    /// directory does not list others.
-    pub(crate) fn changes_of_coded<R: Real>(&self, step: f64, codes: &[i32], field: &[R]) -> Vec<Change> {
-        let ranges = wavelet::ranges(&self.part_lengths());
-        let coded = std::array::from_fn(|part| !rows::all_zero(&codes[ranges[part].clone()]));
-        self.changes_without(&coded, field, |number, parts| self.dense(number, step, codes, parts))
+    /// As [`Self::changes`], only for parts with a code that is not zero: the directory does not list others.
+    pub(crate) fn changes_of_coded<R: Real>(&self, step: f64, codes: &SparseCodes, field: &[R]) -> Vec<Change> {
+        let coded = std::array::from_fn(|part| self.count(part as u8, codes) > 0);
+        self.changes_without(&coded, field, |number, parts| self.sparse(number, step, codes, parts))
     }
 
     /// The changes from leaving out each part that `wanted` marks and all finer ones. `decoding(number, parts)` decodes a
@@ -213,24 +384,15 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Decodes a pyramid from its first parts.
-    fn sparse<'c, R: Real>(
-        &self,
-        number: usize,
-        step: f64,
-        codes: &'c SparseCodes,
-        parts: usize,
-    ) -> SparseDecoding<'c, R> {
-        let of_pass = |(n, pass): (usize, &Pass)| {
-            (usize::from(pass.part) < parts).then(|| (self.runs_of(n, number).start, self.step(step, pass)))
-        };
-        SparseDecoding { codes, passes: self.passes.iter().enumerate().map(of_pass).collect() }
-    }
-
-    fn dense<'c, R: Real>(&self, number: usize, step: f64, codes: &'c [i32], parts: usize) -> DenseDecoding<'c, R> {
-        let of_pass = |(pass, range): (&Pass, Range<usize>)| {
-            (usize::from(pass.part) < parts).then(|| (&codes[range], self.step(step, pass)))
-        };
-        DenseDecoding { passes: self.passes.iter().zip(self.code_ranges(number)).map(of_pass).collect() }
+    fn sparse<'c, R: Real>(&self, number: usize, step: f64, codes: &'c SparseCodes, parts: usize) -> Decoding<'c, R> {
+        let steps = self.passes.iter().map(|pass| (self.step(step, pass), Vec::new()));
+        let mut passes: Vec<(R, Vec<usize>)> = steps.collect();
+        for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| usize::from(of.part) < parts) {
+            if let Some(PassBox { pass, .. }) = of.of {
+                passes[pass].1.push(runs.start + number * (runs.len() / self.pyramids));
+            }
+        }
+        Decoding { codes, passes }
     }
 
     fn step<R: Real>(&self, step: f64, pass: &Pass) -> R {
@@ -248,7 +410,7 @@ impl<'a> PredictionPasses<'a> {
         let of_pass = |pass: &Pass| {
             let step = self.pyramid.step(step, pass.level);
             let first = start;
-            start += pass.codes(self.shape);
+            start += pass.codes();
             (first, [R::of(step), R::of(1.0 / step)])
         };
         self.passes.iter().map(of_pass).collect()
@@ -258,7 +420,7 @@ impl<'a> PredictionPasses<'a> {
     fn code_ranges(&self, number: usize) -> Vec<Range<usize>> {
         let mut start = 0;
         let of_pass = |pass: &Pass| {
-            let codes = pass.codes(self.shape);
+            let codes = pass.codes();
             let first = start + number * codes;
             start += self.pyramids * codes;
             first..first + codes
@@ -266,19 +428,20 @@ impl<'a> PredictionPasses<'a> {
         self.passes.iter().map(of_pass).collect()
     }
 
-    /// The runs of a pyramid's codes.
-    fn runs(&self, number: usize) -> impl Iterator<Item = usize> {
-        (0..self.passes.len()).flat_map(move |pass| self.runs_of(pass, number))
+    /// The runs of codes of each box, for every pyramid and each of its slices along time.
+    fn runs(&self) -> Vec<Range<usize>> {
+        wavelet::ranges(&self.boxes.iter().map(|of| of.at.extents[3]).collect::<Vec<_>>())
     }
+}
 
-    /// The runs of the codes of a pass of one pyramid, one for each slice along time.
-    fn runs_of(&self, pass: usize, number: usize) -> Range<usize> {
-        let slices = |pass: &Pass| pass.extent(self.shape)[3];
-        let before: usize = self.passes[..pass].iter().map(slices).sum();
-        let own = slices(&self.passes[pass]);
-        let first = self.pyramids * before + number * own;
-        first..first + own
-    }
+/// Whether a pass adds nodes at multiples of `2^lod` along x, y and z.
+fn has_nodes(pass: &Pass, lod: u32) -> bool {
+    pass.level >= lod || pass.axis.is_none_or(|axis| axis == Axis::T)
+}
+
+/// Whether a pass is kept for these nodes: it adds some, or drops those that only predict.
+fn is_kept(pass: &Pass, lod: u32) -> bool {
+    has_nodes(pass, lod) || pass.level == 0
 }
 
 /// The parts of a slice at ascending ranges.
@@ -302,42 +465,26 @@ trait Correction<R> {
 }
 
 /// Adds the codes of a pyramid to complete slices, times the step of their level (eq 32).
-struct SparseDecoding<'a, R> {
+struct Decoding<'a, R> {
     codes: &'a SparseCodes,
-    /// The first run and the step of each pass; none if its codes are left out.
-    passes: Vec<Option<(usize, R)>>,
+    /// For each pass the step, and the first run of each of its boxes.
+    passes: Vec<(R, Vec<usize>)>,
 }
 
-impl<R: Real> Correction<R> for SparseDecoding<'_, R> {
+impl<R: Real> Correction<R> for Decoding<'_, R> {
     #[inline(always)]
     fn correct(&mut self, _: usize, _: usize, _: &mut [R]) {}
 
     fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
-        if let Some((run, step)) = self.passes[pass] {
+        let (step, runs) = &self.passes[pass];
+        for run in runs {
             let (places, values) = self.codes.run(run + slice);
             for (place, code) in places.iter().zip(values) {
                 let node = &mut nodes[*place as usize];
-                *node = *node + R::of_code(*code) * step;
+                *node = *node + R::of_code(*code) * *step;
             }
         }
     }
-}
-
-/// Adds the codes of a pyramid to predicted rows, times the step of their level (eq 32).
-struct DenseDecoding<'a, R> {
-    /// The codes and the step of each pass; none if they are left out.
-    passes: Vec<Option<(&'a [i32], R)>>,
-}
-
-impl<R: Real> Correction<R> for DenseDecoding<'_, R> {
-    #[inline(always)]
-    fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]) {
-        if let Some((codes, step)) = self.passes[pass] {
-            rows::decode(predicted, &codes[first..], step);
-        }
-    }
-
-    fn complete(&mut self, _: usize, _: usize, _: &mut [R]) {}
 }
 
 /// Computes the codes of a pyramid, and turns predictions into decoded nodes (eq 32).

@@ -1,7 +1,7 @@
-//! Kernels that refine a lattice by two along one axis, or split it again. Arrays hold the nodes of one lattice side by
+//! Kernels that refine a lattice by two along one axis. Arrays hold the nodes of one lattice side by
 //! side, without gaps for finer nodes, so that all kernels work on contiguous rows.
 //!
-//! An axis divides an array into `outer` parts, each of `evens` or `evens + odds` rows of `inner` nodes. Refining copies
+//! An axis divides an array into `outer` parts, each of `evens` or `kept + odds` rows of `inner` nodes. Refining copies
 //! the rows of even nodes apart from each other, and predicts the odd rows between them (eq 33).
 
 use super::Correction;
@@ -16,19 +16,16 @@ pub(super) struct Rows {
     pub(super) inner: usize,
     pub(super) evens: usize,
     pub(super) odds: usize,
+    /// The even rows that remain: all, or all but a last one that only predicts.
+    pub(super) kept: usize,
 }
 
 impl Rows {
-    /// The rows along `axis` of a lattice of `extents` nodes whose axis gains `odds` nodes.
-    pub(super) fn new(extents: [usize; 3], axis: usize, odds: usize) -> Self {
+    /// The rows along `axis` of a lattice of `extents` nodes whose axis gains `odds` nodes and keeps some.
+    pub(super) fn new(extents: [usize; 3], axis: usize, (odds, kept): (usize, usize)) -> Self {
         let product = |extents: &[usize]| extents.iter().product();
         let (inner, outer) = (product(&extents[..axis]), product(&extents[axis + 1..]));
-        Self { outer, inner, evens: extents[axis], odds }
-    }
-
-    /// The number of even nodes.
-    pub(super) fn even_nodes(&self) -> usize {
-        self.outer * self.evens * self.inner
+        Self { outer, inner, evens: extents[axis], odds, kept }
     }
 }
 
@@ -42,12 +39,13 @@ pub(super) fn refine_across<R: Real, C: Correction<R>>(
     fine: &mut [R],
     (pass, first, correction): (usize, usize, &mut C),
 ) {
-    let &Rows { outer, inner, evens, odds } = rows;
+    let &Rows { outer, inner, evens, odds, kept } = rows;
+    let apart = 1 + usize::from(odds > 0);
     for part in 0..outer {
         let from = &coarse[part * evens * inner..][..evens * inner];
-        let to = &mut fine[part * (evens + odds) * inner..][..(evens + odds) * inner];
-        for i in 0..evens {
-            to[2 * i * inner..][..inner].copy_from_slice(&from[i * inner..][..inner]);
+        let to = &mut fine[part * (kept + odds) * inner..][..(kept + odds) * inner];
+        for i in 0..kept {
+            to[apart * i * inner..][..inner].copy_from_slice(&from[i * inner..][..inner]);
         }
         for i in 0..odds {
             let taps = taps(stencil, i, evens);
@@ -68,17 +66,21 @@ pub(super) fn refine_lines<R: Real, C: Correction<R>>(
     fine: &mut [R],
     (pass, first, correction): (usize, usize, &mut C),
 ) {
-    let &Rows { outer, evens, odds, .. } = rows;
+    let &Rows { outer, evens, odds, kept, .. } = rows;
     let mut odd = vec![R::default(); odds];
     for line in 0..outer {
         let even = &coarse[line * evens..][..evens];
         predict_line(stencil, even, &mut odd);
         correction.correct(pass, first + line * odds, &mut odd);
-        let to = &mut fine[line * (evens + odds)..][..evens + odds];
+        let to = &mut fine[line * (kept + odds)..][..kept + odds];
+        if odds == 0 {
+            to.copy_from_slice(&even[..kept]);
+            continue;
+        }
         for (to, (even, odd)) in to.as_chunks_mut::<2>().0.iter_mut().zip(even.iter().zip(&odd)) {
             *to = [*even, *odd];
         }
-        if evens > odds {
+        if kept > odds {
             to[2 * odds] = even[odds];
         }
     }
@@ -109,34 +111,16 @@ pub(super) fn refine_slices<R: Real>(stencil: Stencil, slice: usize, wanted: &[b
 /// Nodes of a slice that are predicted together along time.
 const NODES: usize = 1024;
 
-/// Splits a lattice into its even nodes and its odd ones along an axis.
+/// Copies every n-th node of a line.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-pub(super) fn split<R: Real>(rows: &Rows, fine: &[R], even: &mut [R], odd: &mut [R]) {
-    let &Rows { outer, inner, evens, odds } = rows;
-    for part in 0..outer {
-        let from = &fine[part * (evens + odds) * inner..][..(evens + odds) * inner];
-        let even = &mut even[part * evens * inner..][..evens * inner];
-        let odd = &mut odd[part * odds * inner..][..odds * inner];
-        if inner == 1 {
-            split_line(from, even, odd);
-            continue;
+pub(super) fn gather<R: Real>(line: &[R], n: usize, out: &mut [R]) {
+    if n == 2 && line.len() >= 2 * out.len() {
+        for (to, pair) in out.iter_mut().zip(line.as_chunks::<2>().0) {
+            *to = pair[0];
         }
-        for i in 0..evens {
-            even[i * inner..][..inner].copy_from_slice(&from[2 * i * inner..][..inner]);
+    } else {
+        for (i, to) in out.iter_mut().enumerate() {
+            *to = line[i * n];
         }
-        for i in 0..odds {
-            odd[i * inner..][..inner].copy_from_slice(&from[(2 * i + 1) * inner..][..inner]);
-        }
-    }
-}
-
-#[inline(always)]
-fn split_line<R: Real>(line: &[R], even: &mut [R], odd: &mut [R]) {
-    let (pairs, last) = line.as_chunks::<2>();
-    for (pair, (even, odd)) in pairs.iter().zip(even.iter_mut().zip(odd)) {
-        [*even, *odd] = *pair;
-    }
-    if let ([last], Some(even)) = (last, even.get_mut(pairs.len())) {
-        *even = *last;
     }
 }

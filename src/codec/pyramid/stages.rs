@@ -5,12 +5,12 @@
 //! `[slice][z][y][x]`, each the lattice as far as it is refined. Before a pass along time, slices lie at even places.
 
 use super::Correction;
-use super::refine::{Rows, refine_across, refine_lines, refine_slices, split};
+use super::refine::{Rows, refine_across, refine_lines, refine_slices};
 use super::stencil::taps;
 use crate::codec::buffer::Buffer;
 use crate::codec::real::Real;
 use std::ops::Range;
-use wavesplat_format::{Axis, CodeBox, Pass, Stencil};
+use wavesplat_format::{Axis, Pass, Stencil};
 
 /// The passes of a pyramid in stages.
 #[derive(Debug)]
@@ -54,36 +54,45 @@ impl Stage {
 }
 
 impl Lattice {
-    fn new(pass: &Pass, shape: [usize; 4]) -> Self {
-        let after: [usize; 4] = std::array::from_fn(|a| shape[a].div_ceil(pass.strides[a]));
-        let added = pass.extent(shape);
-        let (extents, slices) = ([after[0], after[1], after[2]], after[3]);
-        let rows = match pass.axis {
-            Some(axis) if axis != Axis::T => {
-                let odds = added[axis.index()];
-                let mut before = extents;
-                before[axis.index()] -= odds;
-                Rows::new(before, axis.index(), odds)
+    /// The lattice after a pass, and the nodes that the pass adds; `before` is the one before it.
+    fn new(Step { axis, lattice, added }: &Step, before: Option<&Self>) -> Self {
+        let (extents, slices) = ([lattice[0], lattice[1], lattice[2]], lattice[3]);
+        let rows = match (axis, before) {
+            (Some(axis), Some(before)) if *axis != Axis::T => {
+                let (axis, odds) = (axis.index(), if added.contains(&0) { 0 } else { added[axis.index()] });
+                Rows::new(before.extents, axis, (odds, extents[axis] - odds))
             }
             _ => Rows::default(),
         };
-        Self { axis: pass.axis, extents, slices, added: added[..3].iter().product(), rows }
+        Self { axis: *axis, extents, slices, added: added[..3].iter().product(), rows }
     }
 
     /// The number of nodes in a slice.
     fn slice(&self) -> usize {
         self.extents.iter().product()
     }
+}
 
-    /// The number of slices to which the pass adds nodes.
-    fn slices_refined(&self) -> usize {
-        if self.axis == Some(Axis::T) { self.slices / 2 } else { self.slices }
+/// A pass: its axis, the nodes along x, y, z, k after it, and those that it adds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    pub(super) axis: Option<Axis>,
+    pub(super) lattice: [usize; 4],
+    pub(super) added: [usize; 4],
+}
+
+impl From<&Pass> for Step {
+    fn from(pass: &Pass) -> Self {
+        Self { axis: pass.axis, lattice: pass.lattice(), added: pass.extent() }
     }
 }
 
 impl Stages {
-    pub(super) fn new(stencil: Stencil, passes: &[Pass], shape: [usize; 4]) -> Self {
-        let lattices: Vec<Lattice> = passes.iter().map(|pass| Lattice::new(pass, shape)).collect();
+    pub(super) fn new(stencil: Stencil, steps: &[Step]) -> Self {
+        let mut lattices: Vec<Lattice> = Vec::new();
+        for step in steps {
+            lattices.push(Lattice::new(step, lattices.last()));
+        }
         let mut stages: Vec<Stage> = Vec::new();
         for (n, lattice) in lattices.iter().enumerate().skip(1) {
             let open = stages.last_mut().filter(|stage| stage.time.is_none());
@@ -97,15 +106,27 @@ impl Stages {
         Self { stencil, lattices, stages }
     }
 
-    /// Where the codes of a pass over `extents` nodes lie in the slices that it refines.
-    pub(super) fn placed(&self, pass: usize, extents: [usize; 4]) -> CodeBox {
+    /// Where the nodes that a pass adds lie in the slices that it refines: the first, and their distances along x, y, z.
+    pub(super) fn places(&self, pass: usize) -> (usize, [usize; 3]) {
         let Lattice { axis, extents: [x, y, _], .. } = self.lattices[pass];
-        let mut of = CodeBox { extents, first: 0, strides: [1, x, x * y] };
-        if let Some(axis) = axis.filter(|axis| *axis != Axis::T) {
-            of.first = of.strides[axis.index()];
-            of.strides[axis.index()] *= 2;
+        let mut strides = [1, x, x * y];
+        match axis {
+            Some(axis) if axis != Axis::T => {
+                strides[axis.index()] *= 2;
+                (strides[axis.index()] / 2, strides)
+            }
+            _ => (0, strides),
         }
-        of
+    }
+
+    /// The number of the node at a place among those that a pass adds to a slice, x fastest.
+    pub(super) fn number(&self, pass: usize, place: usize) -> usize {
+        let Lattice { axis, extents: [x, y, z], .. } = self.lattices[pass];
+        let (mut node, mut added) = ([place % x, place / x % y, place / (x * y)], [x, y, z]);
+        if let Some(axis) = axis.filter(|axis| *axis != Axis::T).map(Axis::index) {
+            (node[axis], added[axis]) = (node[axis] / 2, added[axis] / 2);
+        }
+        node[0] + added[0] * (node[1] + added[1] * node[2])
     }
 
     /// Refines a pyramid from its coarsest nodes on: predicts nodes and has them corrected. `out` gets the slices that
@@ -176,49 +197,6 @@ impl Stages {
         let refine = if rows.inner == 1 { refine_lines } else { refine_across };
         refine(self.stencil, rows, coarse, fine, (pass, n * added, correction));
         correction.complete(pass, n, fine);
-    }
-
-    /// Splits the nodes of a pyramid into those that its passes add, pass after pass: the opposite of [`Self::refine`].
-    pub(super) fn split<R: Real>(&self, nodes: &[R], added: &mut [R]) {
-        let mut rest = added;
-        let mut of_pass = |lattice: &Lattice| {
-            let (own, after) = std::mem::take(&mut rest).split_at_mut(lattice.added * lattice.slices_refined());
-            rest = after;
-            own
-        };
-        let mut added: Vec<&mut [R]> = self.lattices.iter().map(&mut of_pass).collect();
-        let mut fine: Option<Buffer<R>> = None;
-        for stage in self.stages.iter().rev() {
-            let before = &self.lattices[stage.ends()[0]];
-            let mut coarse = Buffer::of(before.slices * before.slice());
-            self.split_stage(stage, (fine.as_deref().unwrap_or(nodes), &mut coarse), &mut added);
-            fine = Some(coarse);
-        }
-        added[0].copy_from_slice(fine.as_deref().unwrap_or(nodes));
-    }
-
-    fn split_stage<R: Real>(&self, stage: &Stage, (fine, coarse): (&[R], &mut [R]), added: &mut [&mut [R]]) {
-        let [before, after] = stage.ends().map(|pass| self.lattices[pass].slice());
-        if let Some(time) = stage.time {
-            let odd = fine.chunks_exact(after).skip(1).step_by(2);
-            odd.zip(added[time].chunks_exact_mut(after)).for_each(|(slice, to)| to.copy_from_slice(slice));
-        }
-        let even = fine.chunks_exact(after).step_by(stage.apart());
-        for (n, (slice, to)) in even.zip(coarse.chunks_exact_mut(before)).enumerate() {
-            self.split_slice(stage, (n, slice, to), added);
-        }
-    }
-
-    /// Splits one slice in space.
-    fn split_slice<R: Real>(&self, stage: &Stage, (n, fine, coarse): (usize, &[R], &mut [R]), added: &mut [&mut [R]]) {
-        let mut nodes: Option<Buffer<R>> = None;
-        for pass in stage.spatial.clone().rev() {
-            let Lattice { rows, added: own, .. } = &self.lattices[pass];
-            let mut even = Buffer::of(rows.even_nodes());
-            split(rows, nodes.as_deref().unwrap_or(fine), &mut even, &mut added[pass][n * own..][..*own]);
-            nodes = Some(even);
-        }
-        coarse.copy_from_slice(nodes.as_deref().unwrap_or(fine));
     }
 
     /// For every stage but the last, the slices after it that the wanted ones need.

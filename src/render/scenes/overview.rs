@@ -42,7 +42,7 @@ fn of_window_and_channel(
     progress: &dyn Progress,
 ) -> Result<()> {
     let window = file.window_of(frames[0]);
-    let (codec, first) = (file.codec(window)?, file.window_range(window).start);
+    let (codec, first) = (file.coarse_codec(window, request.thinning.stride)?, file.window_range(window).start);
     let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
     let decode = |entry: &BlockEntry| file.coarse(&codec, entry, (request.thinning.stride, &frames));
     for entries in file.entries(window, channel, &request.region) {

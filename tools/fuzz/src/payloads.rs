@@ -26,22 +26,25 @@ pub fn cells(data: &[u8]) {
     let mut extents = |_| [(); 4].map(|()| input.below(13));
     let boxes: Vec<[usize; 4]> = (0..3).map(&mut extents).filter(|extents| !extents.contains(&0)).collect();
     let volume = boxes.iter().map(|extents| extents.iter().product::<usize>()).sum();
+    let boxes: Vec<CodeBox> = boxes.into_iter().map(CodeBox::contiguous).collect();
+    let packing = [Packing::Flat, Packing::Nested][input.below(2)];
     let mut codes = vec![-1; volume];
-    if let Ok(count) = unpack_cells(input.rest(), &boxes, &mut codes) {
+    if let Ok(count) = packing.unpack_all(input.rest(), &boxes, &mut codes) {
         assert_eq!(count, nonzero(&codes));
-        cells_round_trip(&codes, &boxes);
+        cells_round_trip(packing, &codes, &boxes);
     }
     let mut codes = numbers(input.rest());
     codes.resize(volume, 0);
-    cells_round_trip(&codes, &boxes);
+    cells_round_trip(packing, &codes, &boxes);
 }
 
-fn cells_round_trip(codes: &[i32], boxes: &[[usize; 4]]) {
+fn cells_round_trip(packing: Packing, codes: &[i32], boxes: &[CodeBox]) {
     let (mut raw, mut back) = (Vec::new(), vec![-1; codes.len()]);
-    pack_cells(codes, boxes, &mut raw);
+    let dense = DenseCodes::one_after_another(codes, boxes);
+    packing.pack(&dense, &mut raw);
     assert!(raw.len() <= max_packed(boxes), "{} bytes of {boxes:?}", raw.len());
-    estimate_cells(codes, boxes);
-    assert_eq!(unpack_cells(&raw, boxes, &mut back), Ok(nonzero(codes)));
+    packing.estimate(&dense);
+    assert_eq!(packing.unpack_all(&raw, boxes, &mut back), Ok(nonzero(codes)));
     assert_eq!(back, codes);
 }
 

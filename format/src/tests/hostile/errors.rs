@@ -59,7 +59,7 @@ fn damage_is_corrupt_and_names_the_place() {
 #[test]
 fn newer_files_are_unsupported() {
     let pieces = Pieces::new(&lean().file);
-    for (at, value) in [(8, 2), (8, 0), (16, 1), (23, 0x80)] {
+    for (at, value) in [(8, 2), (8, 0), (16, 2), (23, 0x80)] {
         let file = pieces.forge(&mut |piece, _, bytes| {
             if piece == Piece::Header {
                 bytes[at] = value;
@@ -68,6 +68,23 @@ fn newer_files_are_unsupported() {
         assert!(matches!(Reader::open(&file), Err(Error::Unsupported(_))), "{at}");
         assert!(matches!(CompletePrefix::read(&file), Err(Error::Unsupported(_))), "{at}");
         assert!(matches!(Recovery::search(&file, &mut |_| {}), Err(Error::Unsupported(_))), "{at}");
+    }
+}
+
+#[test]
+fn nested_parts_must_be_announced() {
+    for (original, nested) in [(lean(), false), (fat(), true)] {
+        for announced in [false, true] {
+            let file = Pieces::new(&original.file).forge(&mut |piece, _, bytes| {
+                if piece == Piece::Header {
+                    bytes[16] = u8::from(announced);
+                }
+            });
+            match Reader::open(&file) {
+                Ok(_) => assert!(announced || !nested),
+                Err(e) => assert!(!announced && nested && e.to_string().contains("does not announce"), "{e}"),
+            }
+        }
     }
 }
 

@@ -19,16 +19,16 @@ pub(super) struct Original {
 /// Has windows of all bases, with and without a pyramid, two channels, times, outliers, missing and exact samples, and a lost
 /// block.
 pub(super) fn fat() -> Original {
-    original([5, 3, 2], 2, 7)
+    original([5, 3, 2], 2, 7, Packing::Nested)
 }
 
 /// Like [`fat`], with fewer voxels and one channel.
 pub(super) fn lean() -> Original {
-    original([2, 1, 1], 1, 3)
+    original([2, 1, 1], 1, 3, Packing::Flat)
 }
 
-fn original(dims: [u64; 3], channels: u16, seed: u64) -> Original {
-    let mut metadata = Metadata { dims, channels, block_edge: 3, frames: 13, windows: windows(), ..metadata() };
+fn original(dims: [u64; 3], channels: u16, seed: u64, packing: Packing) -> Original {
+    let mut metadata = Metadata { dims, channels, block_edge: 3, frames: 13, windows: windows(packing), ..metadata() };
     metadata.times = (0..13).map(|t| f64::from(t) / 2.0).collect();
     let mut blocks = blocks(&mut metadata, seed);
     let lost = blocks[1].0.id;
@@ -40,7 +40,7 @@ fn original(dims: [u64; 3], channels: u16, seed: u64) -> Original {
     Original { blocks, file, metadata, checked: RefCell::default() }
 }
 
-fn windows() -> Vec<Window> {
+fn windows(packing: Packing) -> Vec<Window> {
     let window = |first_frame, frames, basis, levels: &[u32]| Window {
         first_frame,
         frames,
@@ -50,7 +50,15 @@ fn windows() -> Vec<Window> {
         ..metadata().windows[0].clone()
     };
     let pyramid = |order: &[Axis], stencil, single| {
-        Some(Pyramid { order: order.to_vec(), stencil, growth: 1.5, most: 3.0, single })
+        Some(Pyramid {
+            order: order.to_vec(),
+            stencil,
+            growth: 1.5,
+            most: 3.0,
+            single,
+            packing,
+            ghosts: packing == Packing::Nested,
+        })
     };
     let functions = vec![32767, 0, -5, 9, 100, 200, -300, 0];
     let mut all = vec![window(0, 4, Basis::Haar, &[1, 1, 2]), window(4, 2, Basis::Multi, &[2, 1])];

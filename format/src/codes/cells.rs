@@ -1,4 +1,4 @@
-//! Quantised codes on lattices, packed by contexts.
+//! Codes packed by contexts.
 //!
 //! A cell is 2 x 2 x 2 codes. A byte says which of them are not zero. Neighbours predict how many: the activity of a
 //! cell is the number of nonzero codes in the cells before it along x, y, z and t. Bytes of cells with similar activity
@@ -12,9 +12,11 @@ mod reference;
 mod tests;
 mod unpack;
 
-pub use pack::{estimate_cells, pack_cells};
-pub use unpack::{unpack_cells, unpack_sparse_cells};
+pub(super) use pack::{estimate_cells, pack_cells};
+pub(super) use unpack::unpack_cells;
 
+use super::sparse::CodeBox;
+use super::{volume, volumes};
 use crate::segments::max_segments;
 
 /// Number of streams of significance bytes, chosen by the activity around a cell.
@@ -26,12 +28,6 @@ const SCALES: usize = 4;
 /// Number of activities: up to 8 codes in each of 4 neighbours, rounded up to a power of two so that lookups need no bounds
 /// check.
 const ACTIVITIES: usize = 64;
-
-/// Smaller symbols are values. The others give the length of a value in bits and its highest bits.
-const LONG: u32 = 128;
-
-/// Number of value symbols.
-const SYMBOLS: u32 = LONG + 4 * (32 - 8) + 4;
 
 /// Stream of significance bytes for each activity.
 static CLASS_OF: [u8; ACTIVITIES] = classes([1, 3, 8, 16]);
@@ -51,7 +47,7 @@ const fn classes(thresholds: [usize; 4]) -> [u8; ACTIVITIES] {
 }
 
 /// Number of ones in each byte: not every processor has an instruction for this.
-static ONES: [u8; 256] = {
+pub(super) static ONES: [u8; 256] = {
     let mut table = [0; 256];
     let mut i = 1;
     while i < 256 {
@@ -64,18 +60,13 @@ static ONES: [u8; 256] = {
 /// Upper bound on the packed bytes of boxes with these extents.
 ///
 /// That is a symbol for each cell, a symbol and 29 bits for each code, and a few numbers.
-pub fn max_packed(boxes: &[[usize; 4]]) -> usize {
-    let sum = |each: fn(&[usize; 4]) -> usize| boxes.iter().map(each).fold(0, usize::saturating_add);
-    let (codes, cells) = (sum(volume), sum(cells));
+pub(super) fn max_packed(boxes: &[CodeBox]) -> usize {
+    let cells = boxes.iter().map(|of| cells(&of.extents)).fold(0, usize::saturating_add);
+    let codes = volumes(boxes);
     let symbols = codes.saturating_add(cells);
     let raw = codes.saturating_mul(29).div_ceil(8);
     let lengths = 5 * (CLASSES + SCALES);
     max_segments(symbols, CLASSES + SCALES).saturating_add(raw).saturating_add(lengths)
-}
-
-/// Number of codes in a box.
-fn volume(extents: &[usize; 4]) -> usize {
-    extents.iter().fold(1, |product, &extent| product.saturating_mul(extent))
 }
 
 /// Number of cells in a box.

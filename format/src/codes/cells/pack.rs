@@ -1,22 +1,22 @@
 //! Packs codes into streams.
 
-use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, LONG, ONES, Row, SCALE_OF, SCALES, cells, volume};
+use super::super::sparse::DenseCodes;
+use super::super::values::symbol;
+use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, ONES, Row, SCALE_OF, SCALES, cells};
 use crate::bits::{BitWriter, put_varint};
-use crate::segments::{estimate_segments, pack_segments};
+use crate::segments::{Heads, estimate_segments, pack_segments};
 
-/// Packs the codes of several boxes. `codes` holds the boxes one after another, x fastest, then y, z, t.
-///
-/// `boxes[i]` are the extents of a box along x, y, z, t. `FORMAT.md` specifies the bytes.
-pub fn pack_cells(codes: &[i32], boxes: &[[usize; 4]], out: &mut Vec<u8>) {
+/// Packs the codes of several boxes. `FORMAT.md` specifies the bytes.
+pub(crate) fn pack_cells(boxes: &[DenseCodes<'_>], heads: Heads, out: &mut Vec<u8>) {
     let mut bits = Vec::new();
-    Streams::collect(codes, boxes, &mut bits).finish(out);
+    Streams::collect(boxes, &mut bits).finish(heads, out);
     out.append(&mut bits);
 }
 
 /// Estimates how many bytes [`pack_cells`] appends.
-pub fn estimate_cells(codes: &[i32], boxes: &[[usize; 4]]) -> usize {
+pub(crate) fn estimate_cells(boxes: &[DenseCodes<'_>]) -> usize {
     let mut bits = Vec::new();
-    let packed = Streams::collect(codes, boxes, &mut bits).estimate();
+    let packed = Streams::collect(boxes, &mut bits).estimate();
     packed + bits.len()
 }
 
@@ -27,19 +27,15 @@ struct Streams<'a> {
 }
 
 impl<'a> Streams<'a> {
-    fn new(bits: &'a mut Vec<u8>, boxes: &[[usize; 4]]) -> Self {
+    fn new(bits: &'a mut Vec<u8>, boxes: &[DenseCodes<'_>]) -> Self {
         let mut significance = [const { Vec::new() }; CLASSES];
-        significance[0].reserve(boxes.iter().map(cells).sum());
+        significance[0].reserve(boxes.iter().map(|of| cells(&of.at.extents)).sum());
         Self { significance, values: [const { Vec::new() }; SCALES], bits: BitWriter::new(bits) }
     }
 
-    fn collect(mut codes: &[i32], boxes: &[[usize; 4]], bits: &'a mut Vec<u8>) -> Self {
+    fn collect(boxes: &[DenseCodes<'_>], bits: &'a mut Vec<u8>) -> Self {
         let mut streams = Self::new(bits, boxes);
-        for &extents in boxes {
-            let (here, after) = codes.split_at(volume(&extents));
-            streams.add(here, extents);
-            codes = after;
-        }
+        boxes.iter().for_each(|of| streams.add(&of.contiguous(), of.at.extents));
         streams
     }
 
@@ -50,10 +46,10 @@ impl<'a> Streams<'a> {
         (streams.concat(), streams.iter().map(Vec::len).collect())
     }
 
-    fn finish(self, out: &mut Vec<u8>) {
+    fn finish(self, heads: Heads, out: &mut Vec<u8>) {
         let (symbols, lengths) = self.joined();
         lengths.iter().for_each(|&length| put_varint(length, out));
-        pack_segments(&symbols, &lengths, out);
+        pack_segments(&symbols, &lengths, heads, out);
     }
 
     /// Estimates how many bytes the streams take when packed.
@@ -110,17 +106,6 @@ impl<'a> Streams<'a> {
             left &= left - 1;
         }
     }
-}
-
-/// The symbol of a nonzero code. Writes the value's low bits, if any.
-fn symbol(code: i32, bits: &mut BitWriter) -> u8 {
-    let value = (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1);
-    if value < LONG {
-        return value as u8;
-    }
-    let low = 29 - value.leading_zeros();
-    bits.put(value & ((1 << low) - 1), low);
-    (LONG + 4 * (low - 5) + (value >> low & 3)) as u8
 }
 
 /// The four lines of codes that make up a row of cells, in the order of the significance bits.

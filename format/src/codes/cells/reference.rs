@@ -1,5 +1,7 @@
 //! A reader of lattice codes that follows `FORMAT.md` literally. It is slow and obvious, and shares no code with the fast one.
 
+use crate::pyramid::Packing;
+
 /// Reads bytes in order.
 struct Input<'a>(&'a [u8]);
 
@@ -71,10 +73,9 @@ fn frequencies(input: &mut Input, b: u64) -> Option<Vec<u64>> {
     (all.iter().sum::<u64>() == 1 << b).then_some(all)
 }
 
-fn coded(input: &mut Input, b: u64, length: u64) -> Option<Vec<u8>> {
+fn coded(input: &mut Input, b: u64, length: u64, lanes: usize) -> Option<Vec<u8>> {
     let frequencies = frequencies(input, b)?;
     let mut words = input.number()?;
-    let lanes = if length < 1024 { 1 } else { 4 };
     let mut states = (0..lanes).map(|_| input.little_endian(4)).collect::<Option<Vec<u64>>>()?;
     let mut symbols = Vec::new();
     states.iter().all(|&state| state >= 65536).then_some(())?;
@@ -95,15 +96,20 @@ fn coded(input: &mut Input, b: u64, length: u64) -> Option<Vec<u8>> {
     (words == 0 && states.iter().all(|&state| state == 65536)).then_some(symbols)
 }
 
-fn segment(input: &mut Input, left: usize) -> Option<Vec<u8>> {
+fn segment(input: &mut Input, packing: Packing, left: usize) -> Option<Vec<u8>> {
     let head = input.number()?;
-    let length = head / 4;
+    let kinds = if packing == Packing::Flat { 4 } else { 8 };
+    let length = head / kinds;
     (0 < length && length <= left as u64).then_some(())?;
-    match head % 4 {
+    let usual = if length < 1024 { 1 } else { 4 };
+    match head % kinds {
         0 => (0..length).map(|_| input.byte()).collect(),
         1 => input.byte().map(|byte| vec![byte; length as usize]),
-        2 => coded(input, 12, length),
-        _ => coded(input, 14, length),
+        2 => coded(input, 12, length, usual),
+        3 => coded(input, 14, length, usual),
+        4 => coded(input, 12, length, 32),
+        5 => coded(input, 14, length, 32),
+        _ => None,
     }
 }
 
@@ -126,7 +132,7 @@ fn value(symbol: u8, bits: &mut Bits) -> Option<i64> {
 }
 
 /// The codes of all boxes.
-pub(super) fn unpack(raw: &[u8], boxes: &[[usize; 4]]) -> Option<Vec<i32>> {
+pub(super) fn unpack(raw: &[u8], packing: Packing, boxes: &[[usize; 4]]) -> Option<Vec<i32>> {
     let mut input = Input(raw);
     let lengths = (0..9).map(|_| input.number()).collect::<Option<Vec<u64>>>()?;
     let cells = boxes.iter().map(|b| b[0].div_ceil(2) * b[1].div_ceil(2) * b[2].div_ceil(2) * b[3]).sum::<usize>();
@@ -136,7 +142,7 @@ pub(super) fn unpack(raw: &[u8], boxes: &[[usize; 4]]) -> Option<Vec<i32>> {
     let total = lengths.iter().sum::<u64>() as usize;
     let mut symbols = Vec::new();
     while symbols.len() < total {
-        symbols.extend(segment(&mut input, total - symbols.len())?);
+        symbols.extend(segment(&mut input, packing, total - symbols.len())?);
     }
     let mut symbols = symbols.into_iter();
     let streams = lengths.iter().map(|&length| symbols.by_ref().take(length as usize).collect::<Vec<u8>>());

@@ -1,0 +1,37 @@
+//! The lattice of a file, and coarser ones of it.
+
+use crate::base::error::{Error, Result};
+use crate::base::grid::{BlockGrid, Grid};
+use wavesplat_format::{Axis, Metadata, Window};
+
+/// All voxels of a file, and its blocks.
+pub(super) fn whole(m: &Metadata) -> (Grid, BlockGrid) {
+    let dims = m.dims.map(|n| n as usize);
+    (Grid { dims, spacing: m.spacing, origin: m.origin }, BlockGrid::cubes(dims, m.block_edge as usize))
+}
+
+/// Every 2^lod-th voxel along each axis, and the blocks that hold them.
+pub(super) fn coarse(m: &Metadata, lod: u32) -> Result<(Grid, BlockGrid)> {
+    let (Grid { dims, spacing, origin }, blocks) = whole(m);
+    let longest = dims.into_iter().max().unwrap_or(1);
+    if lod > longest.ilog2() {
+        let what = format!("takes 0 to {} for {longest} voxels along the longest axis", longest.ilog2());
+        return Err(Error::setting("lod", what));
+    }
+    let (every, edge) = (1 << lod, blocks.edges[0]);
+    let begin_on_lattice = edge.is_multiple_of(every) || dims.iter().all(|n| *n <= edge);
+    if !begin_on_lattice {
+        let what = format!("takes 0 to {} for blocks of {edge} voxels a side", edge.trailing_zeros());
+        return Err(Error::setting("lod", what));
+    }
+    if lod > 0 && !m.windows.iter().all(refines_space) {
+        return Err(Error::setting("lod", "takes a file whose pyramids refine x, y and z"));
+    }
+    let grid = Grid { dims: dims.map(|n| n.div_ceil(every)), spacing: spacing.map(|s| s * every as f64), origin };
+    Ok((grid, BlockGrid::cubes(grid.dims, edge.div_ceil(every))))
+}
+
+pub(super) fn refines_space(window: &Window) -> bool {
+    let refines = |order: &[Axis]| [Axis::X, Axis::Y, Axis::Z].iter().all(|axis| order.contains(axis));
+    window.pyramid.as_ref().is_none_or(|pyramid| refines(&pyramid.order))
+}
