@@ -6,9 +6,11 @@
 
 use super::buffer::clear;
 use super::check::{Compared, Tally};
+use super::codes::PooledCodes;
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::load::{Missing, load_group};
+use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
@@ -28,6 +30,19 @@ pub(super) struct Coded {
     pub(super) tally: Tally,
 }
 
+/// The codes of a block that are not zero, and how the field that they give compares with the source.
+struct Checked {
+    listed: PooledCodes,
+    tally: Tally,
+}
+
+impl Checked {
+    /// Whether outliers take a large share of the bytes.
+    fn has_many_outliers(&self) -> bool {
+        self.tally.outliers.len() * CODES_PER_OUTLIER > self.listed.count()
+    }
+}
+
 /// The samples of a block, and the codec for them.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
@@ -44,7 +59,11 @@ impl Source<'_> {
         self.size.iter().product()
     }
 
-    /// Encodes the block by a pyramid, from the samples of `outer`, which also has nodes that only predict. `codes` is the result; the fields are scratch. None if the block must be stored exactly.
+    /// Encodes the block by a pyramid, from the samples of `outer`, which also has nodes that only predict. `codes` is the
+    /// result; the fields are scratch. None if the block must be stored exactly.
+    ///
+    /// The scheme's step suits most blocks. Where so many samples miss the bound that storing them exactly takes a large
+    /// share of the bytes, finer steps are tried.
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
@@ -53,20 +72,22 @@ impl Source<'_> {
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
         let weighing = QuantizerSetup::of(self.codec, self.samples, self.missing.magnitude)?;
-        let step = self.step::<R>(pyramid, &weighing)?;
+        let mut step = self.step::<R>(pyramid, &weighing)?;
         outer.load(&weighing, source);
         let passes = self.codec.passes(pyramid, self.size);
         codes.resize(passes.codes(), 0);
         field.resize(passes.nodes().iter().product(), R::default());
-        if !passes.encode(step, (source, outer.size), (field, split), codes) {
-            return None;
-        }
-        let listed = passes.list(codes);
-        let mut tally = if self.plain() {
-            self.check_samples(field)?
-        } else {
-            self.check_series(&weighing, field, &passes.marked(&listed))?
+        let mut encode = |step| {
+            let fits = passes.encode(step, (source, outer.size), (field, split), codes);
+            fits.then(|| self.checked(&weighing, &passes, field, codes))
         };
+        let mut checked = encode(step)?;
+        let finest = step / self.codec.scheme.coarseness.max(1.0);
+        while checked.as_ref().is_none_or(Checked::has_many_outliers) && step > finest {
+            step = (step / FINER).max(finest);
+            checked = encode(step)?;
+        }
+        let Checked { listed, mut tally } = checked?;
         let outliers = tally.take_outliers(self.codec, self.samples);
         let changes = passes.changes_of_coded(step, &listed, field);
         let of_part = |(part, change): (u8, &Change)| {
@@ -75,6 +96,23 @@ impl Source<'_> {
         };
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
+    }
+
+    /// Compares the field that codes give with the source. None if too many samples miss the bound.
+    fn checked<R: Real>(
+        &self,
+        weighing: &QuantizerSetup,
+        passes: &PredictionPasses<'_>,
+        field: &[R],
+        codes: &[i32],
+    ) -> Option<Checked> {
+        let listed = passes.list(codes);
+        let tally = if self.plain() {
+            self.check_samples(field)?
+        } else {
+            self.check_series(weighing, field, &passes.marked(&listed))?
+        };
+        Some(Checked { listed, tally })
     }
 
     /// The step of the finest level. None if the block must be stored exactly.
@@ -229,6 +267,12 @@ const SAMPLING: usize = 3;
 /// A block is stored exactly if more than one sample in this many misses the bound, because an outlier takes more bytes
 /// than a sample of an exact block.
 const MOST_OUTLIERS: usize = 8;
+
+/// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.
+const CODES_PER_OUTLIER: usize = 8;
+
+/// A finer step is smaller by this factor.
+const FINER: f64 = 1.4;
 
 /// The margin subtracted from a step, relative to the largest sample, for rounding in 32-bit floats.
 const SINGLE_ROUNDING: f64 = 1.0 / (1 << 22) as f64;

@@ -71,7 +71,7 @@ impl<'a, R: Real> Trial<'a, R> {
         if !passes.encode(step, (&self.nodes, self.outer), (field, split), codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field, &passes.marked(&passes.list(codes)));
+        let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));
         let packed = |part| pyramid.packing.estimate(&passes.part_of(part, codes));
         let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.

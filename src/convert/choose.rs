@@ -1,15 +1,17 @@
 //! Chooses the scheme of a window: the one that makes some of its boxes smallest.
 //!
-//! Candidates are a learned basis along time (eq 20) with a pyramid in space, and a pyramid in space and time (eq 32).
-//! The first suits slow change and noise, the second fronts and moving things. The promising candidates are tuned:
-//! first the step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33) and the growth of steps (eq
-//! 34).
+//! Candidates are a learned basis along time (eq 20) with a pyramid in space, and pyramids in space and time (eq 32) whose
+//! passes along time come first or last. The first suits slow change and noise, the others fronts and moving things. Axes
+//! come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
+//! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33), the growth of steps (eq 34) and ghost
+//! nodes.
 
 use super::learn::learned_functions;
+use super::smoothness::{AXES, roughest_first};
 use super::{ConvertConfig, Pool};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
-use crate::base::sample::SampleType;
+use crate::base::sample::{self, SampleType};
 use crate::base::spread::evenly;
 use crate::codec::WindowCodec;
 use crate::codec::bound::{ErrorBound, Measure};
@@ -58,9 +60,9 @@ impl From<Basis> for SchemeConstraint {
     }
 }
 
-/// The largest number of samples in all boxes: as many as in a block of `block` samples, and more if that is small.
+/// The largest number of samples in all boxes, for blocks of `block` samples.
 pub(super) fn most_samples(block: usize) -> usize {
-    block.max(FEW_SAMPLES)
+    (5 * block / 4).max(FEW_SAMPLES)
 }
 
 /// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
@@ -117,17 +119,18 @@ impl SchemeSelector<'_> {
         if self.promise.delta <= 0.0 {
             return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
         }
-        let families = self.families()?;
-        match &families[..] {
-            [alone] if alone.pyramid.is_none() => Ok(alone.clone()),
-            _ if self.single() => self.smallest::<f32>(families),
-            _ => self.smallest::<f64>(families),
+        if self.config.coding.space == SpatialPredictor::Alone {
+            let (basis, functions) = (Basis::Learned, self.functions()?);
+            let coarseness = self.coarseness(COARSE);
+            return Ok(Scheme { functions, coarseness, ..Scheme::along_time(basis) });
         }
+        if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() }
     }
 
-    /// The smallest of some families and their variants; all families must have a pyramid.
-    fn smallest<R: Real + Send + Sync>(&self, families: Vec<Scheme>) -> Result<Scheme> {
+    /// The smallest of all families with a pyramid and their variants.
+    fn smallest<R: Real + Send + Sync>(&self) -> Result<Scheme> {
         let boxes = self.boxes()?;
+        let families = self.families(&self.order(&boxes))?;
         let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
         let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
@@ -203,18 +206,17 @@ impl SchemeSelector<'_> {
         self.channels[0].frames()
     }
 
-    /// Boxes spread over the volume and the channels: about one voxel in fifty, at least a few boxes, together at most
-    /// as many samples as a block.
+    /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
+    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
     fn boxes(&self) -> Result<Vec<Sampled>> {
         let dims = self.archive.grid.dims;
-        let whole: usize = dims.iter().product();
+        let voxels = dims.iter().product::<usize>() * self.channels.len();
         let least = LEAST_BOXES.max(self.channels.len());
-        let largest = if whole >= LARGE { EDGE } else { EDGE / 3 * 2 };
-        let samples = |size: [usize; 3]| size.iter().product::<usize>() * self.frames();
-        let sizes = (1..=largest).rev().map(|edge| dims.map(|n| n.min(edge)));
-        let size = sizes.into_iter().find(|size| least * samples(*size) <= self.most).unwrap_or([1; 3]);
-        let count = whole * self.channels.len() / SHARE / size.iter().product::<usize>();
-        let count = count.clamp(least, MOST_BOXES).min(self.most / samples(size)).max(1);
+        let most = (voxels / LARGEST_SHARE).min(self.most / self.frames());
+        let volume = |size: &[usize; 3]| size.iter().product::<usize>();
+        let size = EDGES.map(|edge| dims.map(|n| n.min(edge)));
+        let size = size.into_iter().find(|size| least * volume(size) <= most).unwrap_or([1; 3]);
+        let count = (voxels / SHARE / volume(&size)).clamp(least, MOST_BOXES).min(most / volume(&size)).max(1);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
@@ -236,12 +238,25 @@ impl SchemeSelector<'_> {
 
     /// The voxels that coding a box by any pyramid takes.
     fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
-        let ghosts = self.pyramid(&ORDERS[0], Stencil::Cubic).ghost_nodes(size);
+        let ghosts = self.pyramid(&AXES, Stencil::Cubic).ghost_nodes(size);
         std::array::from_fn(|axis| size[axis] + ghosts[axis])
     }
 
-    /// One scheme of each allowed kind.
-    fn families(&self) -> Result<Vec<Scheme>> {
+    /// The axes from the roughest to the smoothest.
+    fn order(&self, boxes: &[Sampled]) -> [Axis; 4] {
+        let (ty, missing) = (self.archive.sample, self.config.missing_value);
+        let values = |b: &Sampled| {
+            let mut values = vec![0.0; b.samples.len() / ty.size()];
+            sample::load(ty, &b.samples, &mut values);
+            values.iter_mut().filter(|v| sample::is_missing(**v, missing)).for_each(|v| *v = f64::NAN);
+            let [x, y, z] = b.size.known;
+            (values, [x, y, z, self.frames()])
+        };
+        roughest_first(boxes.iter().map(values), self.promise.delta)
+    }
+
+    /// One scheme with a pyramid for each allowed transform along time.
+    fn families(&self, order: &[Axis; 4]) -> Result<Vec<Scheme>> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
@@ -249,17 +264,18 @@ impl SchemeSelector<'_> {
             Some(Basis::Samples) => None,
             forced => forced,
         };
+        let in_space: Vec<Axis> = order.iter().copied().filter(|axis| *axis != Axis::T).collect();
         let mut found = Vec::new();
         if let Some(basis) = along_time {
             let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
-            let pyramid =
-                (space != SpatialPredictor::Alone).then(|| self.pyramid(&[Axis::X, Axis::Y, Axis::Z], stencil));
+            let pyramid = Some(self.pyramid(&in_space, stencil));
             found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
-        if basis.is_none_or(|b| b == Basis::Samples) && space != SpatialPredictor::Alone {
-            let coarseness = self.coarseness(1.0);
-            let pyramid = Some(self.pyramid(&ORDERS[0], stencil));
-            found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
+        if basis.is_none_or(|b| b == Basis::Samples) {
+            for order in [[&[Axis::T], &in_space[..]].concat(), [&in_space[..], &[Axis::T]].concat()] {
+                let (coarseness, pyramid) = (self.coarseness(1.0), Some(self.pyramid(&order, stencil)));
+                found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
+            }
         }
         if let Some(before) = self.before {
             let begin = |scheme: &mut Scheme| {
@@ -302,9 +318,15 @@ impl SchemeSelector<'_> {
         }
     }
 
+    /// The next order: the last two axes are those that are predicted best, and nearly equally well.
     fn orders(&self, best: &Scheme) -> Vec<Scheme> {
-        let others = if best.basis == Basis::Samples { &ORDERS[1..] } else { &[] };
-        variants(best, |p| others.iter().map(|order| Pyramid { order: order.to_vec(), ..p.clone() }).collect())
+        let swapped = |p: &Pyramid| {
+            let mut order = p.order.clone();
+            let last = order.len() - 1;
+            order.swap(last - 1, last);
+            vec![Pyramid { order, ..p.clone() }]
+        };
+        variants(best, swapped)
     }
 
     fn stencils(&self, best: &Scheme) -> Vec<Scheme> {
@@ -344,7 +366,7 @@ impl SchemeSelector<'_> {
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.frames();
-        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGE);
+        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGES[0]);
         codec.missing_value = self.config.missing_value;
         codec
     }
@@ -363,8 +385,8 @@ fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme>
 /// The number of samples that may always be read.
 const FEW_SAMPLES: usize = 1 << 17;
 
-/// The edge, in voxels, of a box for trials.
-const EDGE: usize = 30;
+/// The edges of boxes for trials, in voxels: multiples of eight have coarse lattices like those of blocks.
+const EDGES: [usize; 8] = [40, 32, 24, 16, 8, 4, 2, 1];
 
 /// One voxel in this many is used for trials.
 const SHARE: usize = 50;
@@ -373,8 +395,8 @@ const SHARE: usize = 50;
 const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
-/// From this number of voxels on, a few boxes are a small part of the volume.
-const LARGE: usize = 1 << 19;
+/// At most one voxel in this many is used for trials.
+const LARGEST_SHARE: usize = 8;
 
 /// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;
@@ -386,10 +408,6 @@ const PROMISING: f64 = 1.3;
 /// A variant is used only if it makes boxes smaller by this factor: smaller gains do not carry over to blocks, which
 /// are larger.
 const CLEARLY: f64 = 0.99;
-
-/// The orders of passes to try. Orders with x first keep rows of x contiguous in all other passes.
-const ORDERS: [[Axis; 4]; 3] =
-    [[Axis::X, Axis::Y, Axis::Z, Axis::T], [Axis::Z, Axis::Y, Axis::X, Axis::T], [Axis::T, Axis::Z, Axis::Y, Axis::X]];
 
 /// The shrinkage of steps of coarser levels, and its limit; the choice begins with the first.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];

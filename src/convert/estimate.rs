@@ -66,7 +66,7 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     let bytes = coded.bytes(source, &windows, progress)?;
     progress.finish();
     let voxels = blocks.iter().map(|block| plan.blocks.region(*block).voxels()).sum::<usize>();
-    let samples = voxels * windows.iter().map(|window| window.len()).sum::<usize>();
+    let samples = voxels * windows.iter().map(ExactSizeIterator::len).sum::<usize>();
     let all = archive.grid.whole().voxels() as f64 * frames as f64;
     let bytes = bytes as f64 * all / samples as f64;
     let ratio = all * source_archive.sample.size() as f64 / bytes.max(1.0);

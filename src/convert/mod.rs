@@ -23,6 +23,7 @@ mod record;
 #[doc(hidden)]
 pub mod sampled;
 mod settings;
+mod smoothness;
 mod task;
 mod to_file;
 

@@ -292,6 +292,13 @@ impl<'a> PredictionPasses<'a> {
         some.iter().flat_map(|some| std::iter::repeat_n(*some, self.shape[3])).collect()
     }
 
+    /// As [`Self::marked`], from all codes, pass after pass.
+    pub(crate) fn marked_codes(&self, codes: &[i32]) -> Vec<bool> {
+        let some =
+            (0..self.pyramids).map(|k| self.code_ranges(k).into_iter().any(|range| !rows::all_zero(&codes[range])));
+        some.flat_map(|some| std::iter::repeat_n(some, self.shape[3])).collect()
+    }
+
     /// As [`Self::decode_some`], for one k that is not refined with others. False if all its nodes are zero.
     pub(crate) fn decode_one<R: Real>(&self, k: usize, step: f64, codes: &SparseCodes, nodes: &mut Vec<R>) -> bool {
         let some = self.marked(codes)[k];

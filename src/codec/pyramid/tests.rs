@@ -30,7 +30,9 @@ fn some_codes(count: usize, state: &mut u64) -> Vec<i32> {
 
 /// The extents with ghost nodes: one more node behind an even number of voxels along a refined axis.
 fn with_ghosts(pyramid: &Pyramid, shape: [usize; 4]) -> [usize; 4] {
-    let ghost = |a: usize| a < 3 && pyramid.ghosts && shape[a] % 2 == 0 && pyramid.order.iter().any(|o| o.index() == a);
+    let ghost = |a: usize| {
+        a < 3 && pyramid.ghosts && shape[a].is_multiple_of(2) && pyramid.order.iter().any(|o| o.index() == a)
+    };
     std::array::from_fn(|a| shape[a] + usize::from(ghost(a)))
 }
 
