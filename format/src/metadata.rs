@@ -169,7 +169,7 @@ impl Metadata {
     }
 
     /// The record of a window's section. Panics if there is no such window.
-    pub(crate) fn window_record(&self, number: u32) -> WindowRecord {
+    pub fn window_record(&self, number: u32) -> WindowRecord {
         let window = self.windows[number as usize].without_totals();
         let first = window.first_frame as usize;
         let times = self.times.get(first..first + window.frames as usize).unwrap_or_default().to_vec();
@@ -177,7 +177,7 @@ impl Metadata {
     }
 
     /// The record of a window's end. Panics if there is no such window.
-    pub(crate) fn window_end(&self, number: u32) -> WindowEnd {
+    pub fn window_end(&self, number: u32) -> WindowEnd {
         WindowEnd::from_window(number, &self.windows[number as usize])
     }
 

@@ -151,6 +151,21 @@ impl InputArgs {
         given.into_iter().filter_map(|(name, value)| Some((name, value?)))
     }
 
+    /// The coefficient file, if that is the only input; none if the inputs are frames.
+    pub fn coefficients(&self, inputs: &[PathBuf]) -> Result<Option<CoefficientFile>> {
+        let [only] = inputs else { return Ok(None) };
+        let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");
+        if !named_so && !only.is_file() {
+            return Ok(None);
+        }
+        let foreign =
+            |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
+        match CoefficientFile::open_with(only, self.access()) {
+            Err(e) if !named_so && foreign(&e) => Ok(None),
+            file => file.map(Some),
+        }
+    }
+
     /// Opens the archive that a file was converted from, or one that continues it. Options that are not given are those
     /// stored in the file. The archive is narrowed to the file's region and to `frames`.
     pub fn open_again(

@@ -195,6 +195,18 @@ impl Encoder {
     }
 }
 
+impl Encoder {
+    /// Compresses the payload of a part.
+    pub(super) fn part(
+        &mut self,
+        kind: PartKind,
+        stats: PartStats,
+        raw: &[u8],
+    ) -> wavesplat_format::Result<EncodedPart> {
+        self.compressor.part(kind, stats, raw)
+    }
+}
+
 /// The parts of a block, with its statistics for the directory and the window's record.
 struct Parts {
     stats: BlockStats,

@@ -19,6 +19,7 @@ mod load;
 pub(crate) mod pyramid;
 pub(crate) mod real;
 mod refine;
+mod repack;
 mod rows;
 pub(crate) mod sampled_box;
 pub(crate) mod scheme;

@@ -90,10 +90,7 @@ impl Source<'_> {
         let Checked { listed, mut tally } = checked?;
         let outliers = tally.take_outliers(self.codec, self.samples);
         let changes = passes.changes_of_coded(step, &listed, field);
-        let of_part = |(part, change): (u8, &Change)| {
-            let count = passes.count(part, &listed) as u64;
-            PartStats { count, energy: change.energy(), largest: change.largest() }
-        };
+        let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
     }

@@ -2,6 +2,7 @@
 
 use super::real::Real;
 use crate::wavelet::{LANES, Lane};
+use wavesplat_format::PartStats;
 
 /// p = w0 a + w1 b + 0: adding 0 turns -0 into 0.
 #[inline(always)]
@@ -78,6 +79,12 @@ impl Change {
         }
         let largest = self.largest.into_iter().fold(0.0, f64::max);
         if largest > 0.0 { largest.next_up() } else { 0.0 }
+    }
+
+    /// The statistics of a level part of `count` codes that are not zero, if this is the change from leaving out it and all
+    /// finer ones.
+    pub(super) fn stats(&self, count: usize) -> PartStats {
+        PartStats { count: count as u64, energy: self.energy(), largest: self.largest() }
     }
 
     #[inline(always)]

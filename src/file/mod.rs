@@ -1,6 +1,6 @@
 //! The `.wspl` file and its safety: opening it, reporting what it promises, checking it, and saving what is whole.
 //!
-//! [`CoefficientFile`] is the only door to stored bytes. Nothing here writes blocks (that is
+//! [`CoefficientFile`] is the only door to stored bytes. Nothing here codes samples (that is
 //! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
 
 mod counted;
@@ -10,6 +10,7 @@ mod coefficient_file;
 pub mod report;
 pub mod verify;
 pub mod recover;
+pub mod repack;
 pub mod resume;
 
 pub(crate) use batch::BlockBatch;

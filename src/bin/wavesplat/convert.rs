@@ -10,6 +10,8 @@ use wavesplat::convert::{
     Basis, Bound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor,
     Stencil, open_partial, resume,
 };
+use wavesplat::file::CoefficientFile;
+use wavesplat::file::repack::{RepackReport, repack};
 use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{Archive, FrameSource, extensions};
 
@@ -23,11 +25,13 @@ Examples:
   wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
-  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis",
+  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
+  wavesplat convert old.wspl -o new.wspl",
     after_help = after_help()
 )]
 pub(crate) struct ConvertArgs {
-    /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
+    /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input; or a coefficient
+    /// file, to pack it as this version does, with the same samples
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Coefficient file to write, or - for standard output
@@ -39,9 +43,9 @@ pub(crate) struct ConvertArgs {
     /// Continue an unfinished earlier run of this command, to the same bytes
     #[arg(long, help_heading = "Output")]
     resume: bool,
-    /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit
-    #[arg(long, value_name = "X", default_value_t = 0.01, value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
-    tolerance: f64,
+    /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit [default: 0.01]
+    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    tolerance: Option<f64>,
     /// Error that the tolerance limits
     #[arg(long, value_enum, default_value = "pointwise", help_heading = ERROR_BOUND)]
     bound: BoundName,
@@ -165,6 +169,9 @@ enum MissingName {
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;
+    if let Some(file) = args.input.coefficients(&args.inputs)? {
+        return args.repack(&file);
+    }
     let config = args.config()?;
     let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
     spare_inputs(&args.inputs, &args.output)?;
@@ -224,12 +231,55 @@ impl ConvertArgs {
         Ok(())
     }
 
+    /// Packs a coefficient file anew.
+    fn repack(&self, file: &CoefficientFile) -> Result<()> {
+        self.refuse_for_coefficients(file.path())?;
+        spare_inputs(&self.inputs, &self.output)?;
+        refuse_other_format(&self.output)?;
+        let mut out = Output::create(&self.output, self.force)?;
+        let progress = self.common.progress("convert", "blocks");
+        let report = repack(file, (self.level, self.common.memory.0), &self.output, &mut out, &progress)?;
+        out.commit_if(resume::check)?;
+        let RepackReport { frames, input_bytes, output_bytes, .. } = report;
+        self.common.note(format_args!("{frames} frames, {input_bytes} -> {output_bytes} bytes, with the same samples"));
+        self.common.report(&report, self.output == Path::new(STANDARD))
+    }
+
+    /// Options of a conversion would have no effect on a coefficient file.
+    fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
+        let given = [
+            (self.tolerance.is_some(), "--tolerance"),
+            (!matches!(self.bound, BoundName::Pointwise), "--bound"),
+            (self.range.is_some(), "--range"),
+            (self.missing.is_some(), "--missing"),
+            (self.missing_value.is_some(), "--missing-value"),
+            (self.floor.is_some(), "--floor"),
+            (self.samples.is_some(), "--samples"),
+            (self.seed.is_some(), "--seed"),
+            (self.transfer_function.is_some(), "--transfer-function"),
+            (!matches!(self.basis, BasisName::Auto), "--basis"),
+            (self.space.is_some(), "--space"),
+            (self.window.is_some(), "--window"),
+            (self.block.is_some(), "--block"),
+            (self.select.frames.is_some(), "--frames"),
+            (self.select.region.is_some(), "--region"),
+            (self.resume, "--resume"),
+        ];
+        match given.into_iter().find(|(given, _)| *given) {
+            Some((_, name)) => Err(Error::usage(format!(
+                "{}: is a coefficient file, whose samples stay as they are; {name} is for frames",
+                path.display()
+            ))),
+            None => self.input.refuse_for_coefficients(),
+        }
+    }
+
     fn config(&self) -> Result<ConvertConfig> {
         let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
         Ok(ConvertConfig {
             coding: self.coding()?,
             window: self.window.unwrap_or(window),
-            tolerance: self.tolerance,
+            tolerance: self.tolerance.unwrap_or(TOLERANCE),
             bound: self.bound()?,
             range: self.range()?,
             missing: match (self.missing, self.missing_value) {
@@ -323,6 +373,9 @@ impl ConvertArgs {
         given.chain(self.input.settings().map(|(name, value)| (name.to_string(), value))).collect()
     }
 }
+
+/// The default tolerance.
+const TOLERANCE: f64 = 0.01;
 
 /// The default number of pixels on each face, as in the paper.
 const SAMPLES: u32 = 300;

@@ -48,21 +48,9 @@ pub(crate) fn run(args: &InfoArgs) -> Result<()> {
 impl InfoArgs {
     /// The coefficient file, or none if the inputs are frames.
     fn coefficients(&self) -> Result<Option<CoefficientFile>> {
-        let [only] = self.inputs.as_slice() else { return Ok(None) };
-        let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");
-        if !named_so && !only.is_file() {
-            return Ok(None);
-        }
-        let foreign =
-            |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-        match CoefficientFile::open_with(only, self.input.access()) {
-            Err(e) if !named_so && foreign(&e) => Ok(None),
-            file => {
-                let file = file?;
-                self.refuse_for_coefficients(only)?;
-                Ok(Some(file))
-            }
-        }
+        let Some(file) = self.input.coefficients(&self.inputs)? else { return Ok(None) };
+        self.refuse_for_coefficients(file.path())?;
+        Ok(Some(file))
     }
 
     fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
