@@ -14,8 +14,9 @@ use wavesplat::convert::{
 };
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
+use wavesplat::file::repack::repack;
 use wavesplat::file::verify::verify;
-use wavesplat_format::{CompletePrefix, Metadata};
+use wavesplat_format::{CompletePrefix, Metadata, Packing, Window};
 use xxhash_rust::xxh3::xxh3_64;
 
 fn folder() -> PathBuf {
@@ -82,6 +83,11 @@ fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
     );
     let sampled = Bound::Sampled { samples: 30, seed: 1 };
     add("sampled", Kind::Wave, Mask::None, ConvertConfig { bound: sampled, ..plain(Basis::Haar) });
+    // Version 1.1: nested parts, and ghost nodes.
+    add("nested-samples", Kind::Wave, Mask::None, plain(Basis::Samples));
+    add("nested-learned", Kind::Wave, Mask::None, plain(Basis::Learned));
+    add("nested-missing", Kind::Mixed, Mask::Special, pyramid(Basis::Samples, Stencil::Cubic, 1e-3));
+    add("nested-double", Kind::Wave, Mask::None, pyramid(Basis::Haar, Stencil::Linear, 1e-7));
     found
 }
 
@@ -93,6 +99,36 @@ fn window(basis: Basis) -> usize {
 fn source(seed: usize, (ty, kind, mask): (SampleType, Kind, Mask)) -> Memory {
     let grid = Grid { dims: [11, 7, 6], spacing: [1.0, 0.5, 2.0], origin: [0.0, -1.0, 3.0] };
     Memory::new(grid, ty, volume(kind, ty, mask, grid.whole().voxels(), 20, seed as u64))
+}
+
+/// Packing a file anew changes no sample, no statistics and no lost block.
+#[test]
+fn golden_files_are_packed_anew_with_the_same_samples() {
+    let work = tempfile::tempdir().unwrap();
+    for (name, digest) in digests() {
+        let (old, mut bytes) = (open(&folder().join(format!("{name}.wspl"))), Vec::new());
+        let report = repack(&old, (3, MEMORY), Path::new("new.wspl"), &mut bytes, &Silent).unwrap();
+        assert_eq!((report.output_bytes, report.frames), (bytes.len() as u64, old.frames() as u64), "{name}");
+        let path = work.path().join(format!("{name}.wspl"));
+        fs::write(&path, &bytes).unwrap();
+        let new = open(&path);
+        let has_pyramid = new.metadata().windows.iter().any(|window| window.pyramid.is_some());
+        assert_eq!(new.metadata().packing() == Packing::Nested, has_pyramid, "{name}");
+        assert!(has_pyramid || new.id() == old.id() || name == "lost", "{name}");
+        assert_eq!(totals(&new), totals(&old), "{name}");
+        assert_eq!(verify(&new, None, MEMORY, &Silent).unwrap().damaged, u64::from(name == "lost"), "{name}");
+        let new = if name == "lost" { new.skip_damaged().unwrap() } else { new };
+        assert_eq!(xxh3_64(&extracted(&new)), digest, "{name}");
+    }
+}
+
+/// Of each window what does not depend on packing.
+fn totals(file: &CoefficientFile) -> Vec<(u64, [f64; 6], [u64; 4])> {
+    let of_window = |w: &Window| {
+        let reals = [w.delta, w.reached, w.share, w.squared_error, w.min, w.max];
+        (w.digest, reals, [w.missing, w.coded, w.outliers, w.frames.into()])
+    };
+    file.metadata().windows.iter().map(of_window).collect()
 }
 
 /// Ids of older files follow from another rule; what continues such a file keeps its id and its windows.

@@ -13,6 +13,7 @@ mod cli;
 mod coefficients;
 mod common;
 mod composite;
+mod detail;
 mod determinism;
 mod every_float;
 mod expected;

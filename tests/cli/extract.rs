@@ -143,3 +143,54 @@ fn converting_an_extraction_of_all_types_works() {
         work.wavesplat("verify l.wspl --against t.npy").ok();
     }
 }
+
+#[test]
+fn a_coarse_lattice_is_every_few_voxels() {
+    let work = Work::with_file("--block 8");
+    let (_, all) = read_npy(&work.wavesplat("extract a.wspl -o -").ok().out);
+    let (header, coarse) = read_npy(&work.wavesplat("extract a.wspl --lod 2 -o -").ok().out);
+    assert!(header.contains("(40, 3, 4, 5)"), "{header}");
+    let of_voxel = |t: usize, [x, y, z]: [usize; 3]| all[4 * (x + 20 * (y + 14 * (z + 10 * t)))..][..4].to_vec();
+    let thinned = |frames: std::ops::Range<usize>, [xs, ys, zs]: [std::ops::Range<usize>; 3]| -> Vec<u8> {
+        let on = |range: std::ops::Range<usize>| range.filter(|n| n.is_multiple_of(4)).collect::<Vec<_>>();
+        let (xs, ys, zs) = (on(xs), on(ys), on(zs));
+        let rows = frames.flat_map(|t| zs.iter().flat_map(move |z| [(t, *z)])).collect::<Vec<_>>();
+        let voxels = rows.iter().flat_map(|(t, z)| ys.iter().map(move |y| (*t, *y, *z)));
+        voxels.flat_map(|(t, y, z)| xs.iter().flat_map(move |x| of_voxel(t, [*x, y, z])).collect::<Vec<_>>()).collect()
+    };
+    assert!(coarse == thinned(0..40, [0..20, 0..14, 0..10]));
+    let some = work.wavesplat("extract a.wspl --lod 2 --region 3:20,1:9,4:10 --frames 7:9 -o -").ok();
+    assert!(read_npy(&some.out).1 == thinned(7..9, [3..20, 1..9, 4..10]));
+    work.wavesplat("extract a.wspl --lod 2 --region 1:4,:,: -o b.npy").fails(2, &["--region", "no voxel", "--lod 2"]);
+    work.wavesplat("extract a.wspl --lod 4 -o b.npy").fails(2, &["--lod", "takes 0 to 3", "blocks of 8"]);
+    work.wavesplat("extract a.wspl --lod 2 -o b.nrrd").ok();
+    let nrrd = work.read("b.nrrd");
+    let spacing = nrrd.windows(7).any(|word| word == b"(4,0,0)");
+    assert!(spacing, "{}", String::from_utf8_lossy(&nrrd[..400]));
+}
+
+#[test]
+fn coefficient_files_are_packed_anew() {
+    let work = Work::with_file("");
+    let golden = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/samples-u16.wspl");
+    work.write("old.wspl", std::fs::read(golden).unwrap());
+    let told = work.wavesplat("convert old.wspl -o new.wspl --json").ok().json();
+    assert_eq!(told["output_bytes"], work.read("new.wspl").len());
+    work.wavesplat("verify new.wspl").ok();
+    work.wavesplat("extract old.wspl -o old.npy").ok();
+    work.wavesplat("extract new.wspl -o new.npy").ok();
+    assert!(work.read("old.npy") == work.read("new.npy"));
+    assert!(work.wavesplat("convert a.wspl -o -").ok().out == work.read("a.wspl"), "this version's files stay");
+    work.wavesplat("convert old.wspl -o new.wspl").fails(2, &["new.wspl", "exists"]);
+    work.wavesplat("convert old.wspl -o old.wspl --force").fails(2, &["old.wspl"]);
+    for option in ["--tolerance 0.1", "--block 4", "--frames 1:2", "--resume", "--basis haar", "--dims 1x2x3"] {
+        let name = option.split(' ').next().unwrap();
+        work.wavesplat(&format!("convert old.wspl -o b.wspl {option}")).fails(2, &[name, "is for frames"]);
+    }
+    let mut damaged = work.read("old.wspl");
+    let place = damaged.windows(4).position(|bytes| bytes == b"BLCK").unwrap();
+    damaged[place + 100..place + 300].fill(7);
+    work.write("damaged.wspl", damaged);
+    work.wavesplat("convert damaged.wspl -o b.wspl").fails(3, &["damaged.wspl", "block"]);
+    assert!(!work.names().contains(&"b.wspl".to_string()));
+}

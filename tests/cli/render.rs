@@ -220,3 +220,26 @@ fn the_report_is_json() {
     assert_eq!(run.out.len(), 40 * 48 * 40 * 3, "data alone");
     assert!(run.err.contains("\"stated_splat_error\""));
 }
+
+#[test]
+fn a_coarse_picture_has_the_framing_of_the_whole() {
+    let work = Work::with_file("--block 8");
+    let picture = |work: &Work, more: &str| {
+        let size = if more.contains("--size") { "" } else { SIZE };
+        let command = format!("a.wspl {size} --frames 2,38 --range 0,1 {more} -o all.npy --force");
+        work.render(&command).ok();
+        floats(&read_npy(&work.read("all.npy")).1)
+    };
+    for mode in ["", "--mode emission", "--mode mip", "--mode composite", "--region 2:18,:,1:9"] {
+        let whole = picture(&work, mode);
+        let coarse = picture(&work, &format!("{mode} --lod 1"));
+        assert_eq!(coarse.len(), whole.len(), "{mode}");
+        let largest = whole.iter().fold(0.0, |largest: f32, v| largest.max(v.abs()));
+        let off: f32 = whole.iter().zip(&coarse).map(|(a, b)| (a - b).abs()).sum::<f32>() / whole.len() as f32;
+        assert!(off > 0.0 && off < 0.08 * largest, "{mode}: {off} of {largest}");
+    }
+    let few_pixels = |more: &str| picture(&work, &format!("--size 12x10 {more}"));
+    assert_eq!(few_pixels("--lod auto"), few_pixels("--lod 1"));
+    work.render("a.wspl -o b.npy --lod 9").fails(2, &["--lod", "takes 0 to"]);
+    work.render("a.npy -o b.npy --lod 1").fails(2, &["--lod", "coefficient file"]);
+}
