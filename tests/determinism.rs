@@ -86,9 +86,9 @@ const DIGESTS: [u64; 13] = [
     0x3311_c8c2_79a8_2898,
     0x3a6d_17b8_41d0_c072,
     0xd9c2_8b2a_905c_7fae,
-    0x981c_6a15_e8e4_dbab,
-    0xe4eb_c41b_3f5e_6c1d,
-    0x821a_8292_1518_e42c,
+    0xe752_248b_885d_10e6,
+    0xbf81_1941_1aff_e382,
+    0x2daa_0501_850a_96d8,
 ];
 
 #[test]

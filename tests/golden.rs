@@ -114,7 +114,6 @@ fn golden_files_are_packed_anew_with_the_same_samples() {
         let new = open(&path);
         let has_pyramid = new.metadata().windows.iter().any(|window| window.pyramid.is_some());
         assert_eq!(new.metadata().packing() == Packing::Nested, has_pyramid, "{name}");
-        assert!(has_pyramid || new.id() == old.id() || name == "lost", "{name}");
         assert_eq!(totals(&new), totals(&old), "{name}");
         assert_eq!(verify(&new, None, MEMORY, &Silent).unwrap().damaged, u64::from(name == "lost"), "{name}");
         let new = if name == "lost" { new.skip_damaged().unwrap() } else { new };

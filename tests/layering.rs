@@ -40,6 +40,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 22] = [
             "extract/mod.rs",
             "file/batch.rs",
             "file/coefficient_file.rs",
+            "file/repack.rs",
             "file/verify.rs",
             "cli/common.rs",
         ],

@@ -24,7 +24,7 @@ fn failed(file: &[u8], synced: usize, random: &mut Random) -> Vec<u8> {
         match random.below(8) {
             0 => left[start..end].fill(0),
             1 => left[start..end].fill_with(|| random.bits() as u8), // the disk's earlier content
-            2 => left[start..start + random.below(end - start)].fill(0),
+            2 => left[start..start + random.below((end - start).max(1))].fill(0),
             3 if page > synced / PAGE => left.copy_within(start - PAGE..end - PAGE, start),
             _ => {}
         }

@@ -188,9 +188,9 @@ fn coefficient_files_are_packed_anew() {
         work.wavesplat(&format!("convert old.wspl -o b.wspl {option}")).fails(2, &[name, "is for frames"]);
     }
     let mut damaged = work.read("old.wspl");
-    let place = damaged.windows(4).position(|bytes| bytes == b"BLCK").unwrap();
-    damaged[place + 100..place + 300].fill(7);
+    let place = damaged.windows(4).position(|bytes| bytes == b"LEAF").unwrap();
+    damaged[place + 30] ^= 1;
     work.write("damaged.wspl", damaged);
-    work.wavesplat("convert damaged.wspl -o b.wspl").fails(3, &["damaged.wspl", "block"]);
+    work.wavesplat("convert damaged.wspl -o b.wspl").fails(3, &["damaged.wspl", "directory"]);
     assert!(!work.names().contains(&"b.wspl".to_string()));
 }
