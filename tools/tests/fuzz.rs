@@ -109,7 +109,7 @@ fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
 }
 
 #[test]
-#[ignore = "makes the seeds of the corpus anew"]
+#[ignore = "makes missing seeds and inputs of the corpus"]
 fn seeds_are_made() {
     let mut multi = case(SampleType::F64, Basis::Multi, 5, 0.02);
     multi.config.bound = Bound::Rms;
@@ -122,10 +122,12 @@ fn seeds_are_made() {
         ("channels", blocks(&exact, 3, 2)),
         ("leaves", blocks(&exact, 520, 1)),
         ("exact", exact),
+        ("nested", nested(Basis::Samples, SampleType::F32)),
+        ("ghosts", nested(Basis::Learned, SampleType::F64)),
     ];
     let mut corpus = Vec::new();
     for (name, file) in &files {
-        fs::write(folder("seeds").join(format!("{name}.wspl")), file).unwrap();
+        keep(&folder("seeds").join(format!("{name}.wspl")), file);
         if *name != "leaves" {
             corpus.push(("file", name.to_string(), file.clone()));
             let metadata = Reader::open(file).unwrap().metadata().encode().unwrap();
@@ -138,7 +140,21 @@ fn seeds_are_made() {
     for (target, name, bytes) in corpus {
         let folder = folder("corpus").join(target);
         fs::create_dir_all(&folder).unwrap();
-        fs::write(folder.join(name), bytes).unwrap();
+        keep(&folder.join(name), &bytes);
+    }
+}
+
+/// A file of version 1.1 whose blocks have ghost nodes.
+fn nested(basis: Basis, sample: SampleType) -> Vec<u8> {
+    let mut case = case(sample, basis, 9, 1e-3);
+    case.config.block = Some(4);
+    case.convert().unwrap()
+}
+
+/// Writes a file that is missing or empty. Others stay: they are of earlier versions.
+fn keep(path: &Path, bytes: &[u8]) {
+    if fs::read(path).is_ok_and(|held| held.is_empty()) || !path.exists() {
+        fs::write(path, bytes).unwrap();
     }
 }
 
@@ -149,6 +165,11 @@ fn changes(corpus: &mut Corpus) {
     for seed in 0..SEEDS.len() as u8 {
         let edit = [2 * seed, 0, 20 * seed, 0, seed + 3, 1];
         let name = SEEDS[usize::from(seed)].0.to_string();
+        for (azimuth, mode) in [(30, 0), (0, 1), (200, 2)] {
+            let picture = [seed, mode, mode + seed, azimuth, seed];
+            corpus.push(("render", format!("{name}-{azimuth}"), picture.to_vec()));
+            corpus.push(("render", format!("{name}-{azimuth}-edit"), [&picture[..], &edit].concat()));
+        }
         for target in ["forged", "decode"] {
             corpus.push((target, name.clone(), [&[seed][..], &edit].concat()));
             corpus.push((target, format!("{name}-twice"), [&[seed][..], &edit, &[4, 0, 16, 0, 5, 4]].concat()));

@@ -11,6 +11,8 @@ use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig};
+use wavesplat::view::camera::View;
 use wavesplat_format::*;
 
 /// Limits for reading a file: decompressed bytes, and blocks.
@@ -54,18 +56,25 @@ pub fn forged(data: &[u8]) {
     }
 }
 
-/// The same, decoded to samples by the library: some frames of all voxels, and one voxel of all frames.
+/// Opens a file as the library does; none if it is refused or would take too long.
+fn small(path: &Path) -> Option<CoefficientFile> {
+    let file = CoefficientFile::open_with(path, Access::Read).ok()?;
+    let long = |window: &Window| window.frames.max(window.coefficients) > 64;
+    let voxels = file.grid.dims.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).unwrap_or(usize::MAX);
+    let large = file.largest_block() > 1 << 16 || voxels > 1 << 16 || file.metadata().windows.iter().any(long);
+    (!large).then_some(file)
+}
+
+/// The same, decoded to samples by the library: some frames of all voxels, and one voxel of all frames. The number of the
+/// seed also says the level of detail.
 pub fn decode(data: &[u8]) {
     let mut input = Input::new(data);
-    let (_, seed) = seed(input.byte());
+    let number = input.byte();
+    let (_, seed) = seed(number);
     let file = seed.forge(&edits(&mut input));
     with_file(&file, |path| {
-        let Ok(file) = CoefficientFile::open_with(path, Access::Read) else { return };
-        let long = |window: &Window| window.frames.max(window.coefficients) > 64;
-        let voxels = file.grid.dims.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).unwrap_or(usize::MAX);
-        if file.largest_block() > 1 << 16 || voxels > 1 << 16 || file.metadata().windows.iter().any(long) {
-            return; // would take too long
-        }
+        let lod = u32::from(number) / 64;
+        let Some(Ok(file)) = small(path).map(|file| file.with_detail(lod)) else { return };
         let whole = file.grid.whole();
         let corner = Region { start: whole.end.map(|end| end - 1), end: whole.end };
         for (frames, region) in [(file.frames().min(9), whole), (file.frames().min(999), corner)] {
@@ -75,6 +84,25 @@ pub fn decode(data: &[u8]) {
                 assert_eq!(out.len(), frames * region.voxels() * file.sample().size());
             }
         }
+    });
+}
+
+/// The same, drawn by the library: a few frames in a small picture, by any mode and level of detail.
+pub fn render(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (_, seed) = seed(input.byte());
+    let [lod, mode, how] = std::array::from_fn(|_| input.byte());
+    let view = View { size: [12, 10], ..View::new(f64::from(input.byte()), f64::from(how) - 90.0) };
+    let file = seed.forge(&edits(&mut input));
+    with_file(&file, |path| {
+        let Some(Ok(file)) = small(path).map(|file| file.with_detail(u32::from(lod % 3))) else { return };
+        let frames = (0..file.frames().min(9)).collect();
+        let mut scene = CoefficientScene::from(file);
+        let plain = RenderConfig::new(&scene, view);
+        let mode = if mode % 3 == 0 { Mode::Mip { slices: None } } else { Mode::Projection };
+        let (quick, certify) = (how % 2 == 1, how % 4 == 2);
+        let config = RenderConfig { mode, frames, quick, certify, memory: 256 << 20, ..plain };
+        let _ = wavesplat::render::render(&mut scene, &config, &Silent, &mut |_| Ok(()));
     });
 }
 

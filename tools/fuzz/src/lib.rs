@@ -17,7 +17,7 @@ pub mod values;
 pub type Target = fn(&[u8]);
 
 /// Every target by name; its folders in `corpus/` and `regressions/` have the same name.
-pub const TARGETS: [(&str, Target); 13] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("file", files::file),
     ("metadata", files::metadata),
     ("codes", payloads::codes),
@@ -25,6 +25,7 @@ pub const TARGETS: [(&str, Target); 13] = [
     ("payloads", payloads::payloads),
     ("forged", files::forged),
     ("decode", files::decode),
+    ("render", files::render),
     ("prefix", files::prefix),
     ("recovery", files::recovery),
     ("roundtrip", series::roundtrip),

@@ -4,7 +4,7 @@ use super::forge::Seed;
 use std::sync::OnceLock;
 
 /// Their names and bytes, as `tools/tests/fuzz.rs` makes them.
-pub const SEEDS: [(&str, &[u8]); 7] = [
+pub const SEEDS: [(&str, &[u8]); 9] = [
     ("haar", include_bytes!("../seeds/haar.wspl")),
     ("multi", include_bytes!("../seeds/multi.wspl")),
     ("learned", include_bytes!("../seeds/learned.wspl")),
@@ -12,6 +12,8 @@ pub const SEEDS: [(&str, &[u8]); 7] = [
     ("exact", include_bytes!("../seeds/exact.wspl")),
     ("channels", include_bytes!("../seeds/channels.wspl")),
     ("leaves", include_bytes!("../seeds/leaves.wspl")),
+    ("nested", include_bytes!("../seeds/nested.wspl")),
+    ("ghosts", include_bytes!("../seeds/ghosts.wspl")),
 ];
 
 /// A file by its number, modulo how many there are.
