@@ -22,6 +22,8 @@
 //! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So one
 //! k can be decoded and splatted without the others.
 
+mod corrections;
+mod detail;
 mod refine;
 mod stages;
 mod stencil;
@@ -33,6 +35,7 @@ use super::codes::PooledCodes;
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::wavelet;
+use corrections::{Correction, Decoding, Encoding};
 use refine::gather;
 use stages::{Stages, Step};
 use std::ops::Range;
@@ -81,84 +84,6 @@ impl<'a> PredictionPasses<'a> {
         let place = |of: &PassBox| PlacedBox { of: Some(*of), part: of.part, at: new.placed(of), every: [1; 3] };
         new.boxes = pyramid.boxes(&new.passes).iter().map(place).collect();
         new
-    }
-
-    /// The passes over every 2^lod-th node along the axes x, y and z, and over all along k, of a block.
-    ///
-    /// Of the passes in space, those of finer levels add none of them, but the finest drop what only predicts. Passes along
-    /// time add some in every level.
-    pub(crate) fn with_detail(pyramid: &'a Pyramid, size: [usize; 3], k: usize, lod: u32) -> Self {
-        let whole = Self::new(pyramid, size, k);
-        if lod == 0 {
-            return whole;
-        }
-        let every = |pass: &Pass, a: usize| if a < 3 { pass.strides[a].max(1 << lod) } else { pass.strides[a] };
-        let step = |pass: &Pass| {
-            let lattice: [usize; 4] = std::array::from_fn(|a| pass.limits[a].div_ceil(every(pass, a)));
-            let [_, _, _, added] = pass.extent();
-            match pass.axis {
-                Some(Axis::T) => Step { axis: pass.axis, lattice, added: [lattice[0], lattice[1], lattice[2], added] },
-                _ if has_nodes(pass, lod) => Step { lattice, ..Step::from(pass) },
-                axis => Step { axis, lattice, added: [0; 4] },
-            }
-        };
-        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, lod)).collect();
-        let steps: Vec<Step> = kept.iter().map(|pass| step(pass)).collect();
-        let coarse = |pass: &&Pass| Pass {
-            strides: std::array::from_fn(|a| every(pass, a) >> if a < 3 { lod } else { 0 }),
-            ..**pass
-        };
-        let passes: Vec<Pass> = kept.iter().map(coarse).collect();
-        let stages = Stages::new(pyramid.stencil, &steps);
-        let [x, y, z] = size.map(|n| n.div_ceil(1 << lod));
-        let shape = [x, y, z, whole.shape[3]];
-        let mut new = Self { pyramid, shape, pyramids: whole.pyramids, passes, steps, boxes: Vec::new(), stages };
-        new.boxes = whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod)).collect();
-        new
-    }
-
-    /// A box of all nodes, as it is read for these.
-    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32) -> PlacedBox {
-        let (pass, part) = (whole.passes[of.pass], of.part);
-        let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
-        let left_out = PlacedBox { of: None, part, at, every: [1; 3] };
-        if !has_nodes(&pass, lod) {
-            return left_out;
-        }
-        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, lod)).count();
-        let apart: [usize; 3] = std::array::from_fn(|a| of.every[a] * pass.strides[a]);
-        let every = apart.map(|apart| (1_usize << lod).div_ceil(apart));
-        if every == [1; 3] {
-            let every = std::array::from_fn(|a| (apart[a] >> lod) / self.passes[number].strides[a]);
-            let own = PassBox { pass: number, every: every.map(|n: usize| n.max(1)), ..*of };
-            at = self.placed(&own);
-            return PlacedBox { of: Some(own), part, at, every: [1; 3] };
-        }
-        if of.allowed != 0xFF {
-            return left_out; // the coarser nodes are in another box
-        }
-        PlacedBox { of: Some(PassBox { pass: number, every: [1; 3], ..*of }), part, at, every }
-    }
-
-    /// Leaves out codes of finer nodes, and puts the others in their places.
-    fn thin(&self, codes: &mut SparseCodes) {
-        if self.boxes.iter().all(|of| of.of.is_some() && of.every == [1; 3]) {
-            return;
-        }
-        let of_runs: Vec<&PlacedBox> =
-            self.boxes.iter().flat_map(|of| std::iter::repeat_n(of, of.at.extents[3])).collect();
-        codes.map_places(|run, place| {
-            let PlacedBox { of, at, every, .. } = of_runs[run];
-            let of = of.as_ref()?;
-            if *every == [1; 3] {
-                return Some(place);
-            }
-            let ([x, y, _, _], place) = (at.extents, place as usize);
-            let node = [place % x, place / x % y, place / (x * y)];
-            let (first, strides) = self.stages.places(of.pass);
-            let kept = (0..3).all(|a| node[a].is_multiple_of(every[a]));
-            kept.then(|| (first + (0..3).map(|a| node[a] / every[a] * strides[a]).sum::<usize>()) as u32)
-        });
     }
 
     /// The number of nodes along x, y, z and k.
@@ -441,16 +366,6 @@ impl<'a> PredictionPasses<'a> {
     }
 }
 
-/// Whether a pass adds nodes at multiples of `2^lod` along x, y and z.
-fn has_nodes(pass: &Pass, lod: u32) -> bool {
-    pass.level >= lod || pass.axis.is_none_or(|axis| axis == Axis::T)
-}
-
-/// Whether a pass is kept for these nodes: it adds some, or drops those that only predict.
-fn is_kept(pass: &Pass, lod: u32) -> bool {
-    has_nodes(pass, lod) || pass.level == 0
-}
-
 /// The parts of a slice at ascending ranges.
 fn apart<'a>(codes: &'a mut [i32], ranges: &[Range<usize>]) -> Vec<&'a mut [i32]> {
     let (mut rest, mut start) = (codes, 0);
@@ -460,58 +375,4 @@ fn apart<'a>(codes: &'a mut [i32], ranges: &[Range<usize>]) -> Vec<&'a mut [i32]
         part
     };
     ranges.iter().map(part).collect()
-}
-
-/// What becomes of predicted nodes: codes are added, or computed.
-trait Correction<R> {
-    /// Corrects consecutive nodes that a pass adds, from number `first` of them on.
-    fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]);
-
-    /// Completes a slice of the lattice after a pass: the `slice`-th of those that it adds nodes to.
-    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]);
-}
-
-/// Adds the codes of a pyramid to complete slices, times the step of their level (eq 32).
-struct Decoding<'a, R> {
-    codes: &'a SparseCodes,
-    /// For each pass the step, and the first run of each of its boxes.
-    passes: Vec<(R, Vec<usize>)>,
-}
-
-impl<R: Real> Correction<R> for Decoding<'_, R> {
-    #[inline(always)]
-    fn correct(&mut self, _: usize, _: usize, _: &mut [R]) {}
-
-    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
-        let (step, runs) = &self.passes[pass];
-        for run in runs {
-            let (places, values) = self.codes.run(run + slice);
-            for (place, code) in places.iter().zip(values) {
-                let node = &mut nodes[*place as usize];
-                *node = *node + R::of_code(*code) * *step;
-            }
-        }
-    }
-}
-
-/// Computes the codes of a pyramid, and turns predictions into decoded nodes (eq 32).
-struct Encoding<'a, R> {
-    /// The source's nodes, pass after pass.
-    split: &'a [R],
-    /// The codes of each pass.
-    codes: Vec<&'a mut [i32]>,
-    /// For each pass its first node in `split`, its step and the inverse of that.
-    passes: Vec<(usize, [R; 2])>,
-    /// Whether all codes fit.
-    fits: bool,
-}
-
-impl<R: Real> Correction<R> for Encoding<'_, R> {
-    #[inline(always)]
-    fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]) {
-        let (start, steps) = self.passes[pass];
-        self.fits &= rows::encode(&self.split[start + first..], predicted, &mut self.codes[pass][first..], steps);
-    }
-
-    fn complete(&mut self, _: usize, _: usize, _: &mut [R]) {}
 }

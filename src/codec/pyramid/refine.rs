@@ -4,7 +4,7 @@
 //! An axis divides an array into `outer` parts, each of `evens` or `kept + odds` rows of `inner` nodes. Refining copies
 //! the rows of even nodes apart from each other, and predicts the odd rows between them (eq 33).
 
-use super::Correction;
+use super::corrections::Correction;
 use super::stencil::{predict_line, taps};
 use crate::codec::real::Real;
 use wavesplat_format::Stencil;

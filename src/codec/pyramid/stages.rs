@@ -4,7 +4,7 @@
 //! A stage refines slices in space and then, if there is a pass along time, adds the slices between them. Arrays hold
 //! `[slice][z][y][x]`, each the lattice as far as it is refined. Before a pass along time, slices lie at even places.
 
-use super::Correction;
+use super::corrections::Correction;
 use super::refine::{Rows, refine_across, refine_lines, refine_slices};
 use super::stencil::taps;
 use crate::codec::buffer::Buffer;

@@ -1,0 +1,59 @@
+//! What becomes of predicted nodes: codes are added to them (decoding), or computed from them (encoding).
+
+use crate::codec::real::Real;
+use crate::codec::rows;
+use wavesplat_format::SparseCodes;
+
+/// What becomes of predicted nodes: codes are added, or computed.
+pub(super) trait Correction<R> {
+    /// Corrects consecutive nodes that a pass adds, from number `first` of them on.
+    fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]);
+
+    /// Completes a slice of the lattice after a pass: the `slice`-th of those that it adds nodes to.
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]);
+}
+
+/// Adds the codes of a pyramid to complete slices, times the step of their level (eq 32).
+pub(super) struct Decoding<'a, R> {
+    pub(super) codes: &'a SparseCodes,
+    /// For each pass the step, and the first run of each of its boxes.
+    pub(super) passes: Vec<(R, Vec<usize>)>,
+}
+
+impl<R: Real> Correction<R> for Decoding<'_, R> {
+    #[inline(always)]
+    fn correct(&mut self, _: usize, _: usize, _: &mut [R]) {}
+
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
+        let (step, runs) = &self.passes[pass];
+        for run in runs {
+            let (places, values) = self.codes.run(run + slice);
+            for (place, code) in places.iter().zip(values) {
+                let node = &mut nodes[*place as usize];
+                *node = *node + R::of_code(*code) * *step;
+            }
+        }
+    }
+}
+
+/// Computes the codes of a pyramid, and turns predictions into decoded nodes (eq 32).
+pub(super) struct Encoding<'a, R> {
+    /// The source's nodes, pass after pass.
+    pub(super) split: &'a [R],
+    /// The codes of each pass.
+    pub(super) codes: Vec<&'a mut [i32]>,
+    /// For each pass its first node in `split`, its step and the inverse of that.
+    pub(super) passes: Vec<(usize, [R; 2])>,
+    /// Whether all codes fit.
+    pub(super) fits: bool,
+}
+
+impl<R: Real> Correction<R> for Encoding<'_, R> {
+    #[inline(always)]
+    fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]) {
+        let (start, steps) = self.passes[pass];
+        self.fits &= rows::encode(&self.split[start + first..], predicted, &mut self.codes[pass][first..], steps);
+    }
+
+    fn complete(&mut self, _: usize, _: usize, _: &mut [R]) {}
+}
