@@ -8,7 +8,7 @@ use crate::header::HEADER;
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::pyramid::Packing;
+use crate::pyramid::{Packing, check_packing};
 use crate::reader::read_header;
 use crate::section::{SectionExtent, SectionId, decompress, section_at};
 use crate::structure::check_padding;
@@ -92,6 +92,7 @@ impl CompletePrefix {
         let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
         let (extent, end) = plain_at(storage, self.id, section, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
+            .and_then(|record| check_packing(&record.window, self.packing).map(|()| record))
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not at the end of its window".into()));
