@@ -13,17 +13,16 @@ pub(super) fn whole(m: &Metadata) -> (Grid, BlockGrid) {
 /// Every 2^lod-th voxel along each axis, and the blocks that hold them.
 pub(super) fn coarse(m: &Metadata, lod: u32) -> Result<(Grid, BlockGrid)> {
     let (Grid { dims, spacing, origin }, blocks) = whole(m);
-    let longest = dims.into_iter().max().unwrap_or(1);
-    if lod > longest.ilog2() {
-        let what = format!("takes 0 to {} for {longest} voxels along the longest axis", longest.ilog2());
+    let (longest, edge) = (dims.into_iter().max().unwrap_or(1), blocks.edges[0]);
+    // Several blocks must begin on the lattice.
+    let of_blocks = if longest <= edge { u32::MAX } else { edge.trailing_zeros() };
+    let coarsest = longest.ilog2().min(of_blocks);
+    if lod > coarsest {
+        let why = if coarsest == of_blocks { ("blocks of", edge) } else { ("a longest axis of", longest) };
+        let what = format!("takes at most {coarsest} for {} {} voxels", why.0, why.1);
         return Err(Error::setting("lod", what));
     }
-    let (every, edge) = (1 << lod, blocks.edges[0]);
-    let begin_on_lattice = edge.is_multiple_of(every) || dims.iter().all(|n| *n <= edge);
-    if !begin_on_lattice {
-        let what = format!("takes 0 to {} for blocks of {edge} voxels a side", edge.trailing_zeros());
-        return Err(Error::setting("lod", what));
-    }
+    let every = 1 << lod;
     if lod > 0 && !m.windows.iter().all(refines_space) {
         return Err(Error::setting("lod", "takes a file whose pyramids refine x, y and z"));
     }

@@ -50,7 +50,8 @@ pub struct RenderReport {
     pub blocks_hidden: u64,
     /// The parts that a looser tolerance left out of the blocks in the region, over all windows touched.
     pub left_out: LeftOut,
-    /// The parts that were not read because only unrequested frames need them.
+    /// The parts that were not read because only unrequested frames or finer levels of
+    /// detail need them.
     pub other_frames: LeftOut,
     /// Error bound of every splatted sample against the source.
     pub certified_sample_error: f64,

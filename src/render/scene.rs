@@ -186,7 +186,7 @@ pub struct Selection {
     pub empty: u64,
     /// The parts that a looser tolerance leaves out.
     pub left_out: LeftOut,
-    /// The parts that only unrequested frames need.
+    /// The parts that only unrequested frames or finer levels of detail need.
     pub other_frames: LeftOut,
     /// Error bound of every sample against the source, in the unit of samples.
     pub certified: f64,

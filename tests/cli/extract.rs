@@ -162,7 +162,7 @@ fn a_coarse_lattice_is_every_few_voxels() {
     let some = work.wavesplat("extract a.wspl --lod 2 --region 3:20,1:9,4:10 --frames 7:9 -o -").ok();
     assert!(read_npy(&some.out).1 == thinned(7..9, [3..20, 1..9, 4..10]));
     work.wavesplat("extract a.wspl --lod 2 --region 1:4,:,: -o b.npy").fails(2, &["--region", "no voxel", "--lod 2"]);
-    work.wavesplat("extract a.wspl --lod 4 -o b.npy").fails(2, &["--lod", "takes 0 to 3", "blocks of 8"]);
+    work.wavesplat("extract a.wspl --lod 4 -o b.npy").fails(2, &["--lod", "takes at most 3", "blocks of 8"]);
     work.wavesplat("extract a.wspl --lod 2 -o b.nrrd").ok();
     let nrrd = work.read("b.nrrd");
     let spacing = nrrd.windows(7).any(|word| word == b"(4,0,0)");

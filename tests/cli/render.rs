@@ -244,6 +244,10 @@ fn a_coarse_picture_has_the_framing_of_the_whole() {
     let few_pixels = |more: &str| picture(&work, &format!("--size 12x10 {more}"));
     let bits = |picture: Vec<f32>| picture.into_iter().map(f32::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(few_pixels("--lod auto")), bits(few_pixels("--lod 1")));
-    work.render("a.wspl -o b.npy --lod 9").fails(2, &["--lod", "takes 0 to"]);
+    work.render("a.wspl -o b.npy --lod 9").fails(2, &["--lod", "takes at most 3"]);
+    work.render("a.wspl -o b.npy --region 1:2,:,: --lod 1").fails(2, &["--region", "no voxel with --lod 1"]);
+    let told = work.render("a.wspl --size 12x10 --frames 2 --lod auto -o b.npy --json").ok();
+    assert!(told.err.contains("--lod auto takes level 1 of 3"), "{}", told.err);
+    assert_eq!(told.json()["picture"]["lod"], 1);
     work.render("a.npy -o b.npy --method direct --lod 1").fails(2, &["--lod", "coefficient file"]);
 }

@@ -2,11 +2,11 @@
 
 use crate::args::{Cli, ErrorName, MethodName, QuantityName};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
+use wavesplat::base::grid::{Grid, Region};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::range_bound;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{Quantity, RenderConfig, Scene, default_splat_error};
+use wavesplat::render::{Mode, Quantity, RenderConfig, Scene, default_splat_error};
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
 use wavesplat_format::Metadata;
@@ -18,6 +18,16 @@ fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
         Ok(View { scale: Some(camera.scale), center: Some(camera.beside(0.0)), ..*view })
     };
     views.iter().map(fixed).collect()
+}
+
+/// A mode whose opacities apply over the largest spacing of all voxels, whatever the level of detail.
+fn of_whole(mode: Mode, whole: &Grid) -> Mode {
+    match mode {
+        Mode::Composite { transfer, unit: None, slices } => {
+            Mode::Composite { transfer, unit: Some(whole.largest_spacing()), slices }
+        }
+        other => other,
+    }
 }
 
 impl Cli {
@@ -42,15 +52,25 @@ impl Cli {
                 QuantityName::Emission => Quantity::Emission,
             },
             frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
-            region: self.region.map(|r| r.resolve(&whole)).transpose()?.map(|region| region.every(1 << lod)),
+            region: self.region_of(&whole, lod)?,
             splat_error,
             quick: self.fast,
             allowed,
             limited: self.error.into(),
             certify: self.error_image.is_some(),
-            mode: self.along.mode(colours)?,
+            mode: of_whole(self.along.mode(colours)?, &whole),
             memory: self.common.memory.0,
         })
+    }
+
+    /// The voxels to render, of those that a level of detail has.
+    fn region_of(&self, whole: &Grid, lod: u32) -> Result<Option<Region>> {
+        let Some(region) = self.region.map(|r| r.resolve(whole)).transpose()? else { return Ok(None) };
+        let region = region.every(1 << lod);
+        if region.is_empty() {
+            return Err(Error::usage(format!("--region: holds no voxel with --lod {lod}")));
+        }
+        Ok(Some(region))
     }
 
     /// The sample error that `--tolerance` allows, in the unit of the samples.

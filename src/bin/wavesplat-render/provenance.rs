@@ -65,6 +65,7 @@ impl Cli {
         let reached = m.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         let certified = config.limited == Limit::Certified && !self.skip_damaged;
         Provenance {
+            lod: Some(file.lod()).filter(|lod| *lod > 0),
             sample_error: certified.then(|| config.allowed.unwrap_or(0.0).max(reached)),
             file_id: Some(file.id().to_string()),
             file_promise: Some(BoundReport::new(m.bound, m.tolerance, m.range()).promise),

@@ -44,6 +44,9 @@ impl Cli {
         self.along.check(false, self.colour.is_asked())?;
         let file = CoefficientFile::open_with(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
         let lod = self.level_of_detail(&file)?;
+        if self.lod == Detail::Auto {
+            self.common.note(format_args!("--lod auto takes level {lod} of {}", file.coarsest_detail()));
+        }
         let file = file.with_detail(lod)?;
         let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
         let what = match self.method {

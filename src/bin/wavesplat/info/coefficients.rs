@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
-use wavesplat::convert::{Bound, options};
+use wavesplat::convert::{Bound, Packing, options};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::{BoundReport, WindowReport};
 use wavesplat::source::CHANNELS;
@@ -14,6 +14,8 @@ use wavesplat::source::CHANNELS;
 #[derive(Debug, Serialize)]
 struct Info {
     id: String,
+    /// The version of the format that a reader needs.
+    format: &'static str,
     bytes: u64,
     dims: [u64; 3],
     spacing: [f64; 3],
@@ -57,7 +59,9 @@ impl Info {
         let voxels: u64 = m.dims.iter().product();
         let windows: Vec<WindowReport> =
             m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
+        let nested = m.packing() == Packing::Nested;
         Self {
+            format: if nested { "1.1" } else { "1.0" },
             id: file.id().to_string(),
             bytes: file.bytes(),
             dims: m.dims,
@@ -100,7 +104,7 @@ impl Info {
              bound      {}: {}\n\
              reached    at most {share:.4} of the bound; largest sample error {reached:.4e}\n\
              content    {per_sample:.4} coefficients per sample, {} outliers, {} missing samples\n\
-             id         {} ({})\n",
+             id         {} ({}, format {})\n",
             self.spacing,
             self.origin,
             self.sample,
@@ -115,7 +119,8 @@ impl Info {
             self.outliers,
             self.missing,
             self.id,
-            self.program
+            self.program,
+            self.format
         );
         let unit = |name: &str| self.settings.iter().find(|(n, _)| n == name).map(|(_, unit)| unit.as_str());
         if let [first, .., last] | [first @ last] = self.times.as_slice() {
