@@ -24,6 +24,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 22] = [
         "rayon::",
         &[
             "convert/mod.rs",
+            "convert/plan.rs",
             "convert/choose.rs",
             "convert/sampled.rs",
             "source/scan.rs",

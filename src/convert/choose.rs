@@ -212,7 +212,9 @@ impl SchemeSelector<'_> {
         let dims = self.archive.grid.dims;
         let voxels = dims.iter().product::<usize>() * self.channels.len();
         let least = LEAST_BOXES.max(self.channels.len());
-        let most = (voxels / LARGEST_SHARE).min(self.most / self.frames());
+        // Double precision takes more memory.
+        let most = if self.single() { self.most } else { self.most / 3 * 2 };
+        let most = (voxels / LARGEST_SHARE).min(most / self.frames());
         let volume = |size: &[usize; 3]| size.iter().product::<usize>();
         let size = EDGES.map(|edge| dims.map(|n| n.min(edge)));
         let size = size.into_iter().find(|size| least * volume(size) <= most).unwrap_or([1; 3]);

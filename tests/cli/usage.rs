@@ -92,7 +92,7 @@ fn an_extension_without_a_format_is_refused_with_the_known_ones() {
     let remedy = "for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: .npy, .nrrd";
     work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", remedy, ".vti"]);
     work.piped("convert - -o b.wspl", &[7; 300]).fails(2, &["-:", "--dims"]);
-    work.wavesplat("convert a.wspl -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);
+    work.wavesplat("convert a.wspl a.npy -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "in.xyz"]);
 }
 
