@@ -140,7 +140,7 @@ fn golden_files_are_continued_under_their_own_id() {
         let (id, windows) = (unfinished.id(), unfinished.metadata().windows.clone());
         let kept = golden[..unfinished.bytes() as usize].to_vec();
         assert!(!windows.is_empty(), "{name}: whole windows are left");
-        let begun = Some(PartialFile { complete: unfinished, first_window: windows.len() });
+        let begun = Some(PartialFile { complete: unfinished, first_window: windows.len(), description: None });
         let mut bytes = kept.clone();
         resume(&mut source(seed, (ty, kind, mask)), &config, begun, Path::new("a.wspl"), &mut bytes, &Silent).unwrap();
         let work = tempfile::tempdir().unwrap();

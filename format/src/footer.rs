@@ -21,22 +21,27 @@ pub(crate) struct Footer {
     pub(crate) root: SectionExtent,
     pub(crate) blocks: u64,
     pub(crate) leaves: u64,
+    pub(crate) description: Option<SectionExtent>,
 }
 
 impl Footer {
+    /// The section before the footer.
+    pub(crate) fn last(&self) -> &SectionExtent {
+        self.description.as_ref().unwrap_or(&self.root)
+    }
+
     pub(crate) fn encode(&self) -> Vec<u8> {
         let mut out = Vec::with_capacity(FOOTER);
         out.put(&self.id.0);
         out.put_u64(self.total);
-        for extent in [self.metadata, self.root] {
-            out.put_u64(extent.offset);
-            out.put_u32(extent.stored_len);
-            out.put_u32(extent.raw_len);
-            out.put_u64(extent.checksum);
-        }
+        put_extent(&self.metadata, &mut out);
+        put_extent(&self.root, &mut out);
         out.put_u64(self.blocks);
         out.put_u64(self.leaves);
-        out.put(&[0; 24]);
+        match &self.description {
+            Some(extent) => put_extent(extent, &mut out),
+            None => out.put(&[0; EXTENT]),
+        }
         out.put_u64(xxh3_64(&out));
         out.put(&END_MAGIC);
         out
@@ -58,11 +63,24 @@ impl Footer {
             root: extent(&mut fields)?,
             blocks: fields.u64()?,
             leaves: fields.u64()?,
+            description: extent(&mut fields).map(|extent| Some(extent).filter(|extent| *extent != ABSENT))?,
         };
-        fields.reserved::<24>()?;
         fields.end()?;
         Ok(footer)
     }
+}
+
+/// Bytes of a section's extent.
+const EXTENT: usize = 24;
+
+/// The extent of a section that the file lacks.
+const ABSENT: SectionExtent = SectionExtent { offset: 0, stored_len: 0, raw_len: 0, checksum: 0 };
+
+fn put_extent(extent: &SectionExtent, out: &mut Vec<u8>) {
+    out.put_u64(extent.offset);
+    out.put_u32(extent.stored_len);
+    out.put_u32(extent.raw_len);
+    out.put_u64(extent.checksum);
 }
 
 fn extent(fields: &mut FieldReader<'_>) -> ParseResult<SectionExtent> {

@@ -15,14 +15,43 @@ pub(crate) const MAGIC: [u8; 8] = [0x89, b'W', b'S', b'P', 0x0D, 0x0A, 0x1A, 0x0
 /// The version of files without features.
 pub(crate) const VERSION: (u16, u16) = (1, 0);
 
-/// The version of files with nested parts.
-const NESTED_VERSION: (u16, u16) = (1, 1);
+/// The version of files with any feature.
+const FEATURES_VERSION: (u16, u16) = (1, 1);
 
 /// The required features that this reader supports, by bit, as messages for readers that do not.
-const REQUIRED: [&str; 1] = ["nested parts (version 1.1 of the format): wavesplat 0.2 or later"];
+const REQUIRED: [&str; 2] = [
+    "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
+    "a description (version 1.1 of the format): wavesplat 0.2 or later",
+];
 
 /// The bit of [`Packing::Nested`].
-pub(crate) const NESTED: u64 = 1;
+const NESTED: u64 = 1;
+
+/// The bit of a description.
+const DESCRIBED: u64 = 2;
+
+/// The required features of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Features {
+    /// How codes may be packed.
+    pub packing: Packing,
+    /// Whether the file has a description.
+    pub described: bool,
+}
+
+impl Features {
+    /// The field `required` of the header.
+    pub(crate) fn bits(self) -> u64 {
+        let nested = if self.packing == Packing::Nested { NESTED } else { 0 };
+        nested | if self.described { DESCRIBED } else { 0 }
+    }
+}
+
+impl From<Packing> for Features {
+    fn from(packing: Packing) -> Self {
+        Self { packing, described: false }
+    }
+}
 
 /// The fields of a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,18 +68,18 @@ pub(crate) struct Header {
 const NEEDS: usize = 72;
 
 impl Header {
-    /// The header of a new file whose codes may be packed in a way.
-    pub(crate) fn new(id: FileId, packing: Packing) -> Self {
-        let (version, required, needs) = match packing {
-            Packing::Flat => (VERSION, 0, String::new()),
-            Packing::Nested => (NESTED_VERSION, NESTED, REQUIRED[0].into()),
-        };
-        Self { version, required, optional: 0, id, needs }
+    /// The header of a new file with these features.
+    pub(crate) fn new(id: FileId, features: Features) -> Self {
+        let required = features.bits();
+        let version = if required == 0 { VERSION } else { FEATURES_VERSION };
+        let needs = (0..REQUIRED.len()).find(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
+        Self { version, required, optional: 0, id, needs: needs.into() }
     }
 
-    /// How codes may be packed.
-    pub(crate) fn packing(&self) -> Packing {
-        if self.required & NESTED == 0 { Packing::Flat } else { Packing::Nested }
+    /// The features that it announces.
+    pub(crate) fn features(&self) -> Features {
+        let packing = if self.required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
+        Features { packing, described: self.required & DESCRIBED != 0 }
     }
 
     pub(crate) fn encode(&self) -> Vec<u8> {
@@ -151,7 +180,7 @@ mod tests {
 
     #[test]
     fn versions_and_features_are_refused_by_name() {
-        let good = Header::new(FileId([7; 16]), Packing::Flat);
+        let good = Header::new(FileId([7; 16]), Packing::Flat.into());
         assert_eq!(decode(&good).expect("valid"), good);
         let newer = decode(&Header { version: (2, 3), ..good.clone() });
         assert!(matches!(newer, Err(Error::Unsupported(what)) if what.contains("2.3")));
@@ -166,7 +195,7 @@ mod tests {
     #[test]
     fn reserved_bytes_must_be_zero() {
         let mut bytes: [u8; HEADER] =
-            Header::new(FileId([7; 16]), Packing::Flat).encode().try_into().expect("128 bytes");
+            Header::new(FileId([7; 16]), Packing::Flat.into()).encode().try_into().expect("128 bytes");
         bytes[12] = 1;
         let checksum = xxh3_64(&bytes[..120]).to_le_bytes();
         bytes[120..].copy_from_slice(&checksum);

@@ -8,6 +8,7 @@ mod bits;
 mod block;
 mod bytes;
 mod codes;
+mod description;
 mod directory;
 mod error;
 mod file_id;
@@ -40,10 +41,14 @@ mod writer;
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 pub use codes::max_packed;
 pub use codes::sparse::{CodeBox, DenseCodes, SparseCodes};
+pub use description::{
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Numbers, Orientation, Values, Variable,
+};
 pub use directory::{BlockEntry, PartEntry};
 pub use error::{Error, Result};
 pub use file_id::FileId;
 pub use geometry::BlockGeometry;
+pub use header::Features;
 pub use leaf::LeafEntry;
 pub use metadata::{Bound, Metadata};
 pub use payload::{

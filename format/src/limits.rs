@@ -33,6 +33,12 @@ pub const MAX_FRAMES: u64 = 1 << 53;
 /// Bytes of the metadata record: room for two million time values, small enough to hold several times.
 pub const MAX_METADATA: usize = 16 << 20;
 
+/// Bytes of the description record before compression: coordinates of large grids fit, fields do not.
+pub const MAX_DESCRIPTION: usize = MAX_METADATA;
+
+/// Dimensions, axes, variables and attributes of a description together.
+pub const MAX_DESCRIPTION_ITEMS: usize = 1 << 16;
+
 /// Bytes of the root of the directory before compression: 8 million leaves.
 pub const MAX_ROOT_RAW: u64 = 1 << 30;
 

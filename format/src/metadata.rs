@@ -2,7 +2,7 @@
 
 use crate::bytes::{FieldWriter, ParseResult, ensure, finite_amount};
 use crate::file_id::FileId;
-use crate::header::{HEADER, NESTED};
+use crate::header::{Features, HEADER};
 use crate::limits::*;
 use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
@@ -148,16 +148,16 @@ impl Metadata {
     }
 
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the
-    /// first window, and with nested parts by the header's required features (FORMAT.md, section 3). The same settings and
+    /// first window, and with any feature by the header's required features (FORMAT.md, section 3). The same settings and
     /// samples give the same id everywhere.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the metadata cannot be encoded.
-    pub fn file_id(&self, first_digest: u64, packing: Packing) -> Result<FileId> {
+    pub fn file_id(&self, first_digest: u64, features: Features) -> Result<FileId> {
         let mut bytes = self.start().encode()?;
         bytes.put_u64(first_digest);
-        if packing == Packing::Nested {
-            bytes.put_u64(NESTED);
+        if features.bits() != 0 {
+            bytes.put_u64(features.bits());
         }
         Ok(FileId(xxh3_128(&bytes).to_le_bytes()))
     }

@@ -4,11 +4,11 @@ use crate::block::BlockId;
 use crate::bytes::{FieldReader, ensure};
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
 use crate::file_id::FileId;
-use crate::header::HEADER;
+use crate::header::{Features, HEADER};
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::pyramid::{Packing, check_packing};
+use crate::pyramid::check_packing;
 use crate::reader::read_header;
 use crate::section::{SectionExtent, SectionId, decompress, section_at};
 use crate::structure::check_padding;
@@ -19,8 +19,8 @@ use crate::{Result, Storage};
 #[derive(Debug, Clone)]
 pub struct CompletePrefix {
     pub(crate) id: FileId,
-    /// How codes may be packed.
-    pub(crate) packing: Packing,
+    /// The features that the header announces.
+    pub(crate) features: Features,
     /// Metadata of the complete windows; without frames if there are none.
     pub(crate) metadata: Metadata,
     /// The offset at which the last complete window ends.
@@ -46,10 +46,10 @@ impl CompletePrefix {
     /// The header or the start is not intact, so that nothing can be continued; or the storage fails.
     pub fn read(storage: &impl Storage) -> Result<Self> {
         let header = read_header(storage)?;
-        let (id, packing) = (header.id, header.packing());
+        let (id, features) = (header.id, header.features());
         let (extent, record) = plain_at(storage, id, SectionId::Start, HEADER as u64, MAX_METADATA)?;
         let metadata = Metadata::parse_start(&record).map_err(|what| SectionId::Start.corrupt(HEADER as u64, what))?;
-        let mut prefix = Self { id, packing, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
+        let mut prefix = Self { id, features, metadata, end: extent.end(), leaves: Vec::new(), stored: 0 };
         loop {
             match prefix.read_window(storage) {
                 Ok(()) => {}
@@ -64,9 +64,9 @@ impl CompletePrefix {
         self.id
     }
 
-    /// How the codes of further windows may be packed.
-    pub fn packing(&self) -> Packing {
-        self.packing
+    /// The features of the file, which further windows may use.
+    pub fn features(&self) -> Features {
+        self.features
     }
 
     /// The metadata of the complete windows; without frames if there are none.
@@ -92,7 +92,7 @@ impl CompletePrefix {
         let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
         let (extent, end) = plain_at(storage, self.id, section, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
-            .and_then(|record| check_packing(&record.window, self.packing).map(|()| record))
+            .and_then(|record| check_packing(&record.window, self.features.packing).map(|()| record))
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not at the end of its window".into()));

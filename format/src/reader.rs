@@ -4,13 +4,14 @@
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::codes::sparse::{CodeBox, SparseCodes};
+use crate::description::Description;
 use crate::directory::{BlockEntry, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
 use crate::geometry::BlockGeometry;
 use crate::header::{HEADER, Header, check_magic};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
-use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::pyramid::check_packing;
@@ -43,8 +44,10 @@ impl<S: Storage> Reader<S> {
         let header = read_header(&storage)?;
         let footer = read_footer(&storage, header.id)?;
         let metadata = read_metadata(&storage, &footer)?;
-        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, header.packing()));
+        let packing = header.features().packing;
+        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, packing));
         packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
+        check_announced(&header, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;
         Ok(Self { storage, index: Arc::new(Index { footer, metadata, leaves }) })
     }
@@ -69,6 +72,21 @@ impl<S: Storage> Reader<S> {
     /// The file's identity.
     pub fn id(&self) -> FileId {
         self.index.footer.id
+    }
+
+    /// Reads what the source says beside its samples; `None` if the file has no description.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`] if the description is damaged, [`Error::Io`] if the storage fails.
+    pub fn description(&self) -> Result<Option<Description>> {
+        let (section, Some(extent)) = (SectionId::Description, self.index.footer.description) else { return Ok(None) };
+        let corrupt = |what: String| section.corrupt(extent.offset, what);
+        if extent.raw_len as usize > MAX_DESCRIPTION {
+            return Err(corrupt(format!("{} bytes, at most {MAX_DESCRIPTION}", extent.raw_len)));
+        }
+        let stored = read_section(&self.storage, self.id(), section, &extent)?;
+        let raw = decompress(&stored, extent.raw_len).map_err(corrupt)?;
+        Description::parse(&raw, self.metadata()).map(Some).map_err(corrupt)
     }
 
     /// The storage that holds the file's bytes.
@@ -358,14 +376,23 @@ fn explain(storage: &impl Storage, what: String) -> String {
     }
 }
 
+/// Checks that header and footer agree about a description.
+fn check_announced(header: &Header, footer: &Footer) -> Result<()> {
+    let agree = header.features().described == footer.description.is_some();
+    let corrupt = |what| Error::Corrupt { offset: footer.total - FOOTER as u64, place: "footer".into(), what };
+    ensure(agree, || "header and footer disagree about a description".into()).map_err(corrupt)
+}
+
 fn read_metadata(storage: &impl Storage, footer: &Footer) -> Result<Metadata> {
     let (extent, section) = (footer.metadata, SectionId::Metadata);
     let corrupt = |what: String| section.corrupt(extent.offset, what);
     let sized = extent.stored_len == extent.raw_len && extent.raw_len as usize <= MAX_METADATA;
     ensure(sized, || format!("{} bytes, at most {MAX_METADATA}", extent.raw_len)).map_err(corrupt)?;
+    let last = footer.last();
     let placed = align(extent.end()) == footer.root.offset
-        && align(footer.root.end()).checked_add(FOOTER as u64) == Some(footer.total);
-    ensure(placed, || "metadata, root and footer do not follow each other".into()).map_err(corrupt)?;
+        && footer.description.is_none_or(|description| align(footer.root.end()) == description.offset)
+        && align(last.end()).checked_add(FOOTER as u64) == Some(footer.total);
+    ensure(placed, || "metadata, root, description and footer do not follow each other".into()).map_err(corrupt)?;
     let record = read_section(storage, footer.id, section, &extent)?;
     Metadata::parse(&record).map_err(|what| section.corrupt(extent.offset + FRAME as u64, what))
 }

@@ -3,11 +3,13 @@
 
 use crate::block::{BlockId, EncodedBlock, EncodedPart};
 use crate::bytes::{FieldReader, ParseResult, ensure};
+use crate::description::Description;
 use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::FOOTER;
+use crate::header::Features;
 use crate::leaf::{LeafEntry, MIN_BLOCK, leaves_of};
-use crate::limits::{BLOCKS_PER_LEAF, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
+use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_PARTS, MAX_WINDOW_FRAMES};
 use crate::metadata::Metadata;
 use crate::reader::{check_payload, read_footer, read_header};
 use crate::section::{FRAME, SectionId, decompress, read, section_at};
@@ -35,6 +37,8 @@ pub struct Recovery {
     left_behind: u64,
     /// Whether metadata or a footer were found; these say how many windows there are.
     all_known: bool,
+    /// The description, if it was found and fits the metadata.
+    description: Option<Description>,
 }
 
 /// The result of recovering a damaged file.
@@ -62,10 +66,12 @@ struct FoundSections {
     ends: BTreeMap<u32, WindowEnd>,
     blocks: BTreeMap<BlockId, u64>,
     leaves: BTreeMap<BlockId, u64>,
+    /// The record of the description.
+    description: Option<Vec<u8>>,
 }
 
 /// The tags that the search looks for.
-const TAGS: [&[u8; 4]; 6] = [b"STRT", b"WNDW", b"BLCK", b"LEAF", b"WEND", b"META"];
+const TAGS: [&[u8; 4]; 7] = [b"STRT", b"WNDW", b"BLCK", b"LEAF", b"WEND", b"META", b"DESC"];
 
 /// Largest ratio of the new file's least possible size to the damaged file's size. Forged records may claim lost blocks
 /// without limit.
@@ -137,7 +143,8 @@ impl Recovery {
     /// # Errors
     /// [`Error::Io`] if the storage or writing fails.
     pub fn write<W: Write>(&self, storage: &impl Storage, out: W, done: &mut dyn FnMut()) -> Result<(W, Recovered)> {
-        let mut writer = Writer::new(out, self.id, &self.metadata)?;
+        let features = Features { packing: self.metadata.packing(), described: self.description.is_some() };
+        let mut writer = Writer::with_features(out, self.id, &self.metadata, features)?;
         let mut lost = Vec::new();
         for window in 0..self.metadata.windows.len() as u32 {
             writer.begin_window(self.metadata.window_record(window))?;
@@ -161,7 +168,7 @@ impl Recovery {
             }
             writer.end_window(&self.end(end))?;
         }
-        let (out, summary) = writer.finish()?;
+        let (out, summary) = writer.finish_described(self.description.as_ref())?;
         let (undescribed, left_behind, all_known) = (self.undescribed.clone(), self.left_behind, self.all_known);
         Ok((out, Recovered { summary, lost, undescribed, left_behind, all_known }))
     }
@@ -260,6 +267,7 @@ impl FoundSections {
                 self.blocks.entry(block).or_insert(at);
             }
             b"LEAF" => return self.add_leaf(storage, id, at),
+            b"DESC" => self.add_description(storage, id, at)?,
             b"WNDW" => {
                 let record = WindowRecord::parse(&read_numbered(storage, id, tag, at, SectionId::Window)?)
                     .map_err(Error::Invalid)?;
@@ -291,8 +299,17 @@ impl FoundSections {
         Ok(true)
     }
 
+    /// Adds the description. Only the last one in the file can be that of all windows.
+    fn add_description(&mut self, storage: &impl Storage, id: FileId, at: u64) -> Result<()> {
+        let section = SectionId::Description;
+        let (extent, stored) = section_at(storage, id, section, at, max_stored(b"DESC"))?;
+        ensure(extent.raw_len as usize <= MAX_DESCRIPTION, || "too long".into()).map_err(Error::Invalid)?;
+        self.description = Some(decompress(&stored, extent.raw_len).map_err(Error::Invalid)?);
+        Ok(())
+    }
+
     fn assemble(self, id: Option<FileId>, len: u64) -> Result<Recovery> {
-        let Self { start, metadata, mut windows, mut ends, blocks, leaves } = self;
+        let Self { start, metadata, mut windows, mut ends, blocks, leaves, description } = self;
         for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
             windows.entry(number).or_insert_with(|| m.window_record(number));
             ends.entry(number).or_insert_with(|| m.window_end(number));
@@ -319,7 +336,8 @@ impl FoundSections {
             return Err(unrecoverable("no window was begun"));
         }
         let left_behind = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
-        Ok(Recovery { id, metadata: all, ends, undescribed, blocks, leaves, left_behind, all_known })
+        let description = description.and_then(|record| Description::parse(&record, &all).ok());
+        Ok(Recovery { id, metadata: all, ends, undescribed, blocks, leaves, left_behind, all_known, description })
     }
 }
 
@@ -332,7 +350,7 @@ fn claimed_len(storage: &impl Storage, tag: &[u8; 4], at: u64) -> u64 {
     let Ok(frame) = read(storage, SectionId::Root, at, FRAME as u64) else { return 0 };
     let (mut fields, max) = (FieldReader::new(&frame[4..]), max_stored(tag) as u64);
     let (Ok(stored_len), Ok(raw_len)) = (fields.u32(), fields.u32()) else { return 0 };
-    let raw_len = if tag == b"LEAF" { u64::from(raw_len) } else { 0 };
+    let raw_len = if matches!(tag, b"LEAF" | b"DESC") { u64::from(raw_len) } else { 0 };
     let end = at.saturating_add(stored_len.into());
     if u64::from(stored_len).max(raw_len) > max || end > storage.len() { 0 } else { raw_len + u64::from(stored_len) }
 }

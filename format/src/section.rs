@@ -51,6 +51,7 @@ pub(crate) enum SectionId {
     Start,
     Window(u32),
     WindowEnd(u32),
+    Description,
 }
 
 impl SectionId {
@@ -66,6 +67,7 @@ impl SectionId {
             Self::Start => (none, [20, 0]),
             Self::Window(window) => (BlockId { window, ..none }, [21, 0]),
             Self::WindowEnd(window) => (BlockId { window, ..none }, [22, 0]),
+            Self::Description => (none, [23, 0]),
         }
     }
 
@@ -80,6 +82,7 @@ impl SectionId {
             Self::Start => *b"STRT",
             Self::Window(_) => *b"WNDW",
             Self::WindowEnd(_) => *b"WEND",
+            Self::Description => *b"DESC",
         }
     }
 
@@ -110,6 +113,7 @@ impl fmt::Display for SectionId {
             Self::Metadata => f.write_str("metadata"),
             Self::Root => f.write_str("directory root"),
             Self::Start => f.write_str("start"),
+            Self::Description => f.write_str("description"),
             Self::Window(window) => write!(f, "beginning of window {window}"),
             Self::WindowEnd(window) => write!(f, "end of window {window}"),
         }

@@ -1,4 +1,5 @@
-//! Checks the bytes that reading does not need: start, window sections, window's ends, block headers and padding.
+//! Checks the bytes that reading does not need: start, window sections, window's ends, block headers, description and
+//! padding.
 
 use crate::directory::BlockEntry;
 use crate::header::HEADER;
@@ -9,7 +10,7 @@ use crate::section::{FRAME, SectionExtent, SectionId, frame, read};
 use crate::{Error, Result, Storage};
 
 impl<S: Storage> Reader<S> {
-    /// Checks start, window sections, window's ends and the padding outside leaves. Together with [`Reader::open`], and
+    /// Checks start, window sections, window's ends, description and the padding outside leaves. Together with [`Reader::open`], and
     /// with [`Reader::check_leaf`] and [`Reader::check_parts`] for all leaves and blocks, this finds any changed bit of
     /// the file. Calls `found` for each problem.
     ///
@@ -28,7 +29,9 @@ impl<S: Storage> Reader<S> {
             note(self.check_section(SectionId::WindowEnd(window), align(last.extent().end()), &end), found)?;
         }
         note(check_padding(self.storage(), self.footer().metadata.end()), found)?;
-        note(check_padding(self.storage(), self.footer().root.end()), found)
+        note(self.description(), found)?;
+        note(check_padding(self.storage(), self.footer().root.end()), found)?;
+        note(check_padding(self.storage(), self.footer().last().end()), found)
     }
 
     /// Checks the headers of a leaf's blocks against the entries `blocks`, and all padding between them. Calls `found` for

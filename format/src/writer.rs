@@ -2,15 +2,16 @@
 
 use crate::block::{BlockId, EncodedBlock};
 use crate::bytes::ensure;
+use crate::description::Description;
 use crate::directory::{BlockEntry, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
-use crate::header::Header;
+use crate::header::{Features, Header};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::prefix::CompletePrefix;
-use crate::pyramid::{Packing, check_packing};
+use crate::pyramid::check_packing;
 use crate::section::{SectionExtent, SectionId, compress_directory, frame};
 use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
@@ -34,7 +35,7 @@ pub struct Summary {
 pub struct Writer<W: Write> {
     out: W,
     id: FileId,
-    packing: Packing,
+    features: Features,
     /// Bytes written so far.
     position: u64,
     /// Whether the last call succeeded.
@@ -56,24 +57,24 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Starts a file whose codes are packed like those of the windows in `metadata`.
+    /// Starts a file without a description whose codes are packed like those of the windows in `metadata`.
     ///
     /// # Errors
-    /// As [`Self::with_packing`].
+    /// As [`Self::with_features`].
     pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
-        Self::with_packing(out, id, metadata, metadata.packing())
+        Self::with_features(out, id, metadata, metadata.packing().into())
     }
 
     /// Starts a file: writes its header and its start, which is the metadata that does not depend on frames.
     ///
     /// # Errors
     /// [`Error::Invalid`] or [`Error::TooLarge`] if the metadata cannot be encoded, [`Error::Io`] if writing fails.
-    pub fn with_packing(out: W, id: FileId, metadata: &Metadata, packing: Packing) -> Result<Self> {
+    pub fn with_features(out: W, id: FileId, metadata: &Metadata, features: Features) -> Result<Self> {
         let (start, leaves) = (metadata.start(), Vec::new());
         let record = start.encode()?;
-        let nothing = CompletePrefix { id, packing, metadata: start, end: 0, leaves, stored: 0 };
+        let nothing = CompletePrefix { id, features, metadata: start, end: 0, leaves, stored: 0 };
         let mut writer = Self::continue_from(out, nothing);
-        writer.write(&Header::new(id, packing).encode())?;
+        writer.write(&Header::new(id, features).encode())?;
         writer.write_section(SectionId::Start, &record, record.len())?;
         writer.ended = writer.position;
         Ok(writer)
@@ -85,12 +86,12 @@ impl<W: Write> Writer<W> {
     }
 
     fn continue_from(out: W, begun: CompletePrefix) -> Self {
-        let CompletePrefix { id, packing, metadata, end, leaves, stored } = begun;
+        let CompletePrefix { id, features, metadata, end, leaves, stored } = begun;
         let (intact, window, last, leaf, entries) = (true, None, None, None, Vec::new());
         Self {
             out,
             id,
-            packing,
+            features,
             position: end,
             intact,
             metadata,
@@ -127,7 +128,7 @@ impl<W: Write> Writer<W> {
         let next = WindowRecord::parse(&bytes).and_then(|record| {
             let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
             ensure(next, || format!("window {} out of order", record.number))?;
-            check_packing(&record.window, self.packing)
+            check_packing(&record.window, self.features.packing)
         });
         next.map_err(Error::Invalid)?;
         self.count_record(bytes.len())?;
@@ -207,22 +208,34 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Finishes the file: writes metadata, root and footer, and flushes the output.
+    /// As [`Self::finish_described`], without a description.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there is no window or the last one was not ended, [`Error::TooLarge`] if the root exceeds its
-    /// limit, [`Error::Io`] if writing fails.
-    pub fn finish(mut self) -> Result<(W, Summary)> {
+    /// As [`Self::finish_described`].
+    pub fn finish(self) -> Result<(W, Summary)> {
+        self.finish_described(None)
+    }
+
+    /// Finishes the file: writes metadata, root, description and footer, and flushes the output.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there is no window or the last one was not ended, or if there is a description and the header
+    /// says otherwise; [`Error::TooLarge`] if the root exceeds its limit, [`Error::Io`] if writing fails.
+    pub fn finish_described(mut self, description: Option<&Description>) -> Result<(W, Summary)> {
         self.begin_call()?;
+        let announced = self.features.described == description.is_some();
+        ensure(announced, || "the header and the file's end disagree about a description".into())
+            .map_err(Error::Invalid)?;
         let record = self.metadata.encode()?;
         let ended = self.window.is_none() && self.metadata.frames > 0;
         ensure(ended, || "the file has no windows, or its last window was not ended".into()).map_err(Error::Invalid)?;
         let metadata = self.write_section(SectionId::Metadata, &record, record.len())?;
         let root = self.write_root()?;
+        let description = description.map(|description| self.write_description(description)).transpose()?;
         self.pad()?;
         let (total, blocks) = (self.position + FOOTER as u64, self.metadata.blocks());
         let leaves = self.leaves.len() as u64;
-        self.write(&Footer { id: self.id, total, metadata, root, blocks, leaves }.encode())?;
+        self.write(&Footer { id: self.id, total, metadata, root, blocks, leaves, description }.encode())?;
         self.out.flush()?;
         Ok((self.out, Summary { bytes: total, blocks, leaves, stored: self.stored }))
     }
@@ -292,6 +305,11 @@ impl<W: Write> Writer<W> {
         let mut raw = Vec::with_capacity(self.leaves.len() * LEAF_ENTRY);
         self.leaves.iter().for_each(|leaf| leaf.encode(&mut raw));
         self.write_section(SectionId::Root, &compress_directory(&raw)?, raw.len())
+    }
+
+    fn write_description(&mut self, description: &Description) -> Result<SectionExtent> {
+        let raw = description.encode(&self.metadata)?;
+        self.write_section(SectionId::Description, &compress_directory(&raw)?, raw.len())
     }
 
     /// Writes a section at the next multiple of [`ALIGN`].

@@ -11,6 +11,7 @@ pub(crate) mod spread;
 pub(crate) mod half;
 pub mod sample;
 pub mod grid;
+pub mod description;
 pub mod mapped;
 #[doc(hidden)]
 pub mod output;

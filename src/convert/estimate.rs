@@ -55,6 +55,7 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
         ));
     };
     let Task { config, archive, colour_transform } = Task::new(config, &source_archive);
+    let archive = Archive { description: None, ..archive }; // it is not of some blocks
     let plan = Plan::new(&config, &archive, colour_transform.as_ref())?;
     let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, config.window));
     progress.start(Some(windows.len() as u64));
@@ -157,7 +158,7 @@ impl BlocksCoded<'_> {
     fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
         let started = Instant::now();
         let plan = self.plan.of_blocks(self.blocks.len());
-        let mut file = Recorder::new(self.config, &plan, Path::new("estimate"), io::sink(), None);
+        let mut file = Recorder::new((self.config, self.archive), &plan, Path::new("estimate"), io::sink(), None);
         let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
         let mut reader = WindowReader::new((self.config, self.archive), self.plan, &done, &idle);
         for (index, frames) in windows.iter().enumerate() {

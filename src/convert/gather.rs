@@ -15,7 +15,7 @@ use crate::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use wavesplat_format::{BlockId, FileId, Packing, Window};
+use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
 
 /// Blocks of one window with their samples, frame by frame.
 #[derive(Debug)]
@@ -79,8 +79,8 @@ pub(super) struct WindowReader<'a> {
     /// The range of the frames so far.
     range: Option<(f64, f64)>,
     id: Option<FileId>,
-    /// How the file's codes are packed.
-    packing: Packing,
+    /// The features of the file.
+    features: Features,
     /// The scheme of the window before.
     scheme: Option<Scheme>,
     /// The number of frames in the file so far.
@@ -102,9 +102,10 @@ impl<'a> WindowReader<'a> {
         };
         // Without a pyramid, readers of version 1.0 suffice.
         let plain = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0;
-        let packing = if done.id.is_none() && plain { Packing::Flat } else { done.packing };
+        let packing = if plain { Packing::Flat } else { Packing::default() };
+        let features = done.features.unwrap_or(Features { packing, described: archive.description.is_some() });
         let (id, range, scheme) = (done.id, None, None);
-        Self { config, plan, idle, archive, pixels, range, id, packing, scheme, frames: 0, before: 0 }
+        Self { config, plan, idle, archive, pixels, range, id, features, scheme, frames: 0, before: 0 }
     }
 
     /// The next frames of the source, at most `count`; none at its end.
@@ -160,7 +161,7 @@ impl<'a> WindowReader<'a> {
     /// The file's id: that of the continued file, or a new one from the first window's digest.
     fn id(&mut self, digest: u64) -> Result<FileId> {
         let new =
-            || self.plan.start.file_id(digest, self.packing).map_err(|e| Error::setting("settings", e.to_string()));
+            || self.plan.start.file_id(digest, self.features).map_err(|e| Error::setting("settings", e.to_string()));
         let id = self.id.map_or_else(new, Ok)?;
         self.id = Some(id);
         Ok(id)
@@ -204,7 +205,7 @@ impl<'a> WindowReader<'a> {
             promise,
             magnitude,
             most,
-            packing: self.packing,
+            packing: self.features.packing,
             before,
         };
         let scheme = scheme.choose()?;
@@ -217,7 +218,7 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        Ok(WindowJob { index, first_frame, id, packing: self.packing, codec, range, digest: scan.digest, times })
+        Ok(WindowJob { index, first_frame, id, features: self.features, codec, range, digest: scan.digest, times })
     }
 
     /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.

@@ -29,6 +29,7 @@ mod smoothness;
 mod task;
 mod to_file;
 
+use crate::base::description::Description;
 use crate::base::error::{Error, Result};
 use crate::base::memory;
 use crate::base::progress::Progress;
@@ -55,7 +56,7 @@ use std::time::{Duration, Instant};
 use task::Task;
 pub use to_file::convert_to_file;
 pub use wavesplat_format::{Basis, Packing, Stencil};
-use wavesplat_format::{BlockId, CompletePrefix, FileId, Metadata, Window};
+use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Metadata, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,6 +166,9 @@ pub struct ConvertReport {
     pub write_seconds: f64,
     /// Seconds from start to end.
     pub seconds: f64,
+    /// Names of arrays beside the samples that are not kept, since appended frames lack them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_kept: Vec<String>,
 }
 
 /// The complete windows of a file that more frames are added to.
@@ -175,6 +179,8 @@ pub struct PartialFile {
     /// The number of the first window whose frames the source still has, from its first frame on. Windows before it are
     /// not compared with the source.
     pub first_window: usize,
+    /// The description of the windows before it, if there are any and the file has one.
+    pub description: Option<Description>,
 }
 
 /// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
@@ -209,7 +215,7 @@ pub fn resume<W: Write>(
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
-    let mut recorder = Recorder::new(config, &plan, name, out, begun);
+    let mut recorder = Recorder::new((config, archive), &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let idle = Pool::default();
@@ -243,7 +249,8 @@ fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
 #[derive(Debug, Default)]
 struct WindowsDone {
     id: Option<FileId>,
-    packing: Packing,
+    /// Those of the file that is continued.
+    features: Option<Features>,
     windows: Vec<Window>,
     /// [`PartialFile::first_window`]
     first_window: usize,
@@ -252,7 +259,7 @@ struct WindowsDone {
 
 impl WindowsDone {
     fn of(begun: Option<&PartialFile>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
-        let Some(PartialFile { complete, first_window }) = begun else { return Ok(Self::default()) };
+        let Some(PartialFile { complete, first_window, .. }) = begun else { return Ok(Self::default()) };
         let held = complete.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
             return Err(Error::path(name, format!("was begun with another {what}")));
@@ -262,7 +269,7 @@ impl WindowsDone {
         }
         Ok(Self {
             id: Some(complete.id()),
-            packing: complete.packing(),
+            features: Some(complete.features()),
             windows: held.windows.clone(),
             first_window: *first_window,
             name: name.into(),
@@ -347,8 +354,8 @@ struct WindowJob {
     index: u32,
     first_frame: u64,
     id: FileId,
-    /// How the file's codes are packed.
-    packing: Packing,
+    /// How the file's codes are packed, and whether it has a description.
+    features: Features,
     codec: WindowCodec,
     /// The range that the tolerance refers to: the given one, or that of all samples up to the window's end.
     range: (f64, f64),

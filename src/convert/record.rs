@@ -1,9 +1,11 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
 use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
+use crate::base::description::{Description, extended, frames_of, joined, with_frames};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::file::report::{BoundReport, WindowReport};
+use crate::source::Archive;
 use crossbeam_channel::Receiver;
 use std::io::Write;
 use std::path::Path;
@@ -17,26 +19,55 @@ pub(super) struct Recorder<'a, W: Write> {
     /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
+    /// What is said beside the samples; none once the file is finished.
+    descriptions: Descriptions,
     /// The sums over the blocks of the current window so far.
     window: Option<WindowEnd>,
     frames_before: u64,
     busy: Duration,
 }
 
+/// The descriptions of the frames that the file had before and of those that are added.
+#[derive(Default)]
+struct Descriptions {
+    before: Option<Description>,
+    added: Option<Description>,
+}
+
+impl Descriptions {
+    fn new(archive: &Archive, begun: Option<&PartialFile>) -> Self {
+        let before = begun.and_then(|begun| begun.description.clone());
+        let is_told = begun.is_none_or(|begun| begun.complete.features().described);
+        Self { before, added: archive.description.clone().filter(|_| is_told) }
+    }
+
+    /// The description of the whole file, and names of what is not known of all of its frames.
+    fn of_all(self, frames: u64) -> (Option<Description>, Vec<String>) {
+        let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
+        let before = with_frames(before, 1); // if there is no axis of frames, there is one
+        let added = added.map(|added| joined(&before, &with_frames(added.clone(), 1)));
+        let is_whole =
+            |(all, _): &(Description, _)| frames_of(all).is_some_and(|d| all.dimensions[d as usize].length == frames);
+        let (all, not_kept) = added.filter(is_whole).unwrap_or_else(|| extended(&before, frames));
+        (Some(all), not_kept)
+    }
+}
+
 impl<'a, W: Write> Recorder<'a, W> {
     pub(super) fn new(
-        config: &'a ConvertConfig,
+        (config, archive): (&'a ConvertConfig, &Archive),
         plan: &'a Plan<'a>,
         name: &'a Path,
         out: W,
         begun: Option<PartialFile>,
     ) -> Self {
+        let descriptions = Descriptions::new(archive, begun.as_ref());
         let frames_before = begun.as_ref().map_or(0, |b| b.complete.metadata().frames);
         let (writer, out) = match begun {
             Some(begun) => (Some(Writer::resume(out, begun.complete)), None),
             None => (None, Some(out)),
         };
-        Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
+        Self { name, config, plan, writer, out, descriptions, window: None, frames_before, busy: Duration::ZERO }
     }
 
     /// Appends batches until the workers end.
@@ -55,7 +86,7 @@ impl<'a, W: Write> Recorder<'a, W> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         if let Some(out) = self.out.take() {
             self.writer = Some(
-                Writer::with_packing(out, batch.window.id, &self.plan.start, batch.window.packing).map_err(failed)?,
+                Writer::with_features(out, batch.window.id, &self.plan.start, batch.window.features).map_err(failed)?,
             );
         }
         let writer = self.writer.as_mut().expect("created with the first batch");
@@ -83,10 +114,12 @@ impl<'a, W: Write> Recorder<'a, W> {
         };
         let last = Instant::now();
         let metadata = writer.metadata().clone();
-        let (mut out, summary) = writer.finish().map_err(failed)?;
+        let (description, not_kept) = std::mem::take(&mut self.descriptions).of_all(metadata.frames);
+        let (mut out, summary) = writer.finish_described(description.as_ref()).map_err(failed)?;
         out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
         self.busy += last.elapsed();
-        Ok(self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]))
+        let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
+        Ok(ConvertReport { not_kept, ..report })
     }
 
     fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
@@ -117,6 +150,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             encode_seconds,
             write_seconds,
             seconds,
+            not_kept: Vec::new(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
+use crate::base::description::Description;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
@@ -131,6 +132,14 @@ impl CoefficientFile {
     /// Its length in bytes.
     pub fn bytes(&self) -> u64 {
         self.reader.storage().len()
+    }
+
+    /// What the source says beside its samples; `None` if the file has no description.
+    ///
+    /// # Errors
+    /// The description is damaged, or cannot be read.
+    pub fn description(&self) -> Result<Option<Description>> {
+        self.reader.description().map_err(|source| Error::CoefficientFile { path: self.path.clone(), source })
     }
 
     /// Everything about the archive but its samples.

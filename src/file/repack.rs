@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
-use wavesplat_format::{BlockEntry, EncodedBlock, Metadata, Packing, Writer};
+use wavesplat_format::{BlockEntry, EncodedBlock, Features, Metadata, Packing, Writer};
 
 /// What was packed anew.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -40,8 +40,10 @@ pub fn repack(
     let failed = |source| Error::CoefficientFile { path: name.into(), source };
     let metadata = nested(file.metadata());
     let first_digest = metadata.windows.first().map_or(0, |window| window.digest);
-    let id = metadata.file_id(first_digest, metadata.packing()).map_err(failed)?;
-    let mut writer = Writer::new(out, id, &metadata).map_err(failed)?;
+    let description = file.description()?;
+    let features = Features { packing: metadata.packing(), described: description.is_some() };
+    let id = metadata.file_id(first_digest, features).map_err(failed)?;
+    let mut writer = Writer::with_features(out, id, &metadata, features).map_err(failed)?;
     let at_once = (memory / file.block_bytes()).clamp(1, MOST_BLOCKS);
     progress.start(Some(metadata.blocks()));
     for number in 0..metadata.windows.len() as u32 {
@@ -56,7 +58,7 @@ pub fn repack(
         }
         writer.end_window(&metadata.window_end(number)).map_err(failed)?;
     }
-    let (mut out, summary) = writer.finish().map_err(failed)?;
+    let (mut out, summary) = writer.finish_described(description.as_ref()).map_err(failed)?;
     out.flush().map_err(|e| Error::io(name, "writing", e))?;
     progress.finish();
     let (frames, blocks, input_bytes) = (metadata.frames, summary.blocks, file.bytes());

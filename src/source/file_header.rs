@@ -3,6 +3,7 @@
 use super::layout::Shape;
 use super::parts::Part;
 use super::{Advised, Parsed};
+use crate::base::description::{Description, with_frames};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::FileBytes;
@@ -56,6 +57,8 @@ pub(super) struct FileHeader {
     pub(super) units: Units,
     /// What stands for missing samples, if the file says that some may be: NaN, or another value.
     pub(super) missing: Option<f64>,
+    /// What the file says beside the samples.
+    pub(super) description: Option<Description>,
     /// What a user should know about how the file is read.
     pub(super) notes: Vec<Note>,
     /// Where the frames are.
@@ -67,7 +70,19 @@ impl FileHeader {
     pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
-        Self { format: "headerless", shape, spacing, origin, times, variable: None, units, missing: None, notes, parts }
+        let (format, variable, missing, description) = ("headerless", None, None, None);
+        Self { format, shape, spacing, origin, times, variable, units, missing, description, notes, parts }
+    }
+
+    /// Number of frames.
+    pub(super) fn frames(&self) -> usize {
+        self.parts.iter().map(|part| part.frames).sum()
+    }
+
+    /// Describes the frames as those of an archive, in which others may follow.
+    pub(super) fn stack_frames(&mut self) {
+        let frames = self.frames();
+        self.description = self.description.take().map(|description| with_frames(description, frames));
     }
 
     /// The grid of every frame.

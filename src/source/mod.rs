@@ -35,6 +35,7 @@ pub use scan::value_range;
 pub use select::{Selection, select};
 pub use variables::{VariableAxis, VariableInfo};
 
+use crate::base::description::Description;
 use crate::base::error::{Note, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::mapped::Access;
@@ -48,6 +49,15 @@ type Parsed<T> = std::result::Result<T, String>;
 
 /// As [`Parsed`], with a remedy in the error.
 type Advised<T> = std::result::Result<T, Note>;
+
+/// What a header is read for, beside samples and times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Extent {
+    /// Everything.
+    Whole,
+    /// What differs between frames: the file is not the first of an archive.
+    AlongTime,
+}
 
 /// Options for opening inputs.
 #[derive(Debug, Clone)]
@@ -173,6 +183,8 @@ pub struct Archive {
     pub units: Units,
     /// The value of missing samples, if the files declare one: NaN, or another value.
     pub missing: Option<f64>,
+    /// What the files say beside the samples, if they say more than the fields above.
+    pub description: Option<Description>,
     /// Bytes of [`OpenOptions::memory`] that the source takes for a window.
     pub memory: usize,
     /// What a user should know about how the files are read.
@@ -184,7 +196,8 @@ impl Archive {
     pub fn new(grid: Grid, sample: SampleType, frames: Option<usize>) -> Self {
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
         let format = "frames";
-        Self { format, grid, sample, frames, times, variable: None, units, missing: None, memory: 0, notes }
+        let (variable, missing, description) = (None, None, None);
+        Self { format, grid, sample, frames, times, variable, units, missing, description, memory: 0, notes }
     }
 
     /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the

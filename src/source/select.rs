@@ -1,6 +1,7 @@
 //! Narrows an archive to some frames and voxels.
 
 use super::{Archive, FrameSource, FrameWindow};
+use crate::base::description::narrowed;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 
@@ -18,6 +19,14 @@ pub struct Selection {
     pub region: Region,
 }
 
+impl Selection {
+    /// The numbers of the frames, as far as the archive's are known.
+    fn numbers(&self, archive: &Archive) -> Vec<usize> {
+        let all = self.first..archive.frames.unwrap_or(0);
+        all.step_by(self.step).take(self.frames.unwrap_or(usize::MAX)).collect()
+    }
+}
+
 /// Narrows a source to a selection, which must lie within it.
 pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<dyn FrameSource>> {
     let mut archive = source.archive().clone();
@@ -26,6 +35,8 @@ pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<
         let [x, y, z] = archive.grid.dims;
         return Err(Error::setting("region", format!("not within the volume of {x}x{y}x{z} voxels, or empty")));
     }
+    let frames = selection.numbers(&archive);
+    archive.description = archive.description.map(|all| narrowed(&all, &frames, &selection.region));
     archive.grid = archive.grid.crop(&selection.region);
     archive.frames = selection.frames;
     archive.times = archive.times.iter().skip(selection.first).step_by(selection.step).copied().collect();

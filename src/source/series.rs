@@ -6,7 +6,8 @@ use super::inputs::FrameFiles;
 use super::layout::Shape;
 use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
-use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
+use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, formats};
+use crate::base::description::{Description, Values, extended, joined};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
@@ -42,15 +43,20 @@ impl Series {
         let Some((first_path, rest)) = files.paths.split_first() else {
             return Err(Error::setting("inputs", "no input was given"));
         };
-        let mut first = describe(first_path, options)?;
+        let mut first = describe(first_path, options, Extent::Whole)?;
+        if !rest.is_empty() || first.parts.len() > 1 {
+            first.stack_frames();
+        }
         let mut series = Self::of(&mut first, options);
         let name = format!("the first frame ({})", first_path.display());
         let (mut placed_otherwise, mut timed_otherwise) = (None, None);
         for path in rest {
-            let mut file = describe(path, options)?;
+            let mut file = describe(path, options, Extent::AlongTime)?;
             let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
             placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
             timed_otherwise = timed_otherwise.or(unlike.times.then_some(path));
+            file.stack_frames();
+            series.describe_more(&file);
             series.take(&mut file);
         }
         if let Some(path) = placed_otherwise {
@@ -66,6 +72,7 @@ impl Series {
             units: first.units.clone(),
             missing: first.missing,
             format: first.format,
+            description: first.description.take(),
             ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
         let (shape, parts, starts) = (first.shape, Vec::new(), Vec::new());
@@ -92,6 +99,19 @@ impl Series {
         }
     }
 
+    /// Adds what another file says of its frames.
+    fn describe_more(&mut self, file: &FileHeader) {
+        let Some(description) = &self.archive.description else { return };
+        let (all, lost) = match &file.description {
+            Some(next) => joined(description, next),
+            None => extended(description, (self.archive.frames.unwrap_or(0) + file.frames()) as u64),
+        };
+        self.archive.description = Some(all);
+        for name in lost {
+            note_once(&mut self.archive.notes, format!("{name} is not kept: not every file has it in the same form"));
+        }
+    }
+
     fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
         for note in &files.notes {
             note_once(&mut self.archive.notes, note.clone());
@@ -108,8 +128,20 @@ impl Series {
             self.archive.times.clear();
         }
         self.check_times();
+        self.check_description();
+        if let Some(description) = self.archive.description.as_mut().filter(|_| self.archive.times.is_empty()) {
+            description.variables.retain(|variable| !matches!(variable.values, Values::Times(_)));
+        }
         check_grid(&self.archive.grid, options, &files.paths[0])?;
         Ok(self)
+    }
+
+    /// Drops a description that is too large for a coefficient file.
+    fn check_description(&mut self) {
+        if let Some(Err(error)) = self.archive.description.as_ref().map(Description::check_size) {
+            self.archive.description = None;
+            note_once(&mut self.archive.notes, format!("coordinates and attributes are not kept: {error}"));
+        }
     }
 
     /// Drops times that are not finite, and adds a note on times that do not ascend.
@@ -241,8 +273,8 @@ impl FrameSource for Series {
 }
 
 /// Reads a header, and replaces its spacing and origin by those of the user.
-fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
-    let mut file = formats::describe(path, options)?;
+fn describe(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
+    let mut file = formats::describe(path, options, extent)?;
     let mut grid = file.grid();
     override_grid(&mut grid, options);
     (file.spacing, file.origin) = (grid.spacing, grid.origin);

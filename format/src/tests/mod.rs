@@ -1,5 +1,6 @@
 //! Tests of whole files.
 
+mod described;
 mod exit;
 mod files;
 mod hostile;

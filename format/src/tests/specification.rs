@@ -56,7 +56,8 @@ fn the_header_is_as_specified() {
 fn the_footer_is_as_specified() {
     let extent =
         |n: u32| SectionExtent { offset: n.into(), stored_len: n + 1, raw_len: n + 2, checksum: u64::from(n) + 3 };
-    let footer = Footer { id: ID, total: 7, metadata: extent(10), root: extent(20), blocks: 8, leaves: 9 };
+    let description = Some(extent(30));
+    let footer = Footer { id: ID, total: 7, metadata: extent(10), root: extent(20), blocks: 8, leaves: 9, description };
     let record = footer.encode();
     assert_eq!(record.len(), FOOTER);
     let (n8, n4) = (|n: u64| n.to_le_bytes(), |n: u32| n.to_le_bytes());
@@ -65,8 +66,9 @@ fn the_footer_is_as_specified() {
         ("file id", &ID.0), ("total", &n8(7)),
         ("metadata offset", &n8(10)), ("metadata stored", &n4(11)), ("metadata raw", &n4(12)), ("metadata checksum", &n8(13)),
         ("root offset", &n8(20)), ("root stored", &n4(21)), ("root raw", &n4(22)), ("root checksum", &n8(23)),
-        ("blocks", &n8(8)), ("leaves", &n8(9)), ("checksum", &n8(xxh3_64(&record[..112]))),
-        ("end magic", &[0x89, 0x57, 0x53, 0x50, 0x45, 0x4E, 0x44, 0x0A]),
+        ("blocks", &n8(8)), ("leaves", &n8(9)),
+        ("description offset", &n8(30)), ("description stored", &n4(31)), ("description raw", &n4(32)),
+        ("description checksum", &n8(33)), ("checksum", &n8(xxh3_64(&record[..112]))), ("end magic", &[0x89, 0x57, 0x53, 0x50, 0x45, 0x4E, 0x44, 0x0A]),
     ]);
 }
 
@@ -126,7 +128,8 @@ fn limits_are_as_specified() {
         ("MAX_PART_RAW", MAX_PART_RAW), ("MAX_LEVELS", MAX_LEVELS as u64), ("MAX_PARTS", MAX_PARTS as u64),
         ("MAX_WINDOW_FRAMES", MAX_WINDOW_FRAMES.into()), ("MAX_COEFFICIENTS", MAX_COEFFICIENTS.into()),
         ("MAX_DIM", MAX_DIM), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
-        ("MAX_ROOT_RAW", MAX_ROOT_RAW),
+        ("MAX_ROOT_RAW", MAX_ROOT_RAW), ("MAX_DESCRIPTION", MAX_DESCRIPTION as u64),
+        ("MAX_DESCRIPTION_ITEMS", MAX_DESCRIPTION_ITEMS as u64),
     ];
     let stated: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
     assert_eq!(stated, limits);

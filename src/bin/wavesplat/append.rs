@@ -71,7 +71,8 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         return Ok(());
     }
     let (out, complete) = open_successor(&file, Earlier::by(args.force, args.resume))?;
-    let begun = PartialFile { complete, first_window: file.metadata().windows.len() };
+    let (first_window, description) = (file.metadata().windows.len(), file.description()?);
+    let begun = PartialFile { complete, first_window, description };
     finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 

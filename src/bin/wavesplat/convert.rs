@@ -181,7 +181,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
         return args.check_complete(&config, source.archive());
     }
     let (out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
-    let begun = begun.map(|complete| PartialFile { complete, first_window: 0 });
+    let begun = begun.map(|complete| PartialFile { complete, first_window: 0, description: None });
     finish(source.as_mut(), &config, begun, &args.output, out, &args.common, &|| Ok(()))
 }
 

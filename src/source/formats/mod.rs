@@ -24,7 +24,7 @@ mod vtk;
 
 pub use npy::{ArrayHeader, array_header};
 
-use super::{OpenOptions, VariableInfo};
+use super::{Extent, OpenOptions, VariableInfo};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::npy::MAGIC;
@@ -187,13 +187,13 @@ pub(in crate::source) fn has_header(path: &Path) -> bool {
     Format::of_file(path).is_some() || Format::by_content(path).is_ok_and(|format| format.is_some())
 }
 
-/// Reads the header of a file of frames and checks its size.
-pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
+/// Reads the header of a file of frames and checks its size; beside the samples, what `extent` says.
+pub(in crate::source) fn describe(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
     let format = format_of(path, options)?;
     if let Some(format) = format {
         refuse_options(path, format, options)?;
     }
-    let described = of_format(format, path, options)?;
+    let described = of_format(format, path, options, extent)?;
     Ok(FileHeader { format: format.map_or("headerless data", Format::name), ..described })
 }
 
@@ -231,7 +231,7 @@ pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result
 fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
     let component = |index: usize| {
         let options = OpenOptions { variable: Some(format!("[{index}]")), ..options.clone() };
-        let header = describe(path, &options).ok()?;
+        let header = describe(path, &options, Extent::AlongTime).ok()?;
         let (name, shape) = (header.variable.unwrap_or_default(), header.shape);
         Some(VariableInfo {
             unit: header.units.samples,
@@ -245,7 +245,8 @@ fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
 /// Components that are listed, where one array has several.
 const MOST_COMPONENTS: usize = 16;
 
-fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<FileHeader> {
+#[cfg_attr(not(any(feature = "hdf5", feature = "netcdf", feature = "zarr")), allow(unused_variables))]
+fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
     match format {
         Some(Format::Npy) => npy::describe(path),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
@@ -254,11 +255,11 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
         #[cfg(feature = "hdf5")]
-        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options),
+        Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options, extent),
         #[cfg(feature = "netcdf")]
-        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.describe(options),
+        Some(Format::NetCdf) => arrays::open_netcdf(path, options)?.describe(options, extent),
         #[cfg(feature = "zarr")]
-        Some(Format::Zarr) => arrays::open_zarr(path, options)?.describe(options),
+        Some(Format::Zarr) => arrays::open_zarr(path, options)?.describe(options, extent),
         #[cfg(not(feature = "hdf5"))]
         Some(Format::Hdf5) => Err(not_built_in(path, Format::Hdf5, "hdf5")),
         #[cfg(not(feature = "netcdf"))]

@@ -1,6 +1,8 @@
 //! HDF5 files, as [`super::ArrayFile`].
 
+use super::describe::numbers;
 use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
+use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
@@ -72,6 +74,29 @@ impl ArrayFile for Hdf5ArrayFile {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
         let numbers = dataset.read_array::<AnyNumber>().map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().map(|number| number.0).collect())
+    }
+
+    fn described(&self, path: &str) -> Vec<description::Attribute> {
+        let attributes = match path {
+            "" => self.0.root_group().and_then(|group| group.attributes()).unwrap_or_default(),
+            path => self.0.dataset(path).map(|dataset| dataset.attributes()).unwrap_or_default(),
+        };
+        let one =
+            |a: &hdf5_reader::Attribute| Some(description::Attribute { name: a.name.clone(), value: described(a)? });
+        attributes.iter().filter_map(one).collect()
+    }
+
+    fn values(&self, path: &str) -> Parsed<description::Values> {
+        let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
+        if let Ok(texts) = dataset.read_strings() {
+            return Ok(description::Values::Texts(texts));
+        }
+        let ty = number_type(dataset.dtype())?;
+        raw(&dataset, ty).map(|bytes| numbers(ty, &bytes)).map_err(|e| reason(&e))
+    }
+
+    fn number_type(&self, path: &str) -> Parsed<NumberType> {
+        number_type(self.0.dataset(path).map_err(|e| e.to_string())?.dtype())
     }
 
     fn group(&self, path: &str) -> Attributes {
@@ -154,6 +179,57 @@ fn attributes(all: &[hdf5_reader::Attribute]) -> Attributes {
         _ => None,
     };
     all.iter().filter_map(|a| Some((a.name.clone(), value(a)?))).collect()
+}
+
+/// An attribute's value with its type; None of types that users define.
+fn described(attribute: &hdf5_reader::Attribute) -> Option<description::Values> {
+    let Ok(ty) = number_type(&attribute.datatype) else {
+        return attribute.read_strings().ok().map(description::Values::Texts);
+    };
+    macro_rules! read {
+        ($n:expr) => {{
+            let all = attribute.read_1d::<StoredBytes<$n>>();
+            let all = all.or_else(|_| attribute.read_scalar::<StoredBytes<$n>>().map(|number| vec![number])).ok()?;
+            numbers(ty, &all.into_iter().flat_map(|stored| stored.0).collect::<Vec<u8>>())
+        }};
+    }
+    Some(match ty.size() {
+        1 => read!(1),
+        2 => read!(2),
+        4 => read!(4),
+        _ => read!(8),
+    })
+}
+
+/// All numbers of an array, as they are stored, but with the least significant byte first.
+fn raw(dataset: &Dataset, ty: NumberType) -> std::result::Result<Vec<u8>, Hdf5Error> {
+    macro_rules! read {
+        ($n:expr) => {
+            dataset.read_array::<StoredBytes<$n>>()?.into_iter().flat_map(|stored| stored.0).collect()
+        };
+    }
+    Ok(match ty.size() {
+        1 => read!(1),
+        2 => read!(2),
+        4 => read!(4),
+        _ => read!(8),
+    })
+}
+
+fn number_type(ty: &Datatype) -> Parsed<NumberType> {
+    Ok(match *ty {
+        Datatype::FixedPoint { size: 1, signed: false, .. } => NumberType::U8,
+        Datatype::FixedPoint { size: 1, signed: true, .. } => NumberType::I8,
+        Datatype::FixedPoint { size: 2, signed: false, .. } => NumberType::U16,
+        Datatype::FixedPoint { size: 2, signed: true, .. } => NumberType::I16,
+        Datatype::FixedPoint { size: 4, signed: false, .. } => NumberType::U32,
+        Datatype::FixedPoint { size: 4, signed: true, .. } => NumberType::I32,
+        Datatype::FixedPoint { size: 8, signed: false, .. } => NumberType::U64,
+        Datatype::FixedPoint { size: 8, signed: true, .. } => NumberType::I64,
+        Datatype::FloatingPoint { size: 4, .. } => NumberType::F32,
+        Datatype::FloatingPoint { size: 8, .. } => NumberType::F64,
+        ref other => return Err(format!("{} is not kept", kind(other))),
+    })
 }
 
 fn sample_type(ty: &Datatype) -> Parsed<SampleType> {

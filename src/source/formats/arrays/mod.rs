@@ -6,6 +6,7 @@
 mod axes;
 mod choose;
 mod chunks;
+mod describe;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(feature = "netcdf")]
@@ -18,13 +19,14 @@ mod vtkhdf;
 mod zarr;
 
 use super::shared::component;
+use crate::base::description::{self, Description};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::source::file_header::{FileHeader, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{self, Advised, OpenOptions, Parsed, numbering};
+use crate::source::{self, Advised, Extent, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
 use places::Places;
@@ -115,6 +117,29 @@ trait ArrayFile: Send {
     /// All numbers of an array with one axis or none, which may be of any type.
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>>;
 
+    /// The attributes of an array, with their types and in the file's order; of the whole file with an empty path.
+    fn described(&self, path: &str) -> Vec<description::Attribute> {
+        let _ = path;
+        Vec::new()
+    }
+
+    /// All values of an array.
+    fn values(&self, path: &str) -> Parsed<description::Values> {
+        self.numbers(path).map(|numbers| description::Values::floats(&numbers))
+    }
+
+    /// The type of an array's numbers.
+    fn number_type(&self, path: &str) -> Parsed<description::NumberType> {
+        let _ = path;
+        Ok(description::NumberType::F64)
+    }
+
+    /// Whether the file may grow along a dimension.
+    fn is_unlimited(&self, dimension: &str) -> bool {
+        let _ = dimension;
+        false
+    }
+
     /// The attributes of a group; empty if there is no such group.
     fn group(&self, path: &str) -> Attributes {
         let _ = path;
@@ -173,6 +198,7 @@ impl Opener {
 
 /// A file of arrays that was opened to see what it holds.
 pub(super) struct ArrayArchive {
+    format: &'static str,
     opener: Opener,
     file: Box<dyn ArrayFile>,
     /// The file whose state says whether the archive was changed.
@@ -182,7 +208,7 @@ pub(super) struct ArrayArchive {
 /// Opens an HDF5 file. One that the NetCDF library wrote is a NetCDF file, whatever its name is.
 #[cfg(feature = "hdf5")]
 pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
-    let archive = ArrayArchive::open(path, path, hdf5::open, options)?;
+    let archive = ArrayArchive::open("HDF5", [path, path], hdf5::open, options)?;
     match archive.file.group("/").contains_key("_NCProperties") {
         #[cfg(feature = "netcdf")]
         true => open_netcdf(path, options),
@@ -195,20 +221,20 @@ pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchi
 /// Opens a NetCDF file.
 #[cfg(feature = "netcdf")]
 pub(super) fn open_netcdf(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
-    ArrayArchive::open(path, path, netcdf::open, options)
+    ArrayArchive::open("NetCDF", [path, path], netcdf::open, options)
 }
 
 /// Opens a Zarr store, a folder.
 #[cfg(feature = "zarr")]
 pub(super) fn open_zarr(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    ArrayArchive::open(path, &metadata, zarr::open, options)
+    ArrayArchive::open("Zarr", [path, &metadata], zarr::open, options)
 }
 
 impl ArrayArchive {
-    fn open(path: &Path, watched: &Path, open: OpenFile, options: &OpenOptions) -> Result<Self> {
+    fn open(format: &'static str, [path, watched]: [&Path; 2], open: OpenFile, options: &OpenOptions) -> Result<Self> {
         let opener = Opener::new(path, open, options);
-        Ok(Self { file: opener.open()?, opener, watched: watched.into() })
+        Ok(Self { format, file: opener.open()?, opener, watched: watched.into() })
     }
 
     /// All arrays, or those of an image in VTKHDF.
@@ -225,7 +251,7 @@ impl ArrayArchive {
     }
 
     /// Reads what the variable that is meant says of its frames.
-    pub(super) fn describe(&self, options: &OpenOptions) -> Result<FileHeader> {
+    pub(super) fn describe(&self, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
         let (path, state) = (self.opener.path.as_path(), FileBytes::open(&self.watched, Access::Read)?.state());
         let refused = |e| Error::input(path, e);
         let (all, image) = self.variables().map_err(refused)?;
@@ -236,7 +262,8 @@ impl ArrayArchive {
         .map_err(|e| Error::input(path, e))?;
         check_steps(path, &choice, options)?;
         let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
-        let context = Context { file: self.file.as_ref(), all: &all, image, index, axes, spaced };
+        let (file, format) = (self.file.as_ref(), self.format);
+        let context = Context { format, file, all: &all, image, index, axes, spaced, extent };
         let found = choice.arrays.iter().map(|array| context.found(array)).collect::<Advised<Vec<_>>>();
         let found = found.map_err(|e| Error::input(path, e))?;
         let mut parts = Vec::new();
@@ -288,6 +315,8 @@ const SHARE: usize = 4;
 
 /// What variables are found in.
 struct Context<'a> {
+    /// Name of the format.
+    format: &'static str,
     file: &'a dyn ArrayFile,
     all: &'a [Variable],
     image: Option<vtkhdf::Image>,
@@ -297,6 +326,8 @@ struct Context<'a> {
     axes: Option<&'a str>,
     /// Whether the user says how far voxels are apart.
     spaced: bool,
+    /// What to read beside the samples.
+    extent: Extent,
 }
 
 /// What an array is.
@@ -310,6 +341,7 @@ struct ResolvedArray {
     order: Vec<usize>,
     places: Places,
     values: Values,
+    description: Description,
 }
 
 impl Context<'_> {
@@ -343,7 +375,25 @@ impl Context<'_> {
             None => variable.name().to_string(),
         };
         let values = Values::of(&variable, sample)?;
-        Ok(ResolvedArray { name, counts, layout, order, places, values, variable })
+        let description = self.described(&variable, &counts, &values, &mut places);
+        Ok(ResolvedArray { name, counts, layout, order, places, values, variable, description })
+    }
+
+    /// What the file says of an array beside its samples. Notes name what is too large to be kept.
+    fn described(&self, variable: &Variable, counts: &[Counts], values: &Values, places: &mut Places) -> Description {
+        let samples = describe::Samples {
+            variable,
+            counts,
+            backwards: &|counts| places.is_backwards(counts),
+            times: places.time_path.as_deref(),
+            packed: values.packing.is_some(),
+            extent: self.extent,
+        };
+        let (description, left_out) = describe::description(self.format, self.file, self.all, &samples);
+        if !left_out.is_empty() {
+            places.notes.push(format!("{} is too large to be kept with the samples", left_out.join(", ")).into());
+        }
+        description
     }
 
     /// What VTKHDF says of places, and the order of frames.
@@ -371,7 +421,17 @@ impl ResolvedArray {
         let shape = Shape::new(self.layout.dims(), self.values.sample)?;
         let Places { spacing, origin, times, space_unit, time_unit, calendar, notes, .. } = self.places;
         let units = Units { samples: self.values.unit, times: time_unit, space: space_unit, calendar };
-        let (variable, missing) = (Some(self.name), self.values.missing);
-        Ok(FileHeader { spacing, origin, times, variable, units, missing, notes, ..FileHeader::plain(shape, parts) })
+        let (variable, missing, description) = (Some(self.name), self.values.missing, Some(self.description));
+        Ok(FileHeader {
+            description,
+            spacing,
+            origin,
+            times,
+            variable,
+            units,
+            missing,
+            notes,
+            ..FileHeader::plain(shape, parts)
+        })
     }
 }

@@ -1,13 +1,17 @@
 //! NetCDF files, classic and version 4, as [`super::ArrayFile`].
 
+use super::describe::numbers;
 use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable, hdf5};
+use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
 use hdf5_reader::Hdf5File;
 use netcdf_reader::error::Error as NcError;
-use netcdf_reader::{NcAttrValue, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
+use netcdf_reader::{
+    NcAttrValue, NcAttribute, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
+};
 use std::ops::Range;
 use std::path::Path;
 
@@ -73,9 +77,58 @@ impl ArrayFile for NetCdfArrayFile {
         let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().collect())
     }
+
+    fn described(&self, path: &str) -> Vec<description::Attribute> {
+        let of_file = || self.file.global_attributes().unwrap_or_default();
+        let of_variable = || self.file.variable(path).map(NcVariable::attributes).unwrap_or_default();
+        let all = if path.is_empty() { of_file() } else { of_variable() };
+        let one = |a: &NcAttribute| Some(description::Attribute { name: a.name.clone(), value: described(&a.value)? });
+        all.iter().filter_map(one).collect()
+    }
+
+    fn values(&self, path: &str) -> Parsed<description::Values> {
+        let variable = self.file.variable(path).map_err(|e| e.to_string())?;
+        if *variable.dtype() == NcType::String {
+            return self.file.read_variable_as_strings(path).map(description::Values::Texts).map_err(|e| reason(&e));
+        }
+        let ty = number_type(variable.dtype())?;
+        Ok(numbers(ty, &self.raw(path, ty)?))
+    }
+
+    fn number_type(&self, path: &str) -> Parsed<NumberType> {
+        number_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype())
+    }
+
+    fn is_unlimited(&self, dimension: &str) -> bool {
+        let dimensions = self.file.dimensions().unwrap_or_default();
+        dimensions.iter().any(|known| known.name == dimension && known.is_unlimited)
+    }
 }
 
 impl NetCdfArrayFile {
+    /// All numbers of an array, as they are stored.
+    fn raw(&self, path: &str, ty: NumberType) -> Parsed<Vec<u8>> {
+        macro_rules! read {
+            ($ty:ty) => {{
+                let numbers = self.file.read_variable::<$ty>(path).map_err(|e| reason(&e))?;
+                numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
+            }};
+        }
+        Ok(match ty {
+            NumberType::Char => self.file.read_variable_raw_bytes(path).map_err(|e| reason(&e))?,
+            NumberType::U8 => read!(u8),
+            NumberType::I8 => read!(i8),
+            NumberType::U16 => read!(u16),
+            NumberType::I16 => read!(i16),
+            NumberType::U32 => read!(u32),
+            NumberType::I32 => read!(i32),
+            NumberType::U64 => read!(u64),
+            NumberType::I64 => read!(i64),
+            NumberType::F32 => read!(f32),
+            NumberType::F64 => read!(f64),
+        })
+    }
+
     fn add(&self, group: &NcGroup, path: &str, all: &mut Vec<Variable>) {
         for variable in &group.variables {
             all.push(self.variable(variable, format!("{path}{}", variable.name())));
@@ -120,6 +173,48 @@ fn attributes(variable: &NcVariable) -> Attributes {
         None => value.as_f64_vec().map(Attribute::Numbers),
     };
     variable.attributes().iter().filter_map(|a| Some((a.name.clone(), value(&a.value)?))).collect()
+}
+
+/// An attribute's value with its type; None of types that users define.
+fn described(value: &NcAttrValue) -> Option<description::Values> {
+    macro_rules! of {
+        ($ty:ident, $numbers:expr) => {{
+            let bytes: Vec<u8> = $numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+            numbers(NumberType::$ty, &bytes)
+        }};
+    }
+    Some(match value {
+        NcAttrValue::Chars(text) => description::Values::text(text),
+        NcAttrValue::Strings(texts) => description::Values::Texts(texts.clone()),
+        NcAttrValue::Bytes(numbers) => of!(I8, numbers),
+        NcAttrValue::UBytes(numbers) => of!(U8, numbers),
+        NcAttrValue::Shorts(numbers) => of!(I16, numbers),
+        NcAttrValue::UShorts(numbers) => of!(U16, numbers),
+        NcAttrValue::Ints(numbers) => of!(I32, numbers),
+        NcAttrValue::UInts(numbers) => of!(U32, numbers),
+        NcAttrValue::Int64s(numbers) => of!(I64, numbers),
+        NcAttrValue::UInt64s(numbers) => of!(U64, numbers),
+        NcAttrValue::Floats(numbers) => of!(F32, numbers),
+        NcAttrValue::Doubles(numbers) => of!(F64, numbers),
+        NcAttrValue::UserDefined { .. } => return None,
+    })
+}
+
+fn number_type(ty: &NcType) -> Parsed<NumberType> {
+    Ok(match ty {
+        NcType::Char => NumberType::Char,
+        NcType::Byte => NumberType::I8,
+        NcType::UByte => NumberType::U8,
+        NcType::Short => NumberType::I16,
+        NcType::UShort => NumberType::U16,
+        NcType::Int => NumberType::I32,
+        NcType::UInt => NumberType::U32,
+        NcType::Int64 => NumberType::I64,
+        NcType::UInt64 => NumberType::U64,
+        NcType::Float => NumberType::F32,
+        NcType::Double => NumberType::F64,
+        _ => return Err("a type that is not kept".into()),
+    })
 }
 
 fn sample_type(ty: &NcType, unsigned: bool) -> Parsed<SampleType> {

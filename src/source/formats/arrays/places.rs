@@ -35,6 +35,8 @@ pub(super) struct Places {
     pub(super) space_unit: Option<String>,
     pub(super) time_unit: Option<String>,
     pub(super) calendar: Option<String>,
+    /// The path of the variable with the times.
+    pub(super) time_path: Option<String>,
     pub(super) notes: Vec<Note>,
 }
 
@@ -96,7 +98,7 @@ impl Places {
 
     fn take_times(&mut self, file: &dyn ArrayFile, times: &Variable) {
         match numbers(file, times) {
-            Ok(numbers) => self.times = numbers,
+            Ok(numbers) => (self.times, self.time_path) = (numbers, Some(times.path.clone())),
             Err(_) => self.notes.push(format!("{} cannot be read: frames are numbered", times.name()).into()),
         }
         self.time_unit = times.text("units").map(String::from);

@@ -1,6 +1,8 @@
 //! Zarr stores of versions 2 and 3, as [`super::ArrayFile`].
 
+use super::describe::numbers;
 use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
+use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::sample::SampleType;
 use crate::source::Parsed;
@@ -58,6 +60,72 @@ impl ArrayFile for ZarrArrayFile {
         any_of!(f64, f32, i64, i32, u64, u32, i16, u16, i8, u8);
         Err(format!("{path} is of type {}, which is no number", array.data_type()))
     }
+
+    fn described(&self, path: &str) -> Vec<description::Attribute> {
+        let one = |(name, value): (&String, &Value)| {
+            Some(description::Attribute { name: name.clone(), value: described(value)? })
+        };
+        match path {
+            "" => Group::open(self.0.clone(), "/")
+                .map(|group| group.attributes().iter().filter_map(one).collect())
+                .unwrap_or_default(),
+            path => Array::open(self.0.clone(), path)
+                .map(|array| array.attributes().iter().filter_map(one).collect())
+                .unwrap_or_default(),
+        }
+    }
+
+    fn values(&self, path: &str) -> Parsed<description::Values> {
+        let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
+        let ty = number_type(array.data_type())?;
+        let bytes = array.retrieve_array_subset::<ArrayBytes<'_>>(&array.subset_all()).map_err(|e| e.to_string())?;
+        let bytes = bytes.into_fixed().map_err(|e| e.to_string())?;
+        let mut bytes = bytes.into_owned();
+        if cfg!(target_endian = "big") {
+            bytes.chunks_exact_mut(ty.size()).for_each(<[u8]>::reverse);
+        }
+        Ok(numbers(ty, &bytes))
+    }
+
+    fn number_type(&self, path: &str) -> Parsed<NumberType> {
+        number_type(Array::open(self.0.clone(), path).map_err(|e| e.to_string())?.data_type())
+    }
+}
+
+/// An attribute as JSON says it, with the narrowest usual type; None of other values.
+fn described(value: &Value) -> Option<description::Values> {
+    let integers = |all: &[Value]| all.iter().map(Value::as_i64).collect::<Option<Vec<i64>>>();
+    let floats = |all: &[Value]| {
+        let bytes = |number: f64| number.to_le_bytes();
+        all.iter().map(|value| value.as_f64().map(bytes)).collect::<Option<Vec<_>>>()
+    };
+    let all = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
+    if all.iter().all(Value::is_string) {
+        let text = |value: &Value| value.as_str().map(String::from);
+        return all.iter().map(text).collect::<Option<_>>().map(description::Values::Texts);
+    }
+    match integers(all) {
+        Some(integers) => {
+            Some(numbers(NumberType::I64, &integers.into_iter().map(i64::to_le_bytes).collect::<Vec<_>>().concat()))
+        }
+        None => floats(all).map(|floats| numbers(NumberType::F64, &floats.concat())),
+    }
+}
+
+fn number_type(ty: &DataType) -> Parsed<NumberType> {
+    let types = [
+        (data_type::uint8(), NumberType::U8),
+        (data_type::int8(), NumberType::I8),
+        (data_type::uint16(), NumberType::U16),
+        (data_type::int16(), NumberType::I16),
+        (data_type::uint32(), NumberType::U32),
+        (data_type::int32(), NumberType::I32),
+        (data_type::uint64(), NumberType::U64),
+        (data_type::int64(), NumberType::I64),
+        (data_type::float32(), NumberType::F32),
+        (data_type::float64(), NumberType::F64),
+    ];
+    types.into_iter().find(|(of, _)| of == ty).map(|(_, number)| number).ok_or_else(|| ty.to_string())
 }
 
 fn add(group: &Group<FilesystemStore>, depth: usize, all: &mut Vec<Variable>) -> Parsed<()> {

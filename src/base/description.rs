@@ -1,0 +1,237 @@
+//! What a source says beside its samples ([`Description`]): its part for some frames and voxels, and those of several
+//! sources one after another in time.
+
+pub use wavesplat_format::{
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Numbers, Orientation, Values, Variable,
+};
+
+use crate::base::grid::Region;
+
+/// The items of a dimension that are kept, in order.
+type Kept = Option<Vec<usize>>;
+
+/// The description of some frames, by number, and of the voxels of a region.
+///
+/// Frames and voxels are those of the description's axes, with reversed axes turned: voxel 0 is the one at the low end.
+pub fn narrowed(description: &Description, frames: &[usize], region: &Region) -> Description {
+    let mut narrow = description.clone();
+    let mut kept: Vec<Kept> = vec![None; description.dimensions.len()];
+    for axis in &description.axes {
+        let length = description.dimensions[axis.dimension as usize].length as usize;
+        let items: Vec<usize> = match axis.role.voxels() {
+            Some(along) => in_source(region.start[along]..region.end[along], length, axis.reversed).collect(),
+            None if axis.role == AxisRole::Frames => frames.to_vec(),
+            None => continue,
+        };
+        move_first(&mut narrow, description, axis, items.first().copied().unwrap_or(0));
+        narrow.dimensions[axis.dimension as usize].length = items.len() as u64;
+        kept[axis.dimension as usize] = Some(items);
+    }
+    for variable in &mut narrow.variables {
+        variable.values = taken(&variable.values, &variable.dimensions, description, &kept);
+    }
+    narrow
+}
+
+/// The indices in the source of a range of voxels.
+fn in_source(range: std::ops::Range<usize>, length: usize, reversed: bool) -> std::ops::Range<usize> {
+    if reversed { length - range.end..length - range.start } else { range }
+}
+
+/// Moves the place of the first voxel along an axis of the array.
+fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, index: usize) {
+    let voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
+    let (Some(place), Some(orientation)) = (voxels.clone().position(|other| other == axis), &mut narrow.orientation)
+    else {
+        return;
+    };
+    let step = orientation.steps[place];
+    (0..3).for_each(|a| orientation.first[a] += step[a] * index as f64);
+}
+
+/// The values at the kept items of each dimension.
+fn taken(values: &Values, dimensions: &[u32], description: &Description, kept: &[Kept]) -> Values {
+    if dimensions.iter().all(|dimension| kept[*dimension as usize].is_none()) {
+        return values.clone();
+    }
+    let lengths: Vec<usize> = dimensions.iter().map(|d| description.dimensions[*d as usize].length as usize).collect();
+    let kept: Vec<Kept> = dimensions.iter().map(|dimension| kept[*dimension as usize].clone()).collect();
+    select(values, &lengths, &kept)
+}
+
+/// The values of an array of these lengths, the last axis fastest, at the kept items of each axis.
+pub(crate) fn select(values: &Values, lengths: &[usize], kept: &[Kept]) -> Values {
+    let places = places(lengths, kept.iter());
+    match values {
+        Values::Times(ty) => Values::Times(*ty),
+        Values::Texts(texts) => Values::Texts(places.into_iter().map(|place| texts[place].clone()).collect()),
+        Values::Numbers(numbers) => {
+            let (bytes, size) = (numbers.bytes(), numbers.ty.size());
+            let of = |place: usize| &bytes[place * size..(place + 1) * size];
+            Values::Numbers(Numbers::new(numbers.ty, &places.into_iter().flat_map(of).copied().collect::<Vec<u8>>()))
+        }
+    }
+}
+
+/// The places in an array of these lengths, the last fastest, of the kept items along each axis.
+fn places<'a>(lengths: &[usize], kept: impl Iterator<Item = &'a Kept>) -> Vec<usize> {
+    lengths.iter().zip(kept).fold(vec![0], |places, (length, kept)| {
+        let along = |place: usize| match kept {
+            Some(items) => items.iter().map(|item| place * length + item).collect::<Vec<_>>(),
+            None => (0..*length).map(|item| place * length + item).collect(),
+        };
+        places.into_iter().flat_map(along).collect()
+    })
+}
+
+/// The description of the frames of `first`, then those of `next`: values along time follow each other, all else is that
+/// of `first`. Variables along time that `next` lacks, or has in another form, are left out; their names are returned.
+pub fn joined(first: &Description, next: &Description) -> (Description, Vec<String>) {
+    let (Some(time), Some(other)) = (frames_of(first), frames_of(next)) else { return (first.clone(), Vec::new()) };
+    let mut all = first.clone();
+    all.dimensions[time as usize].length += next.dimensions[other as usize].length;
+    let mut lost = Vec::new();
+    all.variables.retain_mut(|variable| {
+        if !variable.dimensions.contains(&time) {
+            return true;
+        }
+        let follower = next.variables.iter().find(|other| other.name == variable.name);
+        match follower.and_then(|follower| appended(variable, first, follower, next)) {
+            Some(values) => variable.values = values,
+            None => lost.push(variable.name.clone()),
+        }
+        lost.last() != Some(&variable.name)
+    });
+    (all, lost)
+}
+
+/// The description of so many frames in all, if nothing else is known of those that were added. Variables along time are left out, but for
+/// those of times; their names are returned.
+pub fn extended(first: &Description, frames: u64) -> (Description, Vec<String>) {
+    let (mut all, mut lost) = (first.clone(), Vec::new());
+    let Some(time) = frames_of(first) else { return (all, lost) };
+    all.dimensions[time as usize].length = frames;
+    let is_lost =
+        |variable: &Variable| variable.dimensions.contains(&time) && !matches!(variable.values, Values::Times(_));
+    lost.extend(all.variables.iter().filter(|variable| is_lost(variable)).map(|variable| variable.name.clone()));
+    all.variables.retain(|variable| !is_lost(variable));
+    (all, lost)
+}
+
+/// The description of an array without an axis of frames, as one of which so many follow each other: the slowest axis
+/// counts frames. It has the name of the variable with the time.
+pub fn with_frames(mut description: Description, frames: usize) -> Description {
+    if frames_of(&description).is_some() {
+        return description;
+    }
+    let dimension = description.dimensions.len() as u32;
+    let mut times: Vec<_> =
+        description.variables.iter_mut().filter(|variable| matches!(variable.values, Values::Times(_))).collect();
+    times.iter_mut().for_each(|variable| variable.dimensions = vec![dimension]);
+    let name = times.first().map_or("time".into(), |variable| variable.name.clone());
+    description.dimensions.push(Dimension { name, length: frames as u64, unlimited: false });
+    description.axes.insert(0, ArrayAxis { dimension, role: AxisRole::Frames, reversed: false });
+    description
+}
+
+/// The dimension of frames.
+pub fn frames_of(description: &Description) -> Option<u32> {
+    description.axes.iter().find(|axis| axis.role == AxisRole::Frames).map(|axis| axis.dimension)
+}
+
+/// Values whose slowest dimension is that of frames, one after another; none if they cannot follow each other.
+fn appended(variable: &Variable, of: &Description, next: &Variable, of_next: &Description) -> Option<Values> {
+    let shape = |variable: &Variable, of: &Description| -> Vec<u64> {
+        variable.dimensions.iter().skip(1).map(|dimension| of.dimensions[*dimension as usize].length).collect()
+    };
+    let slowest = |variable: &Variable, of: &Description| variable.dimensions.first().copied() == frames_of(of);
+    if !slowest(variable, of) || !slowest(next, of_next) || shape(variable, of) != shape(next, of_next) {
+        return None;
+    }
+    match (&variable.values, &next.values) {
+        (Values::Times(ty), Values::Times(_)) => Some(Values::Times(*ty)),
+        (Values::Texts(a), Values::Texts(b)) => Some(Values::Texts([a.clone(), b.clone()].concat())),
+        (Values::Numbers(a), Values::Numbers(b)) if a.ty == b.ty => {
+            Some(Values::Numbers(Numbers::new(a.ty, &[a.bytes(), b.bytes()].concat())))
+        }
+        _ => None,
+    }
+}
+
+/// The coordinates of an axis of voxels at its low end first: those of the variable with the name of its dimension. None
+/// if the source has none, or they are no numbers.
+pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> {
+    let axis = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?;
+    let name = &description.dimensions[axis.dimension as usize].name;
+    let own = |variable: &&Variable| variable.name == *name && variable.dimensions == [axis.dimension];
+    let Values::Numbers(numbers) = &description.variables.iter().find(own)?.values else { return None };
+    let mut at = numbers.to_f64();
+    if axis.reversed {
+        at.reverse();
+    }
+    Some(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Axes (time 2, y 3 reversed, x 2) with a coordinate of each, a field over y and x and bounds of times.
+    fn description(first_time: f64) -> Description {
+        let dimension = |(name, length): (&str, u64)| Dimension { name: name.into(), length, unlimited: false };
+        let axis = |(dimension, role)| ArrayAxis { dimension, role, reversed: role == AxisRole::Y };
+        let variable = |name: &str, dimensions: &[u32], values| Variable {
+            name: name.into(),
+            dimensions: dimensions.to_vec(),
+            values,
+            attributes: Vec::new(),
+        };
+        Description {
+            dimensions: [("time", 2), ("y", 3), ("x", 2), ("nv", 2)].map(dimension).into(),
+            axes: [(0, AxisRole::Frames), (1, AxisRole::Y), (2, AxisRole::X)].map(axis).into(),
+            variables: vec![
+                variable("time", &[0], Values::Times(NumberType::F64)),
+                variable("bounds", &[0, 3], Values::floats(&[0.0, 1.0, 1.0, 2.0].map(|t| t + first_time))),
+                variable("y", &[1], Values::floats(&[30.0, 20.0, 10.0])),
+                variable("lat", &[1, 2], Values::floats(&[31.0, 32.0, 21.0, 22.0, 11.0, 12.0])),
+                variable("name", &[1], Values::Texts(["c", "b", "a"].map(String::from).into())),
+            ],
+            orientation: Some(Orientation {
+                space: "RAS".into(),
+                first: [5.0; 3],
+                steps: [[1.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.0; 3]],
+            }),
+            ..Description::default()
+        }
+    }
+
+    fn floats(description: &Description, name: &str) -> Vec<f64> {
+        match &description.variables.iter().find(|variable| variable.name == name).expect("held").values {
+            Values::Numbers(numbers) => numbers.to_f64(),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn reversed_axes_are_narrowed_in_the_source() {
+        let region = Region { start: [1, 0, 0], end: [2, 2, 1] };
+        let narrow = narrowed(&description(0.0), &[1], &region);
+        assert_eq!(narrow.dimensions.iter().map(|d| d.length).collect::<Vec<_>>(), [1, 2, 1, 2]);
+        assert_eq!((floats(&narrow, "y"), floats(&narrow, "lat")), (vec![20.0, 10.0], vec![22.0, 12.0]));
+        assert_eq!((floats(&narrow, "bounds"), coordinates(&narrow, 1)), (vec![1.0, 2.0], Some(vec![10.0, 20.0])));
+        assert_eq!(narrow.orientation.as_ref().expect("kept").first, [6.0, 3.0, 5.0]);
+        let name = narrow.variables.iter().find(|variable| variable.name == "name").expect("held");
+        assert_eq!(name.values, Values::Texts(["b", "a"].map(String::from).into()));
+        assert_eq!(coordinates(&narrow, 0), None);
+    }
+
+    #[test]
+    fn frames_follow_each_other() {
+        let (mut all, lost) = joined(&description(0.0), &description(2.0));
+        assert_eq!((floats(&all, "bounds"), lost.len()), (vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0], 0));
+        assert_eq!((all.dimensions[0].length, floats(&all, "y")), (4, vec![30.0, 20.0, 10.0]));
+        all.variables.retain(|variable| variable.name != "bounds");
+        let (without, lost) = joined(&description(0.0), &all);
+        assert_eq!((lost, without.variables.len()), (vec!["bounds".to_string()], 4));
+    }
+}

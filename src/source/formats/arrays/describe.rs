@@ -1,0 +1,206 @@
+//! What a file of arrays says beside the samples: dimensions, attributes, coordinates and other small arrays.
+
+use super::{ArrayFile, Variable};
+use crate::base::description::{
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Values, Variable as Described, select,
+};
+use crate::source::layout::Counts;
+use crate::source::{Extent, Parsed};
+
+/// Bytes of an array that is kept whole.
+const MOST_BYTES: usize = 8 << 20;
+
+/// Bytes of all of them: less than a description may have, since it also has texts.
+const MOST_BYTES_TOGETHER: usize = 14 << 20;
+
+/// Values of an array for each frame that are kept.
+const MOST_PER_FRAME: usize = 64;
+
+/// Attributes that say how samples are stored. Samples are given as what they stand for.
+const OF_STORAGE: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "_Unsigned"];
+
+/// The limits of valid samples, as stored.
+const LIMITS: [&str; 3] = ["valid_min", "valid_max", "valid_range"];
+
+/// The samples' array, and what is known of it.
+pub(super) struct Samples<'a> {
+    pub(super) variable: &'a Variable,
+    /// What each axis counts.
+    pub(super) counts: &'a [Counts],
+    /// Whether the voxels of an axis are stored backwards.
+    pub(super) backwards: &'a dyn Fn(Counts) -> bool,
+    /// The variable with the times of the frames.
+    pub(super) times: Option<&'a str>,
+    /// Whether the stored numbers are not the samples.
+    pub(super) packed: bool,
+    /// What to read.
+    pub(super) extent: Extent,
+}
+
+/// The description, and the names of arrays that were left out because they are large.
+pub(super) fn description(
+    source: &str,
+    file: &dyn ArrayFile,
+    all: &[Variable],
+    samples: &Samples<'_>,
+) -> (Description, Vec<String>) {
+    let mut builder = Builder { file, samples, found: Description { source: source.into(), ..Description::default() } };
+    builder.add_axes();
+    builder.found.attributes = builder.attributes();
+    builder.found.global = file.described("").into_iter().filter(is_users).collect();
+    let left_out = builder.add_variables(all);
+    (builder.found, left_out)
+}
+
+struct Builder<'a> {
+    file: &'a dyn ArrayFile,
+    samples: &'a Samples<'a>,
+    found: Description,
+}
+
+impl Builder<'_> {
+    fn add_axes(&mut self) {
+        let Samples { variable, counts, .. } = self.samples;
+        for (axis, counts) in counts.iter().enumerate() {
+            let role = match counts {
+                Counts::Frames => AxisRole::Frames,
+                Counts::Voxels(along) => AxisRole::of_voxels(*along),
+                Counts::Only(_) if variable.lengths[axis] == 1 => AxisRole::Single,
+                Counts::Only(_) => continue,
+            };
+            // axes without names are told apart, though they may be of one length
+            let dimension = self.new_dimension(&variable.dims[axis], variable.lengths[axis]);
+            self.found.axes.push(ArrayAxis { dimension, role, reversed: (self.samples.backwards)(*counts) });
+        }
+    }
+
+    fn new_dimension(&mut self, name: &str, length: usize) -> u32 {
+        let unlimited = self.file.is_unlimited(name);
+        self.found.dimensions.push(Dimension { name: name.into(), length: length as u64, unlimited });
+        (self.found.dimensions.len() - 1) as u32
+    }
+
+    /// The dimension with this name and length.
+    fn dimension(&mut self, name: &str, length: usize) -> u32 {
+        let is_it = |dimension: &Dimension| dimension.name == name && dimension.length == length as u64;
+        match self.found.dimensions.iter().position(is_it) {
+            Some(at) => at as u32,
+            None => self.new_dimension(name, length),
+        }
+    }
+
+    /// The attributes of the samples, without those of their storage.
+    fn attributes(&self) -> Vec<Attribute> {
+        let Samples { variable, packed, .. } = self.samples;
+        let is_kept = |attribute: &Attribute| {
+            let name = attribute.name.as_str();
+            is_users(attribute)
+                && !OF_STORAGE.contains(&name)
+                && !(*packed && LIMITS.contains(&name))
+                && !(*packed && name == "missing_value")
+        };
+        self.file.described(&variable.path).into_iter().filter(is_kept).collect()
+    }
+
+    /// Adds the arrays that are small; returns the names of coordinates that are not.
+    fn add_variables(&mut self, all: &[Variable]) -> Vec<String> {
+        let (mut bytes, mut left_out) = (0, Vec::new());
+        let mut near: Vec<&Variable> = all.iter().filter(|other| self.belongs(other)).collect();
+        near.sort_by_key(|variable| count(variable)); // so that the largest are left out
+        for variable in near {
+            let Ok(values) = self.values(variable) else { continue };
+            let size = held_bytes(&values);
+            if size > MOST_BYTES || bytes + size > MOST_BYTES_TOGETHER {
+                left_out.push(variable.name().to_string());
+                continue;
+            }
+            bytes += size;
+            self.add(variable, values);
+        }
+        left_out
+    }
+
+    /// Whether an array is no field of its own, and is in the samples' group or in one around it.
+    fn belongs(&self, other: &Variable) -> bool {
+        let Samples { variable, counts, times, extent, .. } = self.samples;
+        let group = |variable: &Variable| variable.path[..variable.path.len() - variable.name().len()].to_string();
+        let is_axis = |wanted: fn(&Counts) -> bool| {
+            let names: Vec<&String> =
+                variable.dims.iter().zip(*counts).filter(|(_, c)| wanted(c)).map(|(d, _)| d).collect();
+            other.dims.iter().filter(|dim| names.contains(dim)).count()
+        };
+        let voxels = is_axis(|counts| matches!(counts, Counts::Voxels(_)));
+        let along_time = is_axis(|counts| *counts == Counts::Frames) > 0;
+        let frames = variable.lengths.iter().zip(*counts).find(|(_, c)| **c == Counts::Frames).map_or(1, |(n, _)| *n);
+        let is_small = match along_time {
+            true => voxels == 0 && count(other) <= MOST_PER_FRAME.saturating_mul(frames),
+            false => voxels < 3 && count(other).saturating_mul(size_of::<f64>()) <= 2 * MOST_BYTES,
+        };
+        let is_named = other.dims.iter().zip(&other.lengths).all(|(dim, length)| !dim.is_empty() || *length == 1);
+        let is_read = *extent == Extent::Whole || along_time || *times == Some(other.path.as_str());
+        other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_small && is_read
+    }
+
+    /// The values of an array; at the chosen index along an axis of which only one is meant.
+    fn values(&self, variable: &Variable) -> Parsed<Values> {
+        let Samples { times, .. } = self.samples;
+        if *times == Some(variable.path.as_str()) {
+            return Ok(Values::Times(self.file.number_type(&variable.path)?));
+        }
+        let values = self.file.values(&variable.path)?;
+        let kept: Vec<Option<Vec<usize>>> =
+            variable.dims.iter().map(|dim| self.chosen(dim).map(|index| vec![index])).collect();
+        if kept.iter().all(Option::is_none) { Ok(values) } else { Ok(select(&values, &variable.lengths, &kept)) }
+    }
+
+    /// The chosen index along a dimension of several that is not an axis of frames or voxels.
+    fn chosen(&self, dim: &str) -> Option<usize> {
+        let Samples { variable, counts, .. } = self.samples;
+        let at = variable.dims.iter().position(|other| other == dim && !dim.is_empty())?;
+        match counts[at] {
+            Counts::Only(index) if variable.lengths[at] > 1 => Some(index),
+            _ => None,
+        }
+    }
+
+    fn add(&mut self, variable: &Variable, values: Values) {
+        let kept: Vec<(String, usize)> = variable.dims.iter().cloned().zip(variable.lengths.iter().copied()).collect();
+        let kept = kept.into_iter().filter(|(dim, _)| self.chosen(dim).is_none() && !dim.is_empty());
+        let dimensions = kept.collect::<Vec<_>>().iter().map(|(dim, length)| self.dimension(dim, *length)).collect();
+        let attributes = self.file.described(&variable.path).into_iter().filter(is_users).collect();
+        self.found.variables.push(Described { name: variable.name().into(), dimensions, values, attributes });
+    }
+}
+
+/// How many values an array has.
+fn count(variable: &Variable) -> usize {
+    variable.lengths.iter().fold(1, |count: usize, length| count.saturating_mul(*length))
+}
+
+fn held_bytes(values: &Values) -> usize {
+    match values {
+        Values::Texts(texts) => texts.iter().map(|text| text.len() + size_of::<u64>()).sum(),
+        Values::Numbers(numbers) => numbers.count() * numbers.ty.size(),
+        Values::Times(_) => 0,
+    }
+}
+
+/// Whether an attribute is not one by which the libraries of NetCDF and HDF5 keep their own order.
+fn is_users(attribute: &Attribute) -> bool {
+    const INTERNAL: [&str; 8] = [
+        "CLASS",
+        "NAME",
+        "REFERENCE_LIST",
+        "DIMENSION_LIST",
+        "DIMENSION_LABELS",
+        "_NCProperties",
+        "_nc3_strict",
+        "_ARRAY_DIMENSIONS",
+    ];
+    !INTERNAL.contains(&attribute.name.as_str()) && !attribute.name.starts_with("_Netcdf4")
+}
+
+/// Numbers as values.
+pub(super) fn numbers(ty: NumberType, bytes: &[u8]) -> Values {
+    Values::Numbers(crate::base::description::Numbers::new(ty, bytes))
+}
