@@ -8,7 +8,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig};
-use wavesplat::extract::{ExtractConfig, ExtractReport, extract};
+use wavesplat::extract::{ExtractConfig, ExtractReport, SampleOrder, extract};
 use wavesplat_format::{
     BlockId, BlockStats, Compressor, EncodedBlock, FileId, PartKind, PartStats, Reader, Storage, WindowEnd,
     WindowRecord, Writer,
@@ -27,7 +27,7 @@ fn file() -> crate::common::Stored {
 /// The bytes that are read from the file for some frames of a region, including opening it.
 fn reading(of: &crate::common::Stored, frames: Vec<usize>, region: Region) -> ExtractReport {
     let file = of.open();
-    let config = ExtractConfig { frames, region, channel: 0, memory: MEMORY };
+    let config = ExtractConfig { frames, region, channel: 0, order: SampleOrder::default(), memory: MEMORY };
     extract(&file, &config, Path::new("out"), &mut Vec::new(), &Silent).unwrap()
 }
 

@@ -213,8 +213,10 @@ pub struct Orientation {
     pub space: String,
     /// World position of index (0, 0, 0).
     pub first: [f64; 3],
-    /// World steps from a voxel to the next along each axis of the array, the fastest first.
-    pub steps: [[f64; 3]; 3],
+    /// World direction of each axis of the array, the fastest first. Often of length 1, but it need not be.
+    pub directions: [[f64; 3]; 3],
+    /// A step along each axis is its direction times this.
+    pub spacing: [f64; 3],
 }
 
 impl Description {
@@ -268,7 +270,9 @@ impl Description {
             named(format!("attribute {}", attribute.name), ensure(fixed, || "times are no value".into()))?;
             named(format!("attribute {}", attribute.name), attribute.value.check())?;
         }
-        let finite = |o: &Orientation| o.first.iter().chain(o.steps.iter().flatten()).all(|n| n.is_finite());
+        let finite = |o: &Orientation| {
+            o.first.iter().chain(&o.spacing).chain(o.directions.iter().flatten()).all(|n| n.is_finite())
+        };
         ensure(self.orientation.as_ref().is_none_or(finite), || "an orientation that is not finite".into())
     }
 
@@ -357,7 +361,12 @@ mod tests {
                 variable("depth_bounds", &[3, 4], Values::floats(&depths)),
                 variable("crs", &[], Values::Numbers(Numbers::new(NumberType::I32, &[7, 0, 0, 0]))),
             ],
-            orientation: Some(Orientation { space: "RAS".into(), first: [1.0; 3], steps: [[0.5; 3]; 3] }),
+            orientation: Some(Orientation {
+                space: "RAS".into(),
+                first: [1.0; 3],
+                directions: [[0.5; 3]; 3],
+                spacing: [2.0; 3],
+            }),
         }
     }
 
@@ -387,8 +396,12 @@ mod tests {
             (|d| d.global = vec![d.global[0].clone(); MAX_DESCRIPTION_ITEMS], "items, at most"),
             (
                 |d| {
-                    d.orientation =
-                        Some(Orientation { space: String::new(), first: [f64::NAN; 3], steps: [[0.0; 3]; 3] })
+                    d.orientation = Some(Orientation {
+                        space: String::new(),
+                        first: [f64::NAN; 3],
+                        directions: [[0.0; 3]; 3],
+                        spacing: [1.0; 3],
+                    })
                 },
                 "finite",
             ),

@@ -7,23 +7,35 @@ pub use wavesplat_format::{
 
 use crate::base::grid::Region;
 
+/// The attribute with the header of a NIfTI file, as it was.
+pub const NIFTI_HEADER: &str = "_nifti_header";
+
+/// The world of NIfTI: x to the right of a patient, y to the front, z to the head.
+pub const RAS: &str = "right-anterior-superior";
+
+/// The world of ITK and DICOM: x to the left of a patient, y to the back, z to the head.
+pub const LPS: &str = "left-posterior-superior";
+
 /// The items of a dimension that are kept, in order.
 type Kept = Option<Vec<usize>>;
 
-/// The description of some frames, by number, and of the voxels of a region.
+/// The description of some frames, by number, and of the voxels of a region on the lattice of every `step`-th voxel.
 ///
 /// Frames and voxels are those of the description's axes, with reversed axes turned: voxel 0 is the one at the low end.
-pub fn narrowed(description: &Description, frames: &[usize], region: &Region) -> Description {
+pub fn narrowed(description: &Description, frames: &[usize], region: &Region, step: usize) -> Description {
     let mut narrow = description.clone();
     let mut kept: Vec<Kept> = vec![None; description.dimensions.len()];
     for axis in &description.axes {
         let length = description.dimensions[axis.dimension as usize].length as usize;
         let items: Vec<usize> = match axis.role.voxels() {
-            Some(along) => in_source(region.start[along]..region.end[along], length, axis.reversed).collect(),
+            Some(along) => {
+                let voxels = (region.start[along]..region.end[along]).map(|voxel| voxel * step);
+                if axis.reversed { voxels.rev().map(|voxel| length - 1 - voxel).collect() } else { voxels.collect() }
+            }
             None if axis.role == AxisRole::Frames => frames.to_vec(),
             None => continue,
         };
-        move_first(&mut narrow, description, axis, items.first().copied().unwrap_or(0));
+        move_first(&mut narrow, description, axis, (items.first().copied().unwrap_or(0), step));
         narrow.dimensions[axis.dimension as usize].length = items.len() as u64;
         kept[axis.dimension as usize] = Some(items);
     }
@@ -33,20 +45,16 @@ pub fn narrowed(description: &Description, frames: &[usize], region: &Region) ->
     narrow
 }
 
-/// The indices in the source of a range of voxels.
-fn in_source(range: std::ops::Range<usize>, length: usize, reversed: bool) -> std::ops::Range<usize> {
-    if reversed { length - range.end..length - range.start } else { range }
-}
-
-/// Moves the place of the first voxel along an axis of the array.
-fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, index: usize) {
+/// Moves the place of the first voxel along an axis of the array to an index, and takes longer steps from there.
+fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, (index, longer): (usize, usize)) {
     let voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
     let (Some(place), Some(orientation)) = (voxels.clone().position(|other| other == axis), &mut narrow.orientation)
     else {
         return;
     };
-    let step = orientation.steps[place];
-    (0..3).for_each(|a| orientation.first[a] += step[a] * index as f64);
+    let (direction, spacing) = (orientation.directions[place], orientation.spacing[place]);
+    (0..3).for_each(|a| orientation.first[a] += direction[a] * spacing * index as f64);
+    orientation.spacing[place] *= longer as f64;
 }
 
 /// The values at the kept items of each dimension.
@@ -199,7 +207,8 @@ mod tests {
             orientation: Some(Orientation {
                 space: "RAS".into(),
                 first: [5.0; 3],
-                steps: [[1.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.0; 3]],
+                directions: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0; 3]],
+                spacing: [1.0, 2.0, 1.0],
             }),
             ..Description::default()
         }
@@ -215,7 +224,7 @@ mod tests {
     #[test]
     fn reversed_axes_are_narrowed_in_the_source() {
         let region = Region { start: [1, 0, 0], end: [2, 2, 1] };
-        let narrow = narrowed(&description(0.0), &[1], &region);
+        let narrow = narrowed(&description(0.0), &[1], &region, 1);
         assert_eq!(narrow.dimensions.iter().map(|d| d.length).collect::<Vec<_>>(), [1, 2, 1, 2]);
         assert_eq!((floats(&narrow, "y"), floats(&narrow, "lat")), (vec![20.0, 10.0], vec![22.0, 12.0]));
         assert_eq!((floats(&narrow, "bounds"), coordinates(&narrow, 1)), (vec![1.0, 2.0], Some(vec![10.0, 20.0])));
@@ -223,6 +232,8 @@ mod tests {
         let name = narrow.variables.iter().find(|variable| variable.name == "name").expect("held");
         assert_eq!(name.values, Values::Texts(["b", "a"].map(String::from).into()));
         assert_eq!(coordinates(&narrow, 0), None);
+        let every = narrowed(&description(0.0), &[0], &Region { start: [0; 3], end: [1, 2, 1] }, 2);
+        assert_eq!((floats(&every, "y"), every.orientation.expect("kept").spacing[1]), (vec![30.0, 10.0], 4.0));
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! The description of extracted samples, for the headers of all formats.
 
 use super::ExtractConfig;
+use super::order::{OutputAxis, SampleOrder};
+use crate::base::description::{Description, Orientation, narrowed};
+use crate::base::error::Result;
 use crate::base::grid::Grid;
 use crate::base::sample::{SampleType, missing_value, round_to};
 use crate::file::{CoefficientFile, setting};
@@ -8,6 +11,56 @@ use crate::source::CHANNELS;
 
 /// The largest deviation of regular times from equal steps, in steps.
 const REGULAR: f64 = 1e-6;
+
+/// Voxels in the world, in the order in which they are written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Lattice {
+    /// Voxels along each axis, the fastest first.
+    pub(super) dims: [usize; 3],
+    /// World position of the first voxel.
+    pub(super) first: [f64; 3],
+    /// World direction of each axis, the fastest first; of any length.
+    directions: [[f64; 3]; 3],
+    /// A step along each axis is its direction times this.
+    spacing: [f64; 3],
+    /// The directions in which the world's axes ascend; empty if unknown.
+    pub(super) space: String,
+}
+
+impl Lattice {
+    /// The length of a step along each axis.
+    pub(super) fn spacing(&self) -> [f64; 3] {
+        std::array::from_fn(|axis| if self.is_unit(axis) { self.spacing[axis] } else { length(self.steps()[axis]) })
+    }
+
+    /// The directions of the axes, of length 1.
+    pub(super) fn directions(&self) -> [[f64; 3]; 3] {
+        let of_length = |axis: usize| self.directions[axis].map(|along| along / length(self.directions[axis]));
+        std::array::from_fn(|axis| if self.is_unit(axis) { self.directions[axis] } else { of_length(axis) })
+    }
+
+    /// From a voxel to the next along each axis, the fastest first.
+    pub(super) fn steps(&self) -> [[f64; 3]; 3] {
+        std::array::from_fn(|axis| self.directions[axis].map(|along| along * self.spacing[axis]))
+    }
+
+    /// The same lattice, seen from the other side along x and y: from ITK's world in that of NIfTI, or back.
+    pub(super) fn turned(mut self) -> Self {
+        for place in self.directions.iter_mut().chain([&mut self.first]) {
+            (place[0], place[1]) = (-place[0], -place[1]);
+        }
+        self
+    }
+
+    /// Whether the direction of an axis has the length 1, but for rounding: then it is kept to the bit.
+    fn is_unit(&self, axis: usize) -> bool {
+        (length(self.directions[axis]) - 1.0).abs() < 1e-6
+    }
+}
+
+fn length(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|along| along * along).sum::<f64>().sqrt()
+}
 
 /// A description of the extracted samples for a file's header.
 #[derive(Debug, Clone)]
@@ -34,18 +87,25 @@ pub struct Contents {
     pub space_units: Option<String>,
     /// The value of missing samples, if some may be missing: a number of the sample type, or NaN.
     pub missing: Option<f64>,
+    /// What the source says beside the samples, of these frames and voxels; none of a channel of colours.
+    pub description: Option<Description>,
 }
 
 impl Contents {
     /// Describes what `config` extracts from a file.
-    pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Self {
+    ///
+    /// # Errors
+    /// The description of the file is damaged, or cannot be read.
+    pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
         let m = file.metadata();
         let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
         let channel = file.colour_transform().map(|_| CHANNELS[config.channel]);
         let name = channel.or(m.variable.as_deref()).map(plain).filter(|name| !name.is_empty());
         let numbered = m.times.is_empty();
         let time = |frame: &usize| if numbered { *frame as f64 } else { m.times[*frame] };
-        Self {
+        let description = if channel.is_none() { file.description()? } else { None };
+        let description = description.map(|all| narrowed(&all, &config.frames, &config.region, 1 << file.lod()));
+        Ok(Self {
             grid: file.grid.crop(&config.region),
             sample: file.sample(),
             frames: config.frames.clone(),
@@ -57,7 +117,31 @@ impl Contents {
             calendar: text("calendar").filter(|_| !numbered),
             space_units: text("space-units"),
             missing: missing(file, config),
-        }
+            description,
+        })
+    }
+
+    /// Where the voxels of each frame are: in the order of the source's array if it says how its axes go in the world.
+    pub(super) fn lattice(&self) -> Lattice {
+        let described = self.description.as_ref().and_then(|all| Some((all, all.orientation.as_ref()?)));
+        let Some((description, orientation)) = described else { return self.straight_lattice() };
+        let Orientation { space, first, directions, spacing } = orientation.clone();
+        let voxels = SampleOrder::of_lattice(description).axes().into_iter().rev().filter_map(OutputAxis::voxels);
+        let mut lengths = voxels.map(|axis| self.grid.dims[axis]);
+        Lattice { dims: std::array::from_fn(|_| lengths.next().unwrap_or(1)), first, directions, spacing, space }
+    }
+
+    /// Whether the source's axes go along those of the world, in any order and direction.
+    pub(super) fn is_straight(&self) -> bool {
+        let along = |step: &[f64; 3]| step.iter().filter(|along| **along != 0.0).count();
+        self.lattice().directions.iter().all(|step| along(step) == 1)
+    }
+
+    /// The lattice with its axes along those of the world.
+    pub(super) fn straight_lattice(&self) -> Lattice {
+        let Grid { dims, spacing, origin } = self.grid;
+        let along = |axis: usize| std::array::from_fn(|a| if a == axis { 1.0 } else { 0.0 });
+        Lattice { dims, first: origin, directions: [0, 1, 2].map(along), spacing, space: String::new() }
     }
 
     /// The first time and the step between times, if all steps are equal.
@@ -107,6 +191,7 @@ pub(super) mod testing {
             calendar: None,
             space_units: Some("mm".into()),
             missing: None,
+            description: None,
         }
     }
 

@@ -2,6 +2,8 @@
 
 use super::contents::Contents;
 use super::encoding::Encoding;
+use super::nifti;
+use super::order::SampleOrder;
 use crate::base::sample::SampleType;
 use std::path::Path;
 
@@ -20,13 +22,19 @@ pub enum SampleFormat {
     Vti,
     /// A ParaView list of `.vti` files, one for each frame, with their times.
     Pvd,
-    /// Classic NetCDF (time, z, y, x) with coordinates.
+    /// Classic NetCDF, in the order of the source's array or (time, z, y, x), with coordinates.
     Netcdf,
+    /// NIfTI in one file: x y z t, or x y z for one frame.
+    Nifti,
+    /// As well, in gzip.
+    NiftiGz,
+    /// MetaImage in one file: x y z t, or x y z for one frame.
+    MetaImage,
 }
 
 impl SampleFormat {
     /// The formats by name, which is also their file extension.
-    pub const NAMES: [(&'static str, Self); 7] = [
+    pub const NAMES: [(&'static str, Self); 10] = [
         ("npy", Self::Npy),
         ("raw", Self::Raw),
         ("nrrd", Self::Nrrd),
@@ -34,19 +42,52 @@ impl SampleFormat {
         ("vti", Self::Vti),
         ("pvd", Self::Pvd),
         ("nc", Self::Netcdf),
+        ("nii", Self::Nifti),
+        ("nii.gz", Self::NiftiGz),
+        ("mha", Self::MetaImage),
     ];
 
     /// The format for a path's extension.
     pub fn of_ending(path: &Path) -> Option<Self> {
-        let ending = path.extension().and_then(|e| e.to_str()).map(|e| if e == "bin" { "raw" } else { e })?;
-        Self::NAMES.into_iter().find(|(name, _)| *name == ending).map(|(_, format)| format)
+        let name = path.file_name()?.to_str()?;
+        let has = |ending: &str| name.strip_suffix(ending).is_some_and(|stem| stem.ends_with('.'));
+        let known = Self::NAMES.into_iter().find(|(ending, _)| has(ending));
+        known.map(|(_, format)| format).or(has("bin").then_some(Self::Raw))
     }
 
-    /// How samples of a type are written in this format.
-    pub(super) fn encoding(self, from: SampleType) -> Encoding {
+    /// How the samples are written in this format.
+    pub(super) fn encoding(self, contents: &Contents) -> Encoding {
+        let from = contents.sample;
         let has_halves = matches!(self, Self::Npy | Self::Raw);
         let to = if from == SampleType::F16 && !has_halves { SampleType::F32 } else { from };
-        Encoding { from, to, big_endian: self == Self::Netcdf }
+        let big_endian = match self {
+            Self::Netcdf => true,
+            Self::Nifti | Self::NiftiGz => nifti::is_big_endian(contents),
+            _ => false,
+        };
+        Encoding { from, to, big_endian }
+    }
+
+    /// The order in which this format has the samples.
+    pub fn order(self, contents: &Contents) -> SampleOrder {
+        match &contents.description {
+            Some(description) if self == Self::Netcdf => SampleOrder::of_source(description),
+            Some(description) if self.has_lattice(contents) => SampleOrder::of_lattice(description),
+            _ => SampleOrder::default(),
+        }
+    }
+
+    /// Whether voxels are written in the order of the source's array, with its directions in the world.
+    pub(super) fn has_lattice(self, contents: &Contents) -> bool {
+        let Some(description) = contents.description.as_ref().filter(|all| all.orientation.is_some()) else {
+            return false;
+        };
+        match self {
+            Self::Nifti | Self::NiftiGz | Self::MetaImage | Self::Nrrd | Self::Nhdr => true,
+            // programs that show these rarely turn them: only what cannot be said otherwise
+            Self::Vti | Self::Pvd => description.source.starts_with("VTK") || !contents.is_straight(),
+            Self::Npy | Self::Raw | Self::Netcdf => false,
+        }
     }
 
     /// Notes for the user on what the format cannot store exactly as it was.
@@ -56,12 +97,15 @@ impl SampleFormat {
             Self::Nrrd | Self::Nhdr => "NRRD",
             Self::Vti | Self::Pvd => "VTK",
             Self::Netcdf => "NetCDF",
+            Self::Nifti | Self::NiftiGz => "NIfTI",
+            Self::MetaImage => "MetaImage",
         };
-        let Encoding { from, to, .. } = self.encoding(contents.sample);
+        let Encoding { from, to, .. } = self.encoding(contents);
         let retyped = (from != to).then(|| format!("{name} has no {from}: the samples are written as {to}, exactly"));
-        let untimed = name == "NRRD" && contents.times.len() > 1 && contents.regular_times().is_none();
+        let is_regular = matches!(name, "NRRD" | "NIfTI" | "MetaImage");
+        let untimed = is_regular && contents.times.len() > 1 && contents.regular_times().is_none();
         let untimed = untimed
-            .then(|| "NRRD can store only times at regular steps: the times of these frames are left out".into());
+            .then(|| format!("{name} can store only times at regular steps: the times of these frames are left out"));
         retyped.into_iter().chain(untimed).collect()
     }
 }

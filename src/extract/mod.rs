@@ -2,16 +2,21 @@
 //! formats of other programs.
 
 mod contents;
+mod dataset;
 mod encoding;
 mod format;
+mod metaimage;
 mod netcdf;
+mod nifti;
 mod nrrd;
+mod order;
 mod read;
 mod sink;
 mod vti;
 
 pub use contents::Contents;
 pub use format::SampleFormat;
+pub use order::{Direction, OutputAxis, SampleOrder};
 pub use read::read_region;
 pub use sink::{Files, Sink};
 
@@ -21,6 +26,8 @@ use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
+
+use order::Strides;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
@@ -35,6 +42,8 @@ pub struct ExtractConfig {
     pub region: Region,
     /// Which channel, from 0. Default: the first.
     pub channel: usize,
+    /// The order of the samples. Default: frame by frame, x fastest.
+    pub order: SampleOrder,
     /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
 }
@@ -42,7 +51,8 @@ pub struct ExtractConfig {
 impl ExtractConfig {
     /// All frames and voxels of the first channel of `file`.
     pub fn new(file: &CoefficientFile) -> Self {
-        Self { frames: (0..file.frames()).collect(), region: file.grid.whole(), channel: 0, memory: memory::DEFAULT }
+        let (frames, order) = ((0..file.frames()).collect(), SampleOrder::default());
+        Self { frames, region: file.grid.whole(), channel: 0, order, memory: memory::DEFAULT }
     }
 
     /// An error unless the file has these frames and voxels and this channel.
@@ -83,7 +93,7 @@ pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()
     Pieces::new(file, config).map(|_| ())
 }
 
-/// Writes the samples in the file's sample type, little-endian, frame by frame, x fastest. Messages call `out` `name`.
+/// Writes the samples in the file's sample type, little-endian, in the order of `config`. Messages call `out` `name`.
 pub fn extract(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -95,7 +105,7 @@ pub fn extract(
     extract_to(file, config, &mut write, progress)
 }
 
-/// As [`extract`]; `write` gets the samples in pieces: whole frames, or part of one frame.
+/// As [`extract`]; `write` gets the samples in pieces, one after another.
 pub fn extract_to(
     file: &CoefficientFile,
     config: &ExtractConfig,
@@ -106,14 +116,14 @@ pub fn extract_to(
     let mut report = ExtractReport::default();
     let pieces = Pieces::new(file, config)?;
     let mut bytes = Vec::new();
+    let all = config.frames.len() * config.region.voxels() * file.sample().size();
     for piece in pieces.list(file, config) {
-        read_piece(file, config.channel, &piece, pieces.blocks, &mut bytes, &mut report)?;
+        read_piece(file, config, &piece, pieces.blocks, &mut bytes, &mut report)?;
         write(&bytes)?;
         report.bytes += bytes.len() as u64;
-        if piece.region.end[2] == config.region.end[2] {
-            report.frames += piece.frames.len();
-            progress.advance(piece.frames.len() as u64);
-        }
+        let done = (report.bytes as u128 * config.frames.len() as u128 / all as u128) as usize;
+        progress.advance((done - report.frames) as u64);
+        report.frames = done;
     }
     file.check_unchanged()?;
     (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
@@ -121,17 +131,17 @@ pub fn extract_to(
     Ok(report)
 }
 
-/// The amount decoded at a time: whole frames of a window, or slabs of z of one frame.
+/// The amount decoded at a time: some items of the slowest axis, or of one of these some items of the second axis.
 struct Pieces {
-    frames: usize,
-    slab: usize,
+    /// Items along the two slowest axes.
+    items: [usize; 2],
     /// Blocks decoded at a time.
     blocks: usize,
 }
 
-/// Frames of one window and voxels that are decoded together, in the order of the output.
+/// Frames and voxels that are decoded together, in the order of the output.
+#[derive(Debug, Clone)]
 struct Piece {
-    window: u32,
     frames: Vec<usize>,
     region: Region,
 }
@@ -139,31 +149,54 @@ struct Piece {
 impl Pieces {
     fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
         config.check(file)?;
-        let plane = config.region.dims()[0] * config.region.dims()[1] * file.sample().size();
-        let frame = plane * config.region.dims()[2];
+        let [_, second, third, fastest] = config.order.axes().map(|axis| axis.len(config.frames.len(), &config.region));
+        let plane = third.saturating_mul(fastest).saturating_mul(file.sample().size());
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
         if available < plane {
             let least = (2 * plane + memory::FIXED + block_bytes(file)).div_ceil(1 << 20);
             return Err(Error::setting("memory", format!("extracting from this file needs at least {least}MiB")));
         }
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
-        Ok(Self { blocks, frames: (available / frame).max(1), slab: (available / plane).min(config.region.dims()[2]) })
+        let planes = available / plane.max(1);
+        Ok(Self { blocks, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })
     }
 
     fn list(&self, file: &CoefficientFile, config: &ExtractConfig) -> Vec<Piece> {
-        let same_window = |a: &usize, b: &usize| file.window_of(*a) == file.window_of(*b);
-        let groups = config.frames.chunk_by(same_window).flat_map(|g| g.chunks(self.frames));
-        let [z0, z1] = [config.region.start[2], config.region.end[2]];
-        groups
-            .flat_map(|frames| {
-                let window = file.window_of(frames[0]);
-                (z0..z1).step_by(self.slab).map(move |z| {
-                    let mut region = config.region;
-                    (region.start[2], region.end[2]) = (z, (z + self.slab).min(z1));
-                    Piece { window, frames: frames.to_vec(), region }
-                })
-            })
-            .collect()
+        let whole = Piece { frames: config.frames.clone(), region: config.region };
+        let [slowest, second, ..] = config.order.axes();
+        let slabs = whole.divided(slowest, self.items[0], file);
+        if self.items[1] >= second.len(config.frames.len(), &config.region) {
+            return slabs;
+        }
+        slabs.into_iter().flat_map(|slab| slab.divided(second, self.items[1], file)).collect()
+    }
+}
+
+impl Piece {
+    /// Cuts the piece along an axis, in the axis' direction, into pieces of at most so many items, and of frames of one
+    /// window.
+    fn divided(self, along: OutputAxis, items: usize, file: &CoefficientFile) -> Vec<Self> {
+        match along {
+            OutputAxis::Frames => {
+                let same_window = |a: &usize, b: &usize| file.window_of(*a) == file.window_of(*b);
+                let groups = self.frames.chunk_by(same_window).flat_map(|group| group.chunks(items));
+                groups.map(|frames| Self { frames: frames.to_vec(), region: self.region }).collect()
+            }
+            OutputAxis::Voxels(axis, direction) => {
+                let (start, end) = (self.region.start[axis], self.region.end[axis]);
+                let starts = (0..end - start).step_by(items);
+                let slab = |first: usize| {
+                    let (low, high) = (first, (first + items).min(end - start));
+                    let mut slab = self.clone();
+                    (slab.region.start[axis], slab.region.end[axis]) = match direction {
+                        Direction::Ascending => (start + low, start + high),
+                        Direction::Descending => (end - high, end - low),
+                    };
+                    slab
+                };
+                starts.map(slab).collect()
+            }
+        }
     }
 }
 
@@ -175,19 +208,47 @@ fn block_bytes(file: &CoefficientFile) -> usize {
 /// Fills `out` with the samples of a piece.
 fn read_piece(
     file: &CoefficientFile,
-    channel: usize,
+    config: &ExtractConfig,
     piece: &Piece,
     at_once: usize,
     out: &mut Vec<u8>,
     report: &mut ExtractReport,
 ) -> Result<()> {
-    let codec = file.codec(piece.window)?;
-    let first = file.window_range(piece.window).start;
-    let frames: Vec<usize> = piece.frames.iter().map(|f| f - first).collect();
+    let strides = config.order.strides(piece.frames.len(), &piece.region);
+    out.resize(piece.frames.len() * piece.region.voxels() * file.sample().size(), 0); // blocks overwrite all of it
+    let mut first = 0;
+    for frames in piece.frames.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)) {
+        let target = Target { strides, region: piece.region, first };
+        read_window(file, config.channel, frames, &target, at_once, out, report)?;
+        first += frames.len();
+    }
+    Ok(())
+}
+
+/// Where samples go in the array of a piece.
+struct Target {
+    strides: Strides,
+    region: Region,
+    /// The place of the first frame among those of the piece.
+    first: usize,
+}
+
+/// Reads the samples of a piece in frames of one window.
+fn read_window(
+    file: &CoefficientFile,
+    channel: usize,
+    frames: &[usize],
+    target: &Target,
+    at_once: usize,
+    out: &mut [u8],
+    report: &mut ExtractReport,
+) -> Result<()> {
+    let window = file.window_of(frames[0]);
+    let codec = file.codec(window)?;
+    let first = file.window_range(window).start;
+    let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
-    let size = file.sample().size();
-    out.resize(frames.len() * piece.region.voxels() * size, 0); // blocks overwrite all of it
-    for entries in file.entries(piece.window, channel, &piece.region) {
+    for entries in file.entries(window, channel, &target.region) {
         for entries in entries?.chunks(at_once) {
             let batch = file.batch(&codec, entries, &wanted)?;
             let decode =
@@ -195,7 +256,7 @@ fn read_piece(
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);
-                copy_block(&codec, &frames, &region, &samples, &piece.region, out);
+                target.copy(&codec, &frames, &region, &samples, out);
                 report.blocks_read += 1;
                 report.bytes_read += bytes_read;
             }
@@ -204,17 +265,30 @@ fn read_piece(
     Ok(())
 }
 
-/// Copies the rows shared by a block and the piece.
-fn copy_block(codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], piece: &Region, out: &mut [u8]) {
-    let size = codec.sample.size();
-    let shared = block.intersect(piece);
-    let row = shared.dims()[0] * size;
-    for (to_frame, from_frame) in frames.iter().enumerate() {
-        for (y, z) in shared.rows() {
-            let voxel = [shared.start[0], y, z];
-            let from = (from_frame * block.voxels() + block.index(voxel)) * size;
-            let to = (to_frame * piece.voxels() + piece.index(voxel)) * size;
-            out[to..to + row].copy_from_slice(&samples[from..from + row]);
+impl Target {
+    /// Copies the rows shared by a block and the piece.
+    fn copy(&self, codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], out: &mut [u8]) {
+        let (size, shared) = (codec.sample.size(), block.intersect(&self.region));
+        let row = shared.dims()[0] * size;
+        for (to_frame, from_frame) in frames.iter().enumerate() {
+            for (y, z) in shared.rows() {
+                let voxel = [shared.start[0], y, z];
+                let from = (from_frame * block.voxels() + block.index(voxel)) * size;
+                let to = self.strides.place(self.first + to_frame, voxel);
+                copy_row(&samples[from..from + row], size, (to, self.strides.along_x()), out);
+            }
         }
+    }
+}
+
+/// Copies samples of `size` bytes to places that begin at `to` and lie `step` apart.
+fn copy_row(row: &[u8], size: usize, (to, step): (usize, isize), out: &mut [u8]) {
+    if step == 1 {
+        return out[to * size..][..row.len()].copy_from_slice(row);
+    }
+    let mut at = to as isize;
+    for sample in row.chunks_exact(size) {
+        out[at as usize * size..][..size].copy_from_slice(sample);
+        at += step;
     }
 }

@@ -1,14 +1,15 @@
-//! The header of a classic NetCDF file, with the variables described by the conventions for climate and forecast data
-//! (CF).
+//! Classic NetCDF files: the header and everything before the samples.
 //!
 //! The samples are the last variable, so they are written as they come. The form is CDF-2 (64-bit offsets), or CDF-5
 //! (64-bit counts, more types) if types or lengths need it.
 
 use super::contents::Contents;
+use super::dataset::{Dataset, number_type};
+use crate::base::description::{Attribute, NumberType, Numbers, Values};
 use crate::base::sample::{SampleType, store};
 use std::io::{self, Write};
 
-/// Zeros after the samples fill up to a multiple of this many bytes.
+/// Zeros after the values of a variable fill up to a multiple of this many bytes.
 const ALIGNMENT: u64 = 4;
 
 const DIMENSIONS: u32 = 0x0a;
@@ -16,15 +17,17 @@ const VARIABLES: u32 = 0x0b;
 const ATTRIBUTES: u32 = 0x0c;
 const TEXT: u32 = 2;
 
-/// The dimensions, slowest first. Each has a variable of the same name with its times or positions.
-const NAMES: [&str; 4] = ["time", "z", "y", "x"];
-
-/// Writes the header, times and positions.
+/// Writes the header and all variables before the samples.
 pub(super) fn write_header(contents: &Contents, ty: SampleType, out: &mut impl Write) -> io::Result<()> {
-    let variables = variables(contents, ty);
-    let encode = |first| Header::of(contents, &variables, first).bytes;
+    let dataset = ClassicDataset::new(Dataset::new(contents, ty), sample_bytes(contents, ty));
+    let encode = |first| Header::of(&dataset, first).bytes;
     out.write_all(&encode(encode(0).len() as u64))?;
-    write_coordinates(contents, out)
+    dataset.variables.iter().filter_map(|variable| variable.values.as_ref()).try_for_each(|numbers| {
+        let mut bytes = numbers.bytes();
+        bytes.chunks_exact_mut(numbers.ty.size()).for_each(<[u8]>::reverse);
+        bytes.resize(bytes.len().next_multiple_of(ALIGNMENT as usize), 0);
+        out.write_all(&bytes)
+    })
 }
 
 /// The zeros after the samples.
@@ -38,69 +41,92 @@ fn sample_bytes(contents: &Contents, ty: SampleType) -> u64 {
     contents.voxels().saturating_mul((contents.frames.len() * ty.size()) as u64).min(most)
 }
 
-fn lengths(contents: &Contents) -> [u64; 4] {
-    let [x, y, z] = contents.grid.dims;
-    [contents.frames.len(), z, y, x].map(|n| n as u64)
+/// A dataset in terms of the format: all values are numbers, texts are arrays of characters.
+struct ClassicDataset {
+    dimensions: Vec<(String, u64)>,
+    global: Vec<Attribute>,
+    variables: Vec<ClassicVariable>,
 }
 
-fn write_coordinates(contents: &Contents, out: &mut impl Write) -> io::Result<()> {
-    let mut write = |number: f64| out.write_all(&reversed(number.to_le_bytes()));
-    contents.times.iter().try_for_each(|time| write(*time))?;
-    for axis in [2, 1, 0] {
-        let grid = &contents.grid;
-        (0..grid.dims[axis]).try_for_each(|i| write(grid.position([i; 3])[axis]))?;
-    }
-    Ok(())
-}
-
-/// A variable without its values.
-struct Variable {
+struct ClassicVariable {
     name: String,
-    /// Its range in [`NAMES`].
-    dimensions: std::ops::Range<usize>,
-    ty: SampleType,
-    texts: Vec<(&'static str, String)>,
-    /// The value of missing samples.
-    fill: Option<f64>,
+    dimensions: Vec<usize>,
+    ty: NumberType,
+    attributes: Vec<Attribute>,
     bytes: u64,
+    /// None of the samples, which are the last variable.
+    values: Option<Numbers>,
 }
 
-fn variables(contents: &Contents, ty: SampleType) -> Vec<Variable> {
-    let coordinates = NAMES.iter().enumerate().map(|(i, name)| Variable {
-        name: (*name).into(),
-        dimensions: i..i + 1,
-        ty: SampleType::F64,
-        texts: coordinate_texts(contents, name),
-        fill: None,
-        bytes: lengths(contents)[i] * size_of::<f64>() as u64,
-    });
-    let mut texts = vec![("long_name", contents.name.clone())];
-    texts.extend(contents.units.clone().map(|units| ("units", units)));
-    let (name, fill, bytes) = (name_of(contents), contents.missing, sample_bytes(contents, ty));
-    coordinates.chain([Variable { name, dimensions: 0..NAMES.len(), ty, texts, fill, bytes }]).collect()
+impl ClassicDataset {
+    fn new(dataset: Dataset, sample_bytes: u64) -> Self {
+        let Dataset { dimensions, global, variables, samples } = dataset;
+        let mut classic = Self { dimensions, global, variables: Vec::new() };
+        for variable in variables {
+            let (mut dimensions, mut attributes) = (variable.dimensions, variable.attributes);
+            let (values, characters) = classic.numbers(variable.values);
+            if let Some(characters) = characters {
+                dimensions.push(characters);
+                attributes.push(Attribute { name: "_Encoding".into(), value: Values::text("utf-8") });
+            }
+            let (ty, bytes) = (values.ty, values.bytes().len() as u64);
+            let (name, values) = (variable.name, Some(values));
+            classic.variables.push(ClassicVariable { name, dimensions, ty, attributes, bytes, values });
+        }
+        let mut attributes = samples.attributes;
+        attributes.extend(samples.fill.map(|fill| fill_value(samples.ty, fill)));
+        let (name, ty) = (samples.name, number_type(samples.ty));
+        let samples =
+            ClassicVariable { name, dimensions: samples.dimensions, ty, attributes, bytes: sample_bytes, values: None };
+        classic.variables.push(samples);
+        classic
+    }
+
+    /// Values as numbers; of texts their characters, with the dimension that counts these.
+    fn numbers(&mut self, values: Values) -> (Numbers, Option<usize>) {
+        match values {
+            Values::Numbers(numbers) => (numbers, None),
+            Values::Times(ty) => (Numbers::new(ty, &[]), None), // those of a dataset are numbers
+            Values::Texts(texts) => {
+                let longest = texts.iter().map(String::len).max().unwrap_or(0).max(1);
+                let padded = |text: String| [text.as_bytes(), &vec![0; longest - text.len()]].concat();
+                let characters: Vec<u8> = texts.into_iter().flat_map(padded).collect();
+                (Numbers::new(NumberType::Char, &characters), Some(self.characters(longest as u64)))
+            }
+        }
+    }
+
+    /// The dimension of texts of a length, as xarray calls it.
+    fn characters(&mut self, length: u64) -> usize {
+        let dimension = (format!("string{length}"), length);
+        let known = self.dimensions.iter().position(|other| *other == dimension);
+        known.unwrap_or_else(|| {
+            self.dimensions.push(dimension);
+            self.dimensions.len() - 1
+        })
+    }
+
+    /// Whether types or lengths need CDF-5.
+    fn is_wide(&self) -> bool {
+        let is_plain = |ty: NumberType| {
+            use NumberType::{Char, F32, F64, I8, I16, I32};
+            matches!(ty, Char | I8 | I16 | I32 | F32 | F64)
+        };
+        let of_attribute = |attribute: &Attribute| match &attribute.value {
+            Values::Numbers(numbers) => is_plain(numbers.ty),
+            Values::Texts(_) | Values::Times(_) => true,
+        };
+        let of_variables = self.variables.iter().flat_map(|variable| &variable.attributes);
+        !(self.variables.iter().all(|variable| is_plain(variable.ty))
+            && self.global.iter().chain(of_variables).all(of_attribute)
+            && self.dimensions.iter().all(|(_, length)| *length <= i32::MAX as u64))
+    }
 }
 
-fn coordinate_texts(contents: &Contents, name: &str) -> Vec<(&'static str, String)> {
-    let (space, time) = (contents.space_units.as_ref(), contents.time_units.as_ref());
-    // ParaView reads an axis marked X or Y as longitude or latitude, and bends the volume.
-    let (long, axis, units) = match name {
-        "time" if contents.numbered => ("number of the frame", Some("T"), None),
-        "time" => ("time", Some("T"), time),
-        "z" => ("z", Some("Z"), space),
-        _ => (name, None, space),
-    };
-    let mut texts = vec![("long_name", long.to_string())];
-    texts.extend(axis.map(|axis| ("axis", axis.into())));
-    texts.extend(units.map(|units| ("units", units.clone())));
-    texts.extend(contents.calendar.clone().filter(|_| name == "time").map(|calendar| ("calendar", calendar)));
-    texts
-}
-
-/// The variable's name in letters, digits and underscores, different from all dimensions.
-fn name_of(contents: &Contents) -> String {
-    let name: String = contents.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic());
-    if starts_well && !NAMES.contains(&name.as_str()) { name } else { format!("values_{name}") }
+fn fill_value(ty: SampleType, fill: f64) -> Attribute {
+    let mut bytes = vec![0; ty.size()];
+    store(ty, &[fill], &mut bytes);
+    Attribute { name: "_FillValue".into(), value: Values::Numbers(Numbers::new(number_type(ty), &bytes)) }
 }
 
 /// The header encoded so far.
@@ -112,34 +138,27 @@ struct Header {
 
 impl Header {
     /// The whole header; the values of the variables start at byte `first` of the file.
-    fn of(contents: &Contents, variables: &[Variable], first: u64) -> Self {
-        let lengths = lengths(contents);
-        let has_type = |v: &Variable| !matches!(v.ty, SampleType::U8 | SampleType::U16 | SampleType::U32);
-        let wide = !variables.iter().all(has_type) || lengths.iter().any(|n| *n > i32::MAX as u64);
+    fn of(dataset: &ClassicDataset, first: u64) -> Self {
+        let wide = dataset.is_wide();
         let mut header = Self { bytes: vec![b'C', b'D', b'F', if wide { 5 } else { 2 }], wide };
         header.count(0); // no records: no dimension is unlimited
-        header.list(DIMENSIONS, NAMES.len());
-        for (name, length) in NAMES.iter().zip(lengths) {
+        header.list(DIMENSIONS, dataset.dimensions.len());
+        for (name, length) in &dataset.dimensions {
             header.name(name);
-            header.count(length);
+            header.count(*length);
         }
-        header.list(ATTRIBUTES, 1);
-        header.text("Conventions", "CF-1.8");
-        header.list(VARIABLES, variables.len());
-        variables.iter().fold(first, |begin, variable| header.variable(variable, begin));
+        header.attributes(&dataset.global);
+        header.list(VARIABLES, dataset.variables.len());
+        dataset.variables.iter().fold(first, |begin, variable| header.variable(variable, begin));
         header
     }
 
     /// Encodes a variable whose values begin at byte `begin` of the file; returns where they end.
-    fn variable(&mut self, variable: &Variable, begin: u64) -> u64 {
+    fn variable(&mut self, variable: &ClassicVariable, begin: u64) -> u64 {
         self.name(&variable.name);
         self.count(variable.dimensions.len() as u64);
-        variable.dimensions.clone().for_each(|dimension| self.count(dimension as u64));
-        self.list(ATTRIBUTES, variable.texts.len() + usize::from(variable.fill.is_some()));
-        variable.texts.iter().for_each(|(name, text)| self.text(name, text));
-        if let Some(fill) = variable.fill {
-            self.number("_FillValue", variable.ty, fill);
-        }
+        variable.dimensions.iter().for_each(|dimension| self.count(*dimension as u64));
+        self.attributes(&variable.attributes);
         self.int(code_of(variable.ty));
         let padded = variable.bytes.next_multiple_of(ALIGNMENT);
         self.count(if self.wide { padded } else { padded.min(u32::MAX.into()) }); // the last may be "more"
@@ -156,8 +175,9 @@ impl Header {
         self.bytes.extend(if self.wide { &bytes[..] } else { &bytes[4..] });
     }
 
+    /// The beginning of a list; an empty one has no tag.
     fn list(&mut self, tag: u32, items: usize) {
-        self.int(tag);
+        self.int(if items == 0 { 0 } else { tag });
         self.count(items as u64);
     }
 
@@ -167,19 +187,30 @@ impl Header {
         self.pad();
     }
 
-    fn text(&mut self, name: &str, text: &str) {
-        self.name(name);
-        self.int(TEXT);
-        self.name(text);
+    fn attributes(&mut self, attributes: &[Attribute]) {
+        self.list(ATTRIBUTES, attributes.len());
+        attributes.iter().for_each(|attribute| self.attribute(attribute));
     }
 
-    fn number(&mut self, name: &str, ty: SampleType, value: f64) {
+    /// Several texts become one, a line for each.
+    fn attribute(&mut self, Attribute { name, value }: &Attribute) {
         self.name(name);
-        self.int(code_of(ty));
-        self.count(1);
-        let mut bytes = vec![0; ty.size()];
-        store(ty, &[value], &mut bytes);
-        self.bytes.extend(bytes.iter().rev());
+        match value {
+            Values::Texts(texts) => {
+                self.int(TEXT);
+                self.name(&texts.join("\n"));
+            }
+            Values::Numbers(numbers) => self.numbers(numbers),
+            Values::Times(_) => self.numbers(&Numbers::new(NumberType::F64, &[])), // of variables alone
+        }
+    }
+
+    fn numbers(&mut self, numbers: &Numbers) {
+        self.int(code_of(numbers.ty));
+        self.count(numbers.count() as u64);
+        let mut bytes = numbers.bytes();
+        bytes.chunks_exact_mut(numbers.ty.size()).for_each(<[u8]>::reverse);
+        self.bytes.extend(bytes);
         self.pad();
     }
 
@@ -188,16 +219,19 @@ impl Header {
     }
 }
 
-fn code_of(ty: SampleType) -> u32 {
+fn code_of(ty: NumberType) -> u32 {
     match ty {
-        SampleType::I8 => 1,
-        SampleType::I16 => 3,
-        SampleType::I32 => 4,
-        SampleType::F16 | SampleType::F32 => 5,
-        SampleType::F64 => 6,
-        SampleType::U8 => 7,
-        SampleType::U16 => 8,
-        SampleType::U32 => 9,
+        NumberType::I8 => 1,
+        NumberType::Char => TEXT,
+        NumberType::I16 => 3,
+        NumberType::I32 => 4,
+        NumberType::F32 => 5,
+        NumberType::F64 => 6,
+        NumberType::U8 => 7,
+        NumberType::U16 => 8,
+        NumberType::U32 => 9,
+        NumberType::I64 => 10,
+        NumberType::U64 => 11,
     }
 }
 
@@ -215,9 +249,13 @@ mod tests {
     fn written(contents: &Contents, ty: SampleType) -> (Vec<u8>, usize) {
         let mut bytes = Vec::new();
         write_header(contents, ty, &mut bytes).expect("written");
-        let coordinates = 8 * lengths(contents).iter().sum::<u64>() as usize;
-        let begin = bytes[..bytes.len() - coordinates].last_chunk().copied().expect("a header");
+        let begin = bytes[..bytes.len() - coordinates(contents)].last_chunk().copied().expect("a header");
         (bytes, u64::from_le_bytes(reversed(begin)) as usize)
+    }
+
+    /// Bytes of times and positions.
+    fn coordinates(contents: &Contents) -> usize {
+        8 * (contents.frames.len() + contents.grid.dims.iter().sum::<usize>())
     }
 
     #[test]
@@ -238,16 +276,7 @@ mod tests {
         large.grid.dims = [1 << 11, 1 << 10, 1 << 10];
         let (bytes, begin) = written(&large, SampleType::F32);
         assert_eq!(begin, bytes.len());
-        let size_and_begin = &bytes[bytes.len() - 8 * lengths(&large).iter().sum::<u64>() as usize - 12..][..4];
+        let size_and_begin = &bytes[bytes.len() - coordinates(&large) - 12..][..4];
         assert_eq!(size_and_begin, [0xff; 4]);
-    }
-
-    #[test]
-    fn names_are_those_that_the_conventions_allow() {
-        let named = |name: &str| name_of(&Contents { name: name.into(), ..contents() });
-        assert_eq!(
-            ["T", "wind speed/m", "2m", "x", "\u{3b8}"].map(named),
-            ["T", "wind_speed_m", "values_2m", "values_x", "values__"]
-        );
     }
 }

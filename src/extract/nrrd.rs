@@ -1,6 +1,7 @@
 //! Writes the header of a NRRD.
 
-use super::contents::Contents;
+use super::contents::{Contents, Lattice};
+use crate::base::description::Values;
 use crate::base::sample::SampleType;
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -12,18 +13,20 @@ pub(super) fn write_header(
     data: Option<&str>,
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let [x, y, z] = contents.grid.dims;
+    let lattice = contents.lattice();
+    let [x, y, z] = lattice.dims;
     let frames = contents.frames.len();
     let one = frames == 1;
+    let space = match lattice.space.as_str() {
+        "" => "space dimension: 3".into(),
+        space => format!("space: {space}"),
+    };
     writeln!(out, "NRRD0004\ncontent: {}\ntype: {}", contents.name, name_of(ty))?;
     match one {
-        true => writeln!(out, "dimension: 3\nspace dimension: 3\nsizes: {x} {y} {z}\nkinds: domain domain domain")?,
-        false => writeln!(
-            out,
-            "dimension: 4\nspace dimension: 3\nsizes: {x} {y} {z} {frames}\nkinds: domain domain domain time"
-        )?,
+        true => writeln!(out, "dimension: 3\n{space}\nsizes: {x} {y} {z}\nkinds: domain domain domain")?,
+        false => writeln!(out, "dimension: 4\n{space}\nsizes: {x} {y} {z} {frames}\nkinds: domain domain domain time")?,
     }
-    write_geometry(contents, one, out)?;
+    write_geometry(contents, &lattice, one, out)?;
     if let Some((first, step)) = contents.regular_times() {
         writeln!(out, "spacings: nan nan nan {step}\naxis mins: nan nan nan {first}")?;
         if let Some(units) = &contents.time_units {
@@ -34,18 +37,30 @@ pub(super) fn write_header(
         writeln!(out, "sample units: {units}")?;
     }
     writeln!(out, "endian: little\nencoding: raw")?;
+    write_keys(contents, out)?;
     match data {
         Some(name) => writeln!(out, "data file: {name}"),
         None => writeln!(out),
     }
 }
 
+/// Writes the keys and values of a source of this format.
+fn write_keys(contents: &Contents, out: &mut impl Write) -> io::Result<()> {
+    let of_source = contents.description.as_ref().filter(|description| description.source == "NRRD");
+    for attribute in of_source.iter().flat_map(|description| &description.global) {
+        if let Values::Texts(texts) = &attribute.value {
+            writeln!(out, "{}:={}", attribute.name, texts.join(" "))?;
+        }
+    }
+    Ok(())
+}
+
 /// Writes the positions of voxels in world space.
-fn write_geometry(contents: &Contents, one: bool, out: &mut impl Write) -> io::Result<()> {
-    let [sx, sy, sz] = contents.grid.spacing;
+fn write_geometry(contents: &Contents, lattice: &Lattice, one: bool, out: &mut impl Write) -> io::Result<()> {
     let time = if one { "" } else { " none" };
-    writeln!(out, "space directions: ({sx},0,0) (0,{sy},0) (0,0,{sz}){time}")?;
-    writeln!(out, "space origin: ({})", joined(contents.grid.origin, ","))?;
+    let [x, y, z] = lattice.steps().map(|step| joined(step.map(|along| along + 0.0), ","));
+    writeln!(out, "space directions: ({x}) ({y}) ({z}){time}")?;
+    writeln!(out, "space origin: ({})", joined(lattice.first, ","))?;
     match contents.space_units.as_deref().map(quoted) {
         Some(units) => writeln!(out, "space units: {units} {units} {units}"),
         None => Ok(()),

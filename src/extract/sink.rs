@@ -1,12 +1,14 @@
 //! Writes extracted samples to files.
 
-use super::contents::Contents;
+use super::contents::{Contents, Lattice};
 use super::encoding::Encoding;
 use super::format::SampleFormat;
-use super::{netcdf, nrrd, vti};
+use super::{metaimage, netcdf, nifti, nrrd, vti};
 use crate::base::error::{Error, Result};
 use crate::base::npy;
 use crate::base::output::{Numbered, Output, STANDARD};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -107,6 +109,49 @@ impl Drop for Folder {
     }
 }
 
+/// An output, perhaps in gzip.
+#[derive(Debug)]
+enum Stream {
+    Plain(Output),
+    Gzip(GzEncoder<Output>),
+}
+
+impl Stream {
+    fn new(out: Output, format: SampleFormat) -> Self {
+        match format {
+            SampleFormat::NiftiGz => Self::Gzip(GzEncoder::new(out, GZIP_LEVEL)),
+            _ => Self::Plain(out),
+        }
+    }
+
+    /// Completes the gzip.
+    fn finish(self) -> io::Result<Output> {
+        match self {
+            Self::Plain(out) => Ok(out),
+            Self::Gzip(out) => out.finish(),
+        }
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(out) => out.write(bytes),
+            Self::Gzip(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Plain(out) => out.flush(),
+            Self::Gzip(out) => out.flush(),
+        }
+    }
+}
+
+/// Fast, as nearly all of the time of an extraction goes to gzip.
+const GZIP_LEVEL: Compression = Compression::new(3);
+
 /// Writes samples to the files of an extraction.
 #[derive(Debug)]
 pub struct Sink<'a> {
@@ -115,7 +160,7 @@ pub struct Sink<'a> {
     force: bool,
     encoding: Encoding,
     /// The file being written.
-    open: Option<Output>,
+    open: Option<Stream>,
     /// Bytes of samples still missing in the open file.
     left: u64,
     /// The number of files of samples begun.
@@ -128,7 +173,7 @@ impl<'a> Sink<'a> {
     pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
         files.check(force)?;
         let folder = files.folder().map(Folder::create).transpose()?.flatten();
-        let encoding = files.format.encoding(contents.sample);
+        let encoding = files.format.encoding(contents);
         let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, _folder: folder };
         sink.begin()?;
         Ok(sink)
@@ -143,7 +188,9 @@ impl<'a> Sink<'a> {
             }
             let (these, others) = samples.split_at(self.left.min(samples.len() as u64) as usize);
             if let Some(out) = &mut self.open {
-                self.encoding.write(these, out).map_err(|e| Error::io(out.path(), "writing", e))?;
+                self.encoding
+                    .write(these, out)
+                    .map_err(|e| Error::io(&self.files.samples[self.begun - 1], "writing", e))?;
             }
             self.left -= these.len() as u64;
             samples = others;
@@ -164,7 +211,7 @@ impl<'a> Sink<'a> {
     fn begin(&mut self) -> Result<()> {
         let path = &self.files.samples[self.begun];
         let frames = self.contents.frames.len() / self.files.samples.len();
-        let mut out = Output::create(path, self.force)?;
+        let mut out = Stream::new(Output::create(path, self.force)?, self.files.format);
         self.write_header(&mut out).map_err(|e| Error::io(path, "writing", e))?;
         self.left = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
         (self.open, self.begun) = (Some(out), self.begun + 1);
@@ -179,11 +226,12 @@ impl<'a> Sink<'a> {
             SampleFormat::Netcdf => netcdf::padding(self.contents, self.encoding.to),
             _ => Vec::new(),
         };
-        out.write_all(&end).map_err(|e| Error::io(out.path(), "writing", e))?;
-        out.commit()
+        let failed = |e| Error::io(&self.files.samples[self.begun - 1], "writing", e);
+        out.write_all(&end).map_err(failed)?;
+        out.finish().map_err(failed)?.commit()
     }
 
-    fn write_header(&self, out: &mut Output) -> io::Result<()> {
+    fn write_header(&self, out: &mut Stream) -> io::Result<()> {
         let (contents, ty) = (self.contents, self.encoding.to);
         match self.files.format {
             SampleFormat::Npy => {
@@ -191,9 +239,22 @@ impl<'a> Sink<'a> {
                 npy::write_header(ty, &[contents.frames.len(), z, y, x], out)
             }
             SampleFormat::Nrrd => nrrd::write_header(contents, ty, None, out),
-            SampleFormat::Vti | SampleFormat::Pvd => vti::write_header(contents, ty, contents.times[self.begun], out),
+            SampleFormat::Vti | SampleFormat::Pvd => {
+                let lattice = self.lattice();
+                vti::write_header(contents, &lattice, (ty, contents.times[self.begun]), out)
+            }
+            SampleFormat::Nifti | SampleFormat::NiftiGz => nifti::write_header(contents, ty, out),
+            SampleFormat::MetaImage => metaimage::write_header(contents, ty, out),
             SampleFormat::Netcdf => netcdf::write_header(contents, ty, out),
             SampleFormat::Raw | SampleFormat::Nhdr => Ok(()),
+        }
+    }
+
+    /// Where the voxels are, in the order in which they are written.
+    fn lattice(&self) -> Lattice {
+        match self.files.format.has_lattice(self.contents) {
+            true => self.contents.lattice(),
+            false => self.contents.straight_lattice(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The text around the samples of a `.vti`, and the list of a `.pvd`.
 
-use super::contents::Contents;
+use super::contents::{Contents, Lattice};
 use crate::base::sample::SampleType;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
@@ -9,15 +9,21 @@ use std::io::{self, Write};
 pub(super) const END: &[u8] = b"\n  </AppendedData>\n</VTKFile>\n";
 
 /// Writes the text before the samples of a frame, and their number of bytes.
-pub(super) fn write_header(contents: &Contents, ty: SampleType, time: f64, out: &mut impl Write) -> io::Result<()> {
-    let [x, y, z] = contents.grid.dims.map(|n| n - 1);
+pub(super) fn write_header(
+    contents: &Contents,
+    lattice: &Lattice,
+    (ty, time): (SampleType, f64),
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let [x, y, z] = lattice.dims.map(|n| n - 1);
     let (extent, name, ty_name) = (format!("0 {x} 0 {y} 0 {z}"), escape(&contents.name), name_of(ty));
-    let [spacing, origin] = [contents.grid.spacing, contents.grid.origin].map(|v| v.map(|n| n.to_string()).join(" "));
+    let [spacing, origin] = [lattice.spacing(), lattice.first].map(|v| v.map(|n| n.to_string()).join(" "));
+    let direction = direction(lattice);
     write!(
         out,
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
-  <ImageData WholeExtent="{extent}" Origin="{origin}" Spacing="{spacing}">
+  <ImageData WholeExtent="{extent}" Origin="{origin}" Spacing="{spacing}"{direction}>
     <FieldData>
       <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time}</DataArray>
     </FieldData>
@@ -32,6 +38,16 @@ pub(super) fn write_header(contents: &Contents, ty: SampleType, time: f64, out: 
         units(contents)
     )?;
     out.write_all(&contents.voxels().saturating_mul(ty.size() as u64).to_le_bytes())
+}
+
+/// The directions of the axes as columns of a matrix; nothing if they are those of the world.
+fn direction(lattice: &Lattice) -> String {
+    let columns = lattice.directions();
+    let rows: Vec<f64> = (0..3).flat_map(|row| columns.map(|column| column[row] + 0.0)).collect();
+    if rows == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] {
+        return String::new();
+    }
+    format!(r#" Direction="{}""#, rows.iter().map(f64::to_string).collect::<Vec<_>>().join(" "))
 }
 
 /// The samples' unit, in VTK's own key.
@@ -77,7 +93,7 @@ mod tests {
     #[test]
     fn names_and_units_are_escaped() {
         let mut bytes = Vec::new();
-        write_header(&contents(), SampleType::I16, 0.25, &mut bytes).expect("written");
+        write_header(&contents(), &contents().lattice(), (SampleType::I16, 0.25), &mut bytes).expect("written");
         let (text, count) = bytes.split_at(bytes.len() - 8);
         let text = std::str::from_utf8(text).expect("text");
         for words in [

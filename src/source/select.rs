@@ -36,7 +36,7 @@ pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<
         return Err(Error::setting("region", format!("not within the volume of {x}x{y}x{z} voxels, or empty")));
     }
     let frames = selection.numbers(&archive);
-    archive.description = archive.description.map(|all| narrowed(&all, &frames, &selection.region));
+    archive.description = archive.description.map(|all| narrowed(&all, &frames, &selection.region, 1));
     archive.grid = archive.grid.crop(&selection.region);
     archive.frames = selection.frames;
     archive.times = archive.times.iter().skip(selection.first).step_by(selection.step).copied().collect();

@@ -17,6 +17,7 @@ mod formats_out;
 mod generated;
 mod guide;
 mod help;
+mod identical;
 mod interrupted;
 mod job;
 mod killed;

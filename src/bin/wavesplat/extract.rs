@@ -8,7 +8,9 @@ use wavesplat::base::grid::Region;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
-use wavesplat::extract::{Contents, ExtractConfig, ExtractReport, Files, SampleFormat, Sink, check_memory, extract_to};
+use wavesplat::extract::{
+    Contents, ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, extract_to,
+};
 use wavesplat::file::CoefficientFile;
 use wavesplat::source::CHANNELS;
 
@@ -57,7 +59,7 @@ pub(crate) struct ExtractArgs {
     /// Channel of a file of colours: red, green or blue
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
-    /// Format: npy raw nrrd nhdr vti pvd nc [default: by the extension of OUT; npy for -]
+    /// Format: npy raw nrrd nhdr vti pvd nc nii nii.gz mha [default: by the extension of OUT; npy for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<SampleFormat>,
     /// Extract damaged and lost blocks as missing samples (NaN, or the declared value, or 0), and the rest; exit code 3
@@ -87,14 +89,16 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }
-    let config = ExtractConfig {
+    let mut config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
         region: args.region(&file)?,
         channel: args.channel(&file)?,
+        order: SampleOrder::default(),
         memory: args.common.memory.0,
     };
+    let contents = Contents::new(&file, &config)?;
+    config.order = format.order(&contents);
     check_memory(&file, &config)?;
-    let contents = Contents::new(&file, &config);
     let files = Files::new(&args.output, format, &config.frames)?;
     files.paths().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
     let paths: Vec<PathBuf> = files.paths().map(Path::to_path_buf).collect();

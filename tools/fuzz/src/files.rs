@@ -9,7 +9,7 @@ use std::path::Path;
 use wavesplat::base::grid::Region;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
-use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::extract::{ExtractConfig, SampleOrder, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Mode, RenderConfig};
 use wavesplat::view::camera::View;
@@ -78,7 +78,13 @@ pub fn decode(data: &[u8]) {
         let whole = file.grid.whole();
         let corner = Region { start: whole.end.map(|end| end - 1), end: whole.end };
         for (frames, region) in [(file.frames().min(9), whole), (file.frames().min(999), corner)] {
-            let config = ExtractConfig { frames: (0..frames).collect(), region, channel: 0, memory: 256 << 20 };
+            let config = ExtractConfig {
+                frames: (0..frames).collect(),
+                region,
+                channel: 0,
+                order: SampleOrder::default(),
+                memory: 256 << 20,
+            };
             let mut out = Vec::new();
             if extract(&file, &config, path, &mut out, &Silent).is_ok() {
                 assert_eq!(out.len(), frames * region.voxels() * file.sample().size());

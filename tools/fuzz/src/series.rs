@@ -10,7 +10,7 @@ use wavesplat::base::sample::{SampleType, is_missing, load, store};
 use wavesplat::convert::{
     Basis, Bound, ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor, Stencil, convert,
 };
-use wavesplat::extract::{ExtractConfig, extract};
+use wavesplat::extract::{ExtractConfig, SampleOrder, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
 use wavesplat::source::{FrameSource, OpenOptions, open_stream};
@@ -120,7 +120,7 @@ pub fn roundtrip(data: &[u8]) {
 fn check(case: &Case, file: &CoefficientFile, path: &Path) {
     let mut decoded = Vec::new();
     let (frames, region) = ((0..case.frames).collect(), file.grid.whole());
-    let config = ExtractConfig { frames, region, channel: 0, memory: MEMORY };
+    let config = ExtractConfig { frames, region, channel: 0, order: SampleOrder::default(), memory: MEMORY };
     extract(file, &config, path, &mut decoded, &Silent).expect("what was just written is sound");
     if case.config.tolerance == 0.0 {
         assert_eq!(decoded, case.bytes, "bits");

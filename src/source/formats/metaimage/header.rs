@@ -8,6 +8,8 @@ use std::collections::HashMap;
 #[derive(Debug, Default)]
 pub(super) struct MetaImageHeader {
     fields: HashMap<String, String>, // names in lower case
+    /// Names as they are written, in order.
+    names: Vec<String>,
     /// The file names after `ElementDataFile = LIST`.
     pub(super) list: Vec<String>,
     /// Bytes up to the first one after `ElementDataFile`, which ends every header.
@@ -48,6 +50,7 @@ impl MetaImageHeader {
         let (name, value) = text
             .split_once(['=', ':'])
             .ok_or_else(|| format!("has a header line without a =: {:?}", shortened(text)))?;
+        self.names.push(name.trim().into());
         match self.fields.insert(name.trim().to_lowercase(), value.trim().into()) {
             Some(_) => Err(format!("says {} twice", name.trim())),
             None => Ok(()),
@@ -67,6 +70,12 @@ impl MetaImageHeader {
     /// A field by its name in lower case.
     pub(super) fn get(&self, name: &str) -> Option<&str> {
         self.fields.get(name).map(String::as_str)
+    }
+
+    /// The fields besides those that are `known`, as they are written.
+    pub(super) fn others<'a>(&'a self, known: &'a [&str]) -> impl Iterator<Item = (&'a str, &'a str)> {
+        let others = self.names.iter().filter(|name| !known.contains(&name.to_lowercase().as_str()));
+        others.filter_map(|name| Some((name.as_str(), self.get(&name.to_lowercase())?)))
     }
 
     /// The first of some fields that mean the same.

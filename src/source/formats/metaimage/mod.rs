@@ -6,6 +6,7 @@ mod header;
 use super::shared::component;
 use super::shared::directions::{Directions, Placed};
 use super::shared::words::numbers;
+use crate::base::description::{Attribute, Description, LPS, Values};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
@@ -30,10 +31,53 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let parts = data::parts(&file, &header, &samples)?;
     let times = times(&header, &samples).map_err(refused)?;
     let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
+    let description = description(&header, &samples).map_err(refused)?;
     let MetaImageSamples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
     let notes = note.into_iter().chain(unheeded).collect();
-    Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(shape, parts) })
+    Ok(FileHeader { spacing, origin, times, variable, notes, description, ..FileHeader::plain(shape, parts) })
 }
+
+/// The directions of the axes, and what else the header says; none if that is nothing.
+fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<Option<Description>> {
+    let axes = [Axis::new(Counts::Frames, samples.frames)].into_iter().filter(|_| samples.axes == 4);
+    let layout = Layout(axes.chain(samples.placed.voxels(samples.lengths)).collect());
+    let text = |(name, value): (&str, &str)| Attribute { name: name.into(), value: Values::text(value) };
+    let global: Vec<Attribute> = header.others(&KNOWN).map(text).collect();
+    let is_plain = global.is_empty() && samples.placed.is_plain();
+    let described = directions(header, samples.axes)?.description("MetaImage", LPS, &layout);
+    Ok((!is_plain).then_some(Description { global, ..described }))
+}
+
+/// Fields that say how samples are stored and where, in lower case. Others are kept as texts.
+const KNOWN: [&str; 27] = [
+    "objecttype",
+    "ndims",
+    "dimsize",
+    "elementtype",
+    "elementnumberofchannels",
+    "elementdatafile",
+    "headersize",
+    "binarydata",
+    "binarydatabyteordermsb",
+    "elementbyteordermsb",
+    "compresseddata",
+    "compresseddatasize",
+    "elementspacing",
+    "elementsize",
+    "offset",
+    "position",
+    "origin",
+    "transformmatrix",
+    "rotation",
+    "orientation",
+    "centerofrotation",
+    "elementmin",
+    "elementmax",
+    "itk_inputfiltername",
+    "elementtointensityfunctionslope",
+    "elementtointensityfunctionoffset",
+    "anatomicalorientation",
+];
 
 /// What the samples are, wherever they are.
 struct MetaImageSamples {

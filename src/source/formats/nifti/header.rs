@@ -59,12 +59,12 @@ impl NiftiHeader {
             (true, _) => {
                 let row = |row: usize, column: usize| self.sform[4 * row + column];
                 let steps = [0, 1, 2].map(|column| [0, 1, 2].map(|r| row(r, column)));
-                Directions { steps, first: [0, 1, 2].map(|r| row(r, 3)) }
+                Directions::of_steps(steps, [0, 1, 2].map(|r| row(r, 3)))
             }
             (false, true) => self.by_quaternion(steps),
             (false, false) => {
                 let along = |axis: usize| std::array::from_fn(|a| if a == axis { steps[axis] } else { 0.0 });
-                Directions { steps: [0, 1, 2].map(along), first: [0.0; 3] }
+                Directions::of_steps([0, 1, 2].map(along), [0.0; 3])
             }
         }
     }
@@ -83,7 +83,7 @@ impl NiftiHeader {
         ];
         let steps = std::array::from_fn(|axis| columns[axis].map(|n: f64| n * steps[axis]));
         let [.., x, y, z] = self.qform;
-        Directions { steps, first: [x, y, z] }
+        Directions::of_steps(steps, [x, y, z])
     }
 }
 

@@ -7,6 +7,7 @@ pub(in crate::source) use header::is_nifti;
 
 use super::shared::component;
 use super::shared::deflated::{Compression, Stream};
+use crate::base::description::{Attribute, Description, NIFTI_HEADER, NumberType, Numbers, RAS, Values};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
@@ -31,7 +32,8 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let (data, compressed) = if header.pair { image_of(path)? } else { (path.clone(), compressed) };
     let array = NiftiSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let part = array.part(&header, &data, compressed)?;
-    Ok(array.described(&header, part))
+    let description = array.description(&header, &bytes[..header.len]);
+    Ok(FileHeader { description: Some(description), ..array.described(&header, part) })
 }
 
 /// The `.hdr` beside an `.img`, which other formats have too.
@@ -129,6 +131,13 @@ impl NiftiSamples {
         };
         part.stored.packing.clone_from(&self.packing);
         Ok(part)
+    }
+
+    /// The directions of the axes, and the whole header, which extracted files of the format repeat.
+    fn description(&self, header: &NiftiHeader, bytes: &[u8]) -> Description {
+        let described = header.directions().description("NIfTI", RAS, &self.layout);
+        let value = Values::Numbers(Numbers::new(NumberType::U8, bytes));
+        Description { global: vec![Attribute { name: NIFTI_HEADER.into(), value }], ..described }
     }
 
     fn described(self, header: &NiftiHeader, part: Part) -> FileHeader {

@@ -62,7 +62,7 @@ impl Axes {
         let steps = self.steps(header)?;
         if let Some(text) = header.get("spaceorigin") {
             let origin = vectors(text)?.into_iter().next().flatten().ok_or("space origin is no vector")?;
-            return Ok(Directions { steps, first: [origin[0], origin[1], origin[2]] });
+            return Ok(Directions::of_steps(steps, [origin[0], origin[1], origin[2]]));
         }
         let mins = per_axis(header, "axismins")?;
         let centers = header.get("centerings").or(header.get("centers")).unwrap_or_default().to_lowercase();
@@ -72,7 +72,7 @@ impl Axes {
             let half = if centers.get(axis) == Some(&"cell") { steps[a][a] / 2.0 } else { 0.0 };
             mins.get(axis).filter(|min| min.is_finite()).map_or(0.0, |min| min + half)
         });
-        Ok(Directions { steps, first })
+        Ok(Directions::of_steps(steps, first))
     }
 
     fn steps(&self, header: &NrrdHeader) -> Parsed<[[f64; 3]; 3]> {

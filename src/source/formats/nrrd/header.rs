@@ -10,6 +10,8 @@ pub(in crate::source) const MAGIC: &[u8] = b"NRRD000";
 #[derive(Debug)]
 pub(super) struct NrrdHeader {
     fields: HashMap<String, String>, // names in lower case, without spaces
+    /// Keys of users, and their values.
+    pub(super) keys: Vec<(String, String)>,
     /// The file names after `data file: LIST`.
     pub(super) list: Vec<String>,
     /// Bytes up to the first sample of an attached file.
@@ -24,7 +26,7 @@ impl NrrdHeader {
         if !bytes.starts_with(MAGIC) {
             return Err("does not start as a NRRD file does".into());
         }
-        let mut header = Self { fields: HashMap::new(), list: Vec::new(), len: 0, closed: false };
+        let mut header = Self { fields: HashMap::new(), keys: Vec::new(), list: Vec::new(), len: 0, closed: false };
         for line in bytes.split_inclusive(|b| *b == b'\n') {
             if !line.ends_with(b"\n") && !whole {
                 return Ok(None);
@@ -52,11 +54,16 @@ impl NrrdHeader {
             return Ok(());
         }
         match (text.split_once(": "), text.split_once(":=")) {
-            (Some((name, _)), Some((key, _))) if key.len() < name.len() => Ok(()),
+            (Some((name, _)), Some((key, value))) if key.len() < name.len() => self.key(key, value),
             (Some((name, value)), _) => self.field(name, value),
-            (None, Some(_)) => Ok(()), // a key and its value, for people
+            (None, Some((key, value))) => self.key(key, value),
             (None, None) => Err(format!("has a header line without a colon: {text:?}")),
         }
+    }
+
+    fn key(&mut self, key: &str, value: &str) -> Parsed<()> {
+        self.keys.push((key.trim().into(), value.trim().into()));
+        Ok(())
     }
 
     fn field(&mut self, name: &str, value: &str) -> Parsed<()> {

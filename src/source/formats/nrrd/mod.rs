@@ -10,6 +10,7 @@ pub(in crate::source) use header::MAGIC;
 
 use super::shared::component;
 use super::shared::directions::Placed;
+use crate::base::description::{Attribute, Description, Values};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
@@ -28,12 +29,22 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let header = growing_head(&file, NrrdHeader::parse)?;
     let array = NrrdSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &array)?;
+    let description = description(&header, &array).map_err(refused)?;
     let times = array.axes.times(&header).map_err(refused)?;
     let units = array.axes.units(&header);
     let NrrdSamples { shape, placed, variable, .. } = array;
     let Placed { spacing, origin, note, .. } = placed;
     let notes = note.into_iter().collect();
-    Ok(FileHeader { spacing, origin, times, units, variable, notes, ..FileHeader::plain(shape, parts) })
+    Ok(FileHeader { spacing, origin, times, units, variable, notes, description, ..FileHeader::plain(shape, parts) })
+}
+
+/// The directions of the axes, and the keys and values of users; none if axes ascend along those of an unnamed world.
+fn description(header: &NrrdHeader, array: &NrrdSamples) -> Parsed<Option<Description>> {
+    let space = header.get("space").unwrap_or_default();
+    let is_plain = space.is_empty() && header.keys.is_empty() && array.placed.is_plain();
+    let text = |(name, value): &(String, String)| Attribute { name: name.clone(), value: Values::text(value) };
+    let described = array.axes.placed(header)?.description("NRRD", space, &array.layout);
+    Ok((!is_plain).then(|| Description { global: header.keys.iter().map(text).collect(), ..described }))
 }
 
 /// The samples that are meant.

@@ -1,8 +1,9 @@
 //! How the axes of an array go in the world: along the world's in any order and direction, or aslant.
 
+use crate::base::description::{ArrayAxis, AxisRole, Description, Dimension, Orientation};
 use crate::base::error::Note;
 use crate::source::Parsed;
-use crate::source::layout::{Axis, Counts};
+use crate::source::layout::{Axis, Counts, Layout};
 
 /// What is taken as straight: a part of a step so small does not show.
 const SLANT: f64 = 1e-3;
@@ -10,8 +11,10 @@ const SLANT: f64 = 1e-3;
 /// Axes of voxels in the world.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::source) struct Directions {
-    /// From a voxel to the next along each axis of the array, the fastest first.
-    pub(in crate::source) steps: [[f64; 3]; 3],
+    /// Of each axis of the array, the fastest first; of any length.
+    directions: [[f64; 3]; 3],
+    /// A step along each axis is its direction times this.
+    spacing: [f64; 3],
     /// World position of the voxel that is stored first.
     pub(in crate::source) first: [f64; 3],
 }
@@ -36,26 +39,40 @@ impl Directions {
         if spacing.iter().any(|step| *step < 0.0) {
             return Err(format!("has the spacing {spacing:?}, which is not positive"));
         }
-        let steps = std::array::from_fn(|axis| directions[axis].map(|c: f64| c * spacing[axis]));
-        Ok(Self { steps, first })
+        Ok(Self { directions, spacing, first })
+    }
+
+    /// These steps along the axes.
+    pub(in crate::source) fn of_steps(steps: [[f64; 3]; 3], first: [f64; 3]) -> Self {
+        Self { directions: steps, spacing: [1.0; 3], first }
+    }
+
+    /// From a voxel to the next along each axis.
+    fn steps(&self) -> [[f64; 3]; 3] {
+        std::array::from_fn(|axis| self.directions[axis].map(|c| c * self.spacing[axis]))
+    }
+
+    /// The same axes from another first voxel, whose place is given in steps from this one.
+    pub(in crate::source) fn from_place(self, steps: [f64; 3]) -> Self {
+        Self { first: self.place(steps), ..self }
     }
 
     /// World position of a place that is given in steps from the first voxel.
-    pub(in crate::source) fn place(&self, steps: [f64; 3]) -> [f64; 3] {
-        let along = |axis: usize| (0..3).map(|a| self.steps[a][axis] * steps[a]).sum::<f64>();
+    fn place(&self, steps: [f64; 3]) -> [f64; 3] {
+        let along = |axis: usize| (0..3).map(|a| self.steps()[a][axis] * steps[a]).sum::<f64>();
         std::array::from_fn(|axis| self.first[axis] + along(axis))
     }
 
     /// Turns an array of these lengths so that its axes ascend along x, y, z. One that is aslant stays as it is stored.
     pub(in crate::source) fn placed(&self, lengths: [usize; 3], what: &str) -> Placed {
-        let norms = self.steps.map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
+        let norms = self.steps().map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
         let Some(along) = self.straight(&norms) else {
-            let note = Some(format!("the {what} are not kept: axes are taken as those of the world").into());
+            let note = Some(format!("the {what} are oblique: pictures take the axes as those of the world").into());
             return Placed { axes: [0, 1, 2].map(|a| (a, false)), spacing: norms, origin: self.first, note };
         };
         let (mut spacing, mut origin) = (norms, self.first);
         let axes = [0, 1, 2].map(|a| {
-            let backwards = self.steps[a][along[a]] < 0.0;
+            let backwards = self.steps()[a][along[a]] < 0.0;
             spacing[along[a]] = norms[a];
             origin[along[a]] -= if backwards { norms[a] * lengths[a].saturating_sub(1) as f64 } else { 0.0 };
             (along[a], backwards)
@@ -63,10 +80,38 @@ impl Directions {
         Placed { axes, spacing, origin, note: turned(&axes).map(Note::from) }
     }
 
+    /// The description of an array with these directions, in a world whose axes ascend as `space` says.
+    pub(in crate::source) fn description(&self, source: &str, space: &str, layout: &Layout) -> Description {
+        let role = |axis: &Axis| match axis.counts {
+            Counts::Frames => Some(AxisRole::Frames),
+            Counts::Voxels(along) => Some(AxisRole::of_voxels(along)),
+            Counts::Only(_) => None,
+        };
+        let known = layout.0.iter().filter_map(|axis| Some((axis, role(axis)?)));
+        let dimension = |axis: &Axis| Dimension { name: String::new(), length: axis.len as u64, unlimited: false };
+        let axis = |(number, (axis, role)): (u32, (&Axis, AxisRole))| ArrayAxis {
+            dimension: number,
+            role,
+            reversed: axis.backwards,
+        };
+        Description {
+            source: source.into(),
+            dimensions: known.clone().map(|(axis, _)| dimension(axis)).collect(),
+            axes: (0..).zip(known).map(axis).collect(),
+            orientation: Some(Orientation {
+                space: space.into(),
+                first: self.first,
+                directions: self.directions,
+                spacing: self.spacing,
+            }),
+            ..Description::default()
+        }
+    }
+
     /// The axis of the world that each axis of the array goes along.
     fn straight(&self, norms: &[f64; 3]) -> Option<[usize; 3]> {
         let mut along = [0; 3];
-        for ((along, step), norm) in along.iter_mut().zip(&self.steps).zip(norms) {
+        for ((along, step), norm) in along.iter_mut().zip(&self.steps()).zip(norms) {
             *along = (0..3).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()))?;
             let slant = |a: usize| a != *along && step[a].abs() > SLANT * norm;
             if !norm.is_finite() || *norm == 0.0 || (0..3).any(slant) {
@@ -78,6 +123,11 @@ impl Directions {
 }
 
 impl Placed {
+    /// Whether the axes are those of the world, in order and ascending.
+    pub(in crate::source) fn is_plain(&self) -> bool {
+        self.note.is_none()
+    }
+
     /// The axes of an array of these lengths, its slowest first.
     pub(in crate::source) fn voxels(&self, lengths: [usize; 3]) -> [Axis; 3] {
         [2, 1, 0].map(|a| {
@@ -101,7 +151,7 @@ mod tests {
     use super::*;
 
     fn placed(steps: [[f64; 3]; 3]) -> Placed {
-        Directions { steps, first: [1.0, 2.0, 3.0] }.placed([7, 5, 3], "directions")
+        Directions::of_steps(steps, [1.0, 2.0, 3.0]).placed([7, 5, 3], "directions")
     }
 
     #[test]
@@ -128,7 +178,7 @@ mod tests {
         for steps in [[x, [0.0, 3.0, 4.0], z], [x, x, z], [x, [0.0; 3], z], [x, y, [f64::NAN; 3]]] {
             let found = placed(steps);
             assert_eq!(found.axes, [(0, false), (1, false), (2, false)]);
-            assert!(found.note.expect("a note").text.contains("directions are not kept"));
+            assert!(found.note.expect("a note").text.contains("directions are oblique"));
         }
         assert_eq!(placed([x, [0.0, 3.0, 4.0], z]).spacing, [1.0, 5.0, 1.0]);
     }

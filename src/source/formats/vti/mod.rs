@@ -11,6 +11,7 @@ mod skeleton;
 
 use super::shared::component::{self, Chosen};
 use super::shared::directions::{Directions, Placed};
+use crate::base::description::Description;
 use crate::base::error::{Error, Result};
 use crate::source::file_header::FileHeader;
 use crate::source::layout::Shape;
@@ -29,10 +30,20 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let wanted = ChosenArray::of(header, variable).map_err(|e| Error::input(path, e))?;
     let (part, time) = pieced::part(&image, &wanted)?;
     let array = wanted.array;
+    let description = wanted.description(header).map_err(|e| Error::input(path, e))?;
     let variable = Some(component::label(&array.name, array.components, wanted.chosen.component));
     let Placed { spacing, origin, note, .. } = wanted.placed;
-    let (times, notes) = (time.into_iter().collect(), note.into_iter().collect());
-    Ok(FileHeader { spacing, origin, times, variable, notes, ..FileHeader::plain(wanted.shape, vec![part]) })
+    let (times, notes): (_, Vec<_>) = (time.into_iter().collect(), note.into_iter().collect());
+    let description = (!notes.is_empty()).then_some(description);
+    Ok(FileHeader {
+        spacing,
+        origin,
+        times,
+        variable,
+        notes,
+        description,
+        ..FileHeader::plain(wanted.shape, vec![part])
+    })
 }
 
 /// The arrays among which the user must choose; none if it is clear which one is meant.
@@ -79,6 +90,12 @@ impl<'a> ChosenArray<'a> {
         Ok(Self { array, chosen, whole: header.whole, lengths, placed, shape, voxel })
     }
 
+    /// The directions of the axes.
+    fn description(&self, header: &VtiHeader) -> Parsed<Description> {
+        let directions = directions(header, self.array, header.whole.points()?)?;
+        Ok(directions.description("VTK image data", "", &Layout(self.placed.voxels(self.lengths).to_vec())))
+    }
+
     fn stored(&self, big_endian: bool) -> Parsed<Stored> {
         let components = Axis::new(Counts::Only(self.chosen.component), self.array.components);
         let layout = Layout(self.placed.voxels(self.lengths).into_iter().chain([components]).collect());
@@ -92,7 +109,7 @@ fn directions(header: &VtiHeader, array: &VtiArray, points: [usize; 3]) -> Parse
     let columns = std::array::from_fn(|axis| [0, 1, 2].map(|row| matrix[3 * row + axis]));
     let lattice = Directions::of(columns, header.spacing, header.origin)?;
     let start = [0, 1, 2].map(|axis| header.whole.ends(axis).0 as f64);
-    Ok(Directions { first: lattice.place(array.of.origin(points, start, [1.0; 3])), ..lattice })
+    Ok(lattice.from_place(array.of.origin(points, start, [1.0; 3])))
 }
 
 #[cfg(test)]
