@@ -57,7 +57,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 22] = [
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
     ("spleen_font::", &["render/annotate/"]),
-    ("quick_xml::", &["source/formats/", "extract/vti.rs"]),
+    ("quick_xml::", &["source/formats/", "extract/vti.rs", "extract/vtr.rs"]),
     ("flate2::", &["source/formats/", "extract/sink.rs"]),
     ("hdf5_reader::", &["source/formats/arrays/"]),
     ("netcdf_reader::", &["source/formats/arrays/"]),

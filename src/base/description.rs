@@ -180,6 +180,17 @@ pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> 
     Some(at)
 }
 
+/// Whether coordinates are as far apart as each other, but for rounding to single precision.
+pub fn is_regular(at: &[f64]) -> bool {
+    let [first, .., last] = at else { return true };
+    let step = (last - first) / (at.len() - 1) as f64;
+    let is_near = |(i, at): (usize, &f64)| (first + step * i as f64 - at).abs() <= REGULAR * step.abs();
+    at.iter().enumerate().all(is_near)
+}
+
+/// The largest deviation of regular coordinates from equal steps, in steps.
+const REGULAR: f64 = 1e-2;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,6 +13,12 @@ pub struct Grid {
     pub origin: [f64; 3],
 }
 
+/// A volume that is wider than high by this factor is nearly a sheet.
+const FLAT: f64 = 20.0;
+
+/// A volume that is wider than high by about this factor looks like one.
+const VISIBLE: f64 = 4.0;
+
 impl Grid {
     /// A grid of unit spacing at the world's origin.
     pub fn unit(dims: [usize; 3]) -> Self {
@@ -32,6 +38,25 @@ impl Grid {
     /// World position of a voxel.
     pub fn position(&self, voxel: [usize; 3]) -> [f64; 3] {
         std::array::from_fn(|a| self.origin[a] + self.spacing[a] * voxel[a] as f64)
+    }
+
+    /// The grid with its heights multiplied: `factor` is finite and positive.
+    pub fn exaggerated(&self, factor: f64) -> Self {
+        let ([x, y, z], [ox, oy, oz]) = (self.spacing, self.origin);
+        Self { spacing: [x, y, z * factor], origin: [ox, oy, oz * factor], ..*self }
+    }
+
+    /// The factor that makes heights visible where the volume is nearly a flat sheet: 1, 2 or 5 times a power of 10; 1 for
+    /// other volumes.
+    pub fn sensible_exaggeration(&self) -> f64 {
+        let extent = |axis: usize| self.spacing[axis] * (self.dims[axis] - 1) as f64;
+        let (wide, high) = (extent(0).max(extent(1)), extent(2));
+        if high <= 0.0 || high * FLAT >= wide {
+            return 1.0;
+        }
+        let wanted = wide / high / VISIBLE;
+        let power = 10_f64.powf(wanted.log10().floor());
+        [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|factor| *factor <= wanted).unwrap_or(1.0)
     }
 
     /// The grid of a region of this one, at the same place in the world.
@@ -175,6 +200,17 @@ impl BlockGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flat_volumes_are_exaggerated() {
+        let grid = |z: f64| Grid { spacing: [1000.0, 900.0, z], ..Grid::unit([101, 50, 31]) };
+        // 100 km wide and 3000 z high: a quarter of the width is 25 km
+        let factors = [10.0, 100.0, 160.0, 170.0].map(|z| grid(z).sensible_exaggeration());
+        assert_eq!(factors, [50.0, 5.0, 5.0, 1.0]);
+        assert_eq!(Grid { dims: [101, 50, 1], ..grid(1.0) }.sensible_exaggeration(), 1.0);
+        let drawn = Grid { origin: [1.0, 2.0, -3.0], ..grid(10.0) }.exaggerated(50.0);
+        assert_eq!((drawn.spacing, drawn.origin), ([1000.0, 900.0, 500.0], [1.0, 2.0, -150.0]));
+    }
 
     #[test]
     fn blocks_tile_the_volume_without_overlap() {

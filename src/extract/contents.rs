@@ -2,7 +2,7 @@
 
 use super::ExtractConfig;
 use super::order::{OutputAxis, SampleOrder};
-use crate::base::description::{Description, Orientation, narrowed};
+use crate::base::description::{Description, Orientation, coordinates, is_regular, narrowed};
 use crate::base::error::Result;
 use crate::base::grid::Grid;
 use crate::base::sample::{SampleType, missing_value, round_to};
@@ -129,6 +129,18 @@ impl Contents {
         let voxels = SampleOrder::of_lattice(description).axes().into_iter().rev().filter_map(OutputAxis::voxels);
         let mut lengths = voxels.map(|axis| self.grid.dims[axis]);
         Lattice { dims: std::array::from_fn(|_| lengths.next().unwrap_or(1)), first, directions, spacing, space }
+    }
+
+    /// The coordinates of an axis of voxels, ascending: those of the source, or those of the lattice.
+    pub(super) fn coordinates(&self, axis: usize) -> Vec<f64> {
+        let own = self.description.as_ref().and_then(|description| coordinates(description, axis));
+        own.unwrap_or_else(|| (0..self.grid.dims[axis]).map(|i| self.grid.position([i; 3])[axis]).collect())
+    }
+
+    /// The axes whose coordinates are not at regular steps.
+    pub(super) fn irregular_axes(&self) -> Vec<&'static str> {
+        let is_irregular = |axis: &usize| !is_regular(&self.coordinates(*axis));
+        (0..3).filter(is_irregular).map(|axis| ["x", "y", "z"][axis]).collect()
     }
 
     /// Whether the source's axes go along those of the world, in any order and direction.

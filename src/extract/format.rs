@@ -30,11 +30,15 @@ pub enum SampleFormat {
     NiftiGz,
     /// MetaImage in one file: x y z t, or x y z for one frame.
     MetaImage,
+    /// A VTK rectilinear grid, one file for each frame.
+    Vtr,
+    /// A Zarr store of version 2, in the order of the source's array or (time, z, y, x), with coordinates.
+    Zarr,
 }
 
 impl SampleFormat {
     /// The formats by name, which is also their file extension.
-    pub const NAMES: [(&'static str, Self); 10] = [
+    pub const NAMES: [(&'static str, Self); 12] = [
         ("npy", Self::Npy),
         ("raw", Self::Raw),
         ("nrrd", Self::Nrrd),
@@ -45,7 +49,14 @@ impl SampleFormat {
         ("nii", Self::Nifti),
         ("nii.gz", Self::NiftiGz),
         ("mha", Self::MetaImage),
+        ("vtr", Self::Vtr),
+        ("zarr", Self::Zarr),
     ];
+
+    /// Its name.
+    pub(super) fn name(self) -> &'static str {
+        Self::NAMES.into_iter().find(|(_, format)| *format == self).map_or("", |(name, _)| name)
+    }
 
     /// The format for a path's extension.
     pub fn of_ending(path: &Path) -> Option<Self> {
@@ -71,7 +82,7 @@ impl SampleFormat {
     /// The order in which this format has the samples.
     pub fn order(self, contents: &Contents) -> SampleOrder {
         match &contents.description {
-            Some(description) if self == Self::Netcdf => SampleOrder::of_source(description),
+            Some(description) if matches!(self, Self::Netcdf | Self::Zarr) => SampleOrder::of_source(description),
             Some(description) if self.has_lattice(contents) => SampleOrder::of_lattice(description),
             _ => SampleOrder::default(),
         }
@@ -86,7 +97,7 @@ impl SampleFormat {
             Self::Nifti | Self::NiftiGz | Self::MetaImage | Self::Nrrd | Self::Nhdr => true,
             // programs that show these rarely turn them: only what cannot be said otherwise
             Self::Vti | Self::Pvd => description.source.starts_with("VTK") || !contents.is_straight(),
-            Self::Npy | Self::Raw | Self::Netcdf => false,
+            Self::Npy | Self::Raw | Self::Netcdf | Self::Vtr | Self::Zarr => false,
         }
     }
 
@@ -95,7 +106,8 @@ impl SampleFormat {
         let name = match self {
             Self::Npy | Self::Raw => return Vec::new(),
             Self::Nrrd | Self::Nhdr => "NRRD",
-            Self::Vti | Self::Pvd => "VTK",
+            Self::Vti | Self::Pvd | Self::Vtr => "VTK",
+            Self::Zarr => "Zarr",
             Self::Netcdf => "NetCDF",
             Self::Nifti | Self::NiftiGz => "NIfTI",
             Self::MetaImage => "MetaImage",
@@ -106,6 +118,11 @@ impl SampleFormat {
         let untimed = is_regular && contents.times.len() > 1 && contents.regular_times().is_none();
         let untimed = untimed
             .then(|| format!("{name} can store only times at regular steps: the times of these frames are left out"));
-        retyped.into_iter().chain(untimed).collect()
+        let irregular = contents.irregular_axes();
+        let is_lattice = !matches!(self, Self::Netcdf | Self::Vtr | Self::Zarr) && !irregular.is_empty();
+        let irregular = is_lattice.then(|| {
+            format!("{name} has only regular steps: .vtr, .nc and .zarr keep the places along {}", irregular.join(", "))
+        });
+        retyped.into_iter().chain(untimed).chain(irregular).collect()
     }
 }

@@ -12,7 +12,10 @@ mod nrrd;
 mod order;
 mod read;
 mod sink;
+mod store;
 mod vti;
+mod vtr;
+mod zarr;
 
 pub use contents::Contents;
 pub use format::SampleFormat;

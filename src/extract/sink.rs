@@ -3,7 +3,8 @@
 use super::contents::{Contents, Lattice};
 use super::encoding::Encoding;
 use super::format::SampleFormat;
-use super::{metaimage, netcdf, nifti, nrrd, vti};
+use super::store::StoreSink;
+use super::{metaimage, netcdf, nifti, nrrd, vti, vtr};
 use crate::base::error::{Error, Result};
 use crate::base::npy;
 use crate::base::output::{Numbered, Output, STANDARD};
@@ -28,7 +29,10 @@ impl Files {
     /// like `out_%04d.vti`. Headers and lists also have files beside them.
     pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
         let (samples, last) = match format {
-            SampleFormat::Vti => (numbered(path, frames)?, None),
+            SampleFormat::Vti | SampleFormat::Vtr => (numbered(path, format, frames)?, None),
+            SampleFormat::Zarr if path == Path::new(STANDARD) => {
+                return Err(Error::path(path, "a Zarr store is a folder, which standard output cannot take"));
+            }
             SampleFormat::Pvd => {
                 let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, "vti"));
                 (frames.iter().map(|frame| folder.join(names.of(*frame))).collect(), Some(path.into()))
@@ -66,11 +70,11 @@ impl Files {
 }
 
 /// A name for each frame.
-fn numbered(path: &Path, frames: &[usize]) -> Result<Vec<PathBuf>> {
+fn numbered(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Vec<PathBuf>> {
     if path == Path::new(STANDARD) && frames.len() > 1 {
         return Err(Error::path(
             path,
-            format!("standard output takes one .vti, and these are {} frames", frames.len()),
+            format!("standard output takes one .{}, and these are {} frames", format.name(), frames.len()),
         ));
     }
     let names = Numbered::new(path, frames.len())?;
@@ -154,7 +158,44 @@ const GZIP_LEVEL: Compression = Compression::new(3);
 
 /// Writes samples to the files of an extraction.
 #[derive(Debug)]
-pub struct Sink<'a> {
+pub struct Sink<'a>(Kind<'a>);
+
+#[derive(Debug)]
+enum Kind<'a> {
+    Files(FileSink<'a>),
+    Store(StoreSink),
+}
+
+impl<'a> Sink<'a> {
+    /// Opens the first file; existing files are an error unless `force` replaces them.
+    pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
+        let encoding = files.format.encoding(contents);
+        Ok(Self(match files.format {
+            SampleFormat::Zarr => Kind::Store(StoreSink::create(&files.samples[0], contents, encoding, force)?),
+            _ => Kind::Files(FileSink::create(files, contents, encoding, force)?),
+        }))
+    }
+
+    /// Writes the next samples, given little-endian.
+    pub fn write(&mut self, samples: &[u8]) -> Result<()> {
+        match &mut self.0 {
+            Kind::Files(files) => files.write(samples),
+            Kind::Store(store) => store.write(samples),
+        }
+    }
+
+    /// Commits the last file of samples, and writes the list or header if there is one.
+    pub fn finish(self) -> Result<()> {
+        match self.0 {
+            Kind::Files(files) => files.finish(),
+            Kind::Store(store) => store.finish(),
+        }
+    }
+}
+
+/// Writes samples to files.
+#[derive(Debug)]
+struct FileSink<'a> {
     contents: &'a Contents,
     files: Files,
     force: bool,
@@ -168,19 +209,16 @@ pub struct Sink<'a> {
     _folder: Option<Folder>, // dropped after the open file
 }
 
-impl<'a> Sink<'a> {
-    /// Opens the first file; existing files are an error unless `force` replaces them.
-    pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
+impl<'a> FileSink<'a> {
+    fn create(files: Files, contents: &'a Contents, encoding: Encoding, force: bool) -> Result<Self> {
         files.check(force)?;
         let folder = files.folder().map(Folder::create).transpose()?.flatten();
-        let encoding = files.format.encoding(contents);
         let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, _folder: folder };
         sink.begin()?;
         Ok(sink)
     }
 
-    /// Writes the next samples, given little-endian.
-    pub fn write(&mut self, mut samples: &[u8]) -> Result<()> {
+    fn write(&mut self, mut samples: &[u8]) -> Result<()> {
         while !samples.is_empty() {
             if self.left == 0 {
                 self.end()?;
@@ -198,8 +236,7 @@ impl<'a> Sink<'a> {
         Ok(())
     }
 
-    /// Commits the last file of samples, and writes the list or header if there is one.
-    pub fn finish(mut self) -> Result<()> {
+    fn finish(mut self) -> Result<()> {
         self.end()?;
         let Some(path) = &self.files.last else { return Ok(()) };
         let mut out = Output::create(path, self.force)?;
@@ -222,7 +259,7 @@ impl<'a> Sink<'a> {
     fn end(&mut self) -> Result<()> {
         let Some(mut out) = self.open.take() else { return Ok(()) };
         let end = match self.files.format {
-            SampleFormat::Vti | SampleFormat::Pvd => vti::END.to_vec(),
+            SampleFormat::Vti | SampleFormat::Pvd | SampleFormat::Vtr => vti::END.to_vec(),
             SampleFormat::Netcdf => netcdf::padding(self.contents, self.encoding.to),
             _ => Vec::new(),
         };
@@ -246,7 +283,8 @@ impl<'a> Sink<'a> {
             SampleFormat::Nifti | SampleFormat::NiftiGz => nifti::write_header(contents, ty, out),
             SampleFormat::MetaImage => metaimage::write_header(contents, ty, out),
             SampleFormat::Netcdf => netcdf::write_header(contents, ty, out),
-            SampleFormat::Raw | SampleFormat::Nhdr => Ok(()),
+            SampleFormat::Vtr => vtr::write_header(contents, (ty, contents.times[self.begun]), out),
+            SampleFormat::Raw | SampleFormat::Nhdr | SampleFormat::Zarr => Ok(()),
         }
     }
 

@@ -51,7 +51,7 @@ fn direction(lattice: &Lattice) -> String {
 }
 
 /// The samples' unit, in VTK's own key.
-fn units(contents: &Contents) -> String {
+pub(super) fn units(contents: &Contents) -> String {
     let key = |units| format!(r#"<InformationKey name="UNITS_LABEL" location="vtkDataArray">{units}</InformationKey>"#);
     contents.units.as_deref().map(escape).map(key).unwrap_or_default()
 }
@@ -72,7 +72,7 @@ pub(super) fn write_list(
     writeln!(out, "  </Collection>\n</VTKFile>")
 }
 
-fn name_of(ty: SampleType) -> &'static str {
+pub(super) fn name_of(ty: SampleType) -> &'static str {
     match ty {
         SampleType::U8 => "UInt8",
         SampleType::I8 => "Int8",

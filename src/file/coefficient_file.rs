@@ -31,6 +31,8 @@ pub struct CoefficientFile {
     pub blocks: BlockGrid,
     /// The level of detail: the lattice has every 2^lod-th voxel along each axis.
     lod: u32,
+    /// The factor by which heights are multiplied.
+    exaggeration: f64,
     /// What made samples into channels, if there are several.
     colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
@@ -89,7 +91,7 @@ impl CoefficientFile {
         let m = reader.metadata();
         let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
-        Ok(Self { path, grid, blocks, lod: 0, colour_transform, reader, state: None, skipped: None })
+        Ok(Self { path, grid, blocks, lod: 0, exaggeration: 1.0, colour_transform, reader, state: None, skipped: None })
     }
 
     /// The file as a coarser lattice: every 2^lod-th voxel along each axis, with all frames and the same first voxel.
@@ -100,7 +102,7 @@ impl CoefficientFile {
     /// [`Error::Setting`] if blocks do not begin on the lattice, or a window's pyramid does not refine all three axes.
     pub fn with_detail(mut self, lod: u32) -> Result<Self> {
         let (grid, blocks) = detail::coarse(self.metadata(), lod)?;
-        (self.grid, self.blocks, self.lod) = (grid, blocks, lod);
+        (self.grid, self.blocks, self.lod) = (grid.exaggerated(self.exaggeration), blocks, lod);
         Ok(self)
     }
 
@@ -111,7 +113,14 @@ impl CoefficientFile {
 
     /// The lattice of all voxels, whatever the level of detail.
     pub fn whole_grid(&self) -> Grid {
-        detail::whole(self.metadata()).0
+        detail::whole(self.metadata()).0.exaggerated(self.exaggeration)
+    }
+
+    /// The file with heights multiplied by a factor, finite and positive, for pictures of volumes that are nearly flat.
+    pub fn with_exaggeration(mut self, factor: f64) -> Self {
+        self.grid = self.grid.exaggerated(factor);
+        self.exaggeration *= factor;
+        self
     }
 
     /// The level of detail of [`Self::with_detail`]; 0 for all voxels.

@@ -38,6 +38,8 @@ MAX_DIM = 2147483648
 MAX_FRAMES = 9007199254740992
 MAX_METADATA = 16777216
 MAX_ROOT_RAW = 1073741824
+MAX_DESCRIPTION = 16777216
+MAX_DESCRIPTION_ITEMS = 65536
 
 MAGIC = bytes.fromhex("89 57 53 50 0D 0A 1A 0A")
 END_MAGIC = bytes.fromhex("89 57 53 50 45 4E 44 0A")
@@ -60,7 +62,8 @@ HEADER = Layout("Header", "magic 8s major H minor H reserved I required Q option
 FOOTER = Layout(
     "Footer",
     "id 16s total Q metadata_offset Q metadata_stored I metadata_raw I metadata_checksum Q root_offset Q"
-    " root_stored I root_raw I root_checksum Q blocks Q leaves Q reserved 24s checksum Q magic 8s",
+    " root_stored I root_raw I root_checksum Q blocks Q leaves Q description_offset Q description_stored I"
+    " description_raw I description_checksum Q checksum Q magic 8s",
 )
 FRAME = Layout("Frame", "tag 4s stored I raw I reserved I checksum Q")
 BLOCK = Layout(
@@ -79,7 +82,7 @@ LEAF = Layout(
 
 # Kinds of parts and sections (section 4).
 LEVEL, OUTLIERS, MISSING, EXACT = 0, 1, 2, 3
-KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22}
+KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22, b"DESC": 23}
 
 # The totals of no blocks: reached, share, squared_error, min, max, then counts.
 NO_BLOCKS = struct.pack("<ddddd", 0, 0, 0, math.inf, -math.inf) + bytes(24)
@@ -964,6 +967,86 @@ def to_samples(x: np.ndarray, dtype: np.dtype, place: str) -> np.ndarray:
 # ---------------------------------------------------------------- the file
 
 
+# ---------------------------------------------------------------- section 6, description
+
+
+NUMBERS = ["u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f4", "<f8", "S1"]
+ROLES = ["frames", "x", "y", "z", "single"]
+
+
+def described_numbers(r: Record) -> np.ndarray:
+    dtype = np.dtype(r.variant(NUMBERS))
+    size, packed = dtype.itemsize, r.take(r.get("Q"))
+    need(len(packed) % size == 0, r.place, "a number is cut short", r.at)
+    planes = np.frombuffer(packed, "u1").reshape(size, -1)
+    differences = np.ascontiguousarray(planes.T).reshape(-1).view(f"<u{size}")
+    return np.cumsum(differences, dtype=f"<u{size}").view(dtype)
+
+
+def described_values(r: Record, frames: int):
+    """Values, and how many they are."""
+    kind = r.variant(["texts", "numbers", "times"])
+    if kind == "texts":
+        texts = r.list(r.string)
+        return texts, len(texts)
+    if kind == "numbers":
+        numbers = described_numbers(r)
+        return numbers, len(numbers)
+    return {"times": r.variant(NUMBERS)}, frames
+
+
+def read_description(r: Record, m) -> dict:
+    """The record of a description, checked against itself and the metadata."""
+    items = 0
+
+    def flag() -> bool:
+        value = r.get("B")
+        need(value <= 1, r.place, "a flag is neither 0 nor 1", r.at - 1)
+        return bool(value)
+
+    def attributes() -> dict:
+        nonlocal items
+        found = {}
+        for _ in range(r.get("Q")):
+            items += 1
+            name = r.string()
+            values, _ = described_values(r, m.frames)
+            need(not isinstance(values, dict), r.place, f"attribute {name} is times", r.at)
+            found[name] = values
+        return found
+
+    source = r.string()
+    dimensions = r.list(lambda: {"name": r.string(), "length": r.get("Q"), "unlimited": flag()})
+    axes = r.list(lambda: {"dimension": r.get("I"), "role": r.variant(ROLES), "reversed": flag()})
+    items += len(dimensions) + len(axes)
+    lengths = {"frames": m.frames, "single": 1, **dict(zip("xyz", m.dims))}
+    for i, axis in enumerate(axes):
+        need(axis["dimension"] < len(dimensions), r.place, "there is no such dimension")
+        need(dimensions[axis["dimension"]]["length"] == lengths[axis["role"]], r.place, "an axis of another length")
+        for other in axes[:i]:
+            same = other["role"] == axis["role"] != "single" or other["dimension"] == axis["dimension"]
+            need(not same, r.place, "an axis repeats another")
+    described = {"source": source, "dimensions": dimensions, "axes": axes}
+    described["attributes"], described["global"] = attributes(), attributes()
+    variables = described["variables"] = []
+    for _ in range(r.get("Q")):
+        items += 1
+        name, of = r.string(), r.list(lambda: r.get("I"))
+        need(all(number < len(dimensions) for number in of), r.place, "there is no such dimension")
+        values, count = described_values(r, m.frames)
+        expected = math.prod(dimensions[number]["length"] for number in of)
+        need(count == expected, r.place, f"variable {name} has {count} values, not {expected}")
+        variables.append({"name": name, "dimensions": of, "values": values, "attributes": attributes()})
+    places = ["first", "directions", "spacing"]
+    orientation = r.option(lambda: {"space": r.string(), **dict(zip(places, (r.get("3d"), r.get("9d"), r.get("3d"))))})
+    finite = orientation is None or all(math.isfinite(n) for place in places for n in orientation[place])
+    need(finite, r.place, "an orientation that is not finite")
+    described["orientation"] = orientation
+    need(items <= MAX_DESCRIPTION_ITEMS, r.place, f"{items} items")
+    r.end()
+    return described
+
+
 class Archive:
     """An open file. Opening it does the checks of section 2 up to the root; leaves and blocks are read on demand."""
 
@@ -997,11 +1080,11 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required > 1:
+        if head.required > 3:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
-        self.id, self.nested = head.id, bool(head.required)
+        self.id, self.nested, self.described = head.id, bool(head.required & 1), bool(head.required & 2)
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1012,12 +1095,16 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:112]) == f.checksum, "footer", "wrong checksum", at + 112)
         need(f.id == self.id, "footer", "another file id than the header's", at)
         need(f.total == self.length, "footer", "another length than the file's", at + 16)
-        need(not any(f.reserved), "footer", "reserved bytes are not zero", at + 88)
         need(f.metadata_offset % ALIGN == 0 and f.metadata_offset >= 128, "footer", "bad place of metadata", at + 24)
         end = align(f.metadata_offset + FRAME.size + f.metadata_stored)
         need(end == f.root_offset, "footer", "the root does not follow the metadata", at + 48)
         end = align(f.root_offset + FRAME.size + f.root_stored)
-        need(end == at, "footer", "does not follow the root", at)
+        described = any([f.description_offset, f.description_stored, f.description_raw, f.description_checksum])
+        need(described == self.described, "footer", "the header says otherwise of a description", at + 88)
+        if described:
+            need(end == f.description_offset, "footer", "the description does not follow the root", at + 88)
+            end = align(f.description_offset + FRAME.size + f.description_stored)
+        need(end == at, "footer", "does not follow what is before it", at)
         need(f.blocks <= self.length // 128, "footer", "too many blocks", at + 72)
         need(f.leaves <= f.blocks and f.root_raw == LEAF.size * f.leaves, "footer", "bad count of leaves", at + 80)
 
@@ -1033,12 +1120,24 @@ class Archive:
     def _section(self, tag, offset, stored, raw, checksum, where=(0, 0, 0), place="", cap=None) -> bytes:
         """The stored bytes of a section. `checksum` None: only its frame has it."""
         need(offset + FRAME.size <= self.length - 128, place, "is not within the file", offset)
-        need(tag in (b"LEAF", b"ROOT") or stored == raw, place, "stored and raw differ", offset)
+        need(tag in (b"LEAF", b"ROOT", b"DESC") or stored == raw, place, "stored and raw differ", offset)
         need(cap is None or raw <= cap, place, "is too long", offset)
         frame = FRAME.read(self.data[offset : offset + FRAME.size])
         expected = (tag, stored, raw, 0, frame.checksum if checksum is None else checksum)
         need(frame == expected, place, "its frame is not the one that is expected", offset)
         return self._bytes(offset + FRAME.size, stored, frame.checksum, self._seed(KIND[tag], *where), place)
+
+    # ---- section 6
+
+    def description(self) -> dict | None:
+        """What the source says beside its samples."""
+        if not self.described:
+            return None
+        f = self.footer
+        place = (f.description_offset, f.description_stored, f.description_raw, f.description_checksum)
+        stored = self._section(b"DESC", *place, place="description", cap=MAX_DESCRIPTION)
+        raw = decompress(stored, f.description_raw, "description", f.description_offset)
+        return read_description(Record(raw, "description"), self.metadata)
 
     # ---- section 5
 
@@ -1213,6 +1312,8 @@ class Archive:
             place = f"end of window {number}"
             at = self._padding(self._repeats(b"WEND", at, m.window_end(number), where, place))
         self._padding(f.metadata_offset + FRAME.size + f.metadata_stored)
+        if self.description() is not None:
+            self._padding(f.description_offset + FRAME.size + f.description_stored)
         self._padding(f.root_offset + FRAME.size + f.root_stored)
         return lost
 
@@ -1248,6 +1349,10 @@ def plain(value):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
+    if isinstance(value, dict):
+        return {key: plain(v) for key, v in value.items()}
+    if isinstance(value, bytes):
+        return value.decode("latin-1")
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value
@@ -1256,7 +1361,8 @@ def plain(value):
 def info(path: str) -> None:
     archive = Archive(path)
     file = {"id": archive.id.hex(), "bytes": archive.length, "blocks": archive.footer.blocks, "leaves": len(archive.leaves)}
-    print(json.dumps({"file": file, **plain(archive.metadata)}, indent=2, ensure_ascii=False))
+    described = {"description": plain(archive.description())} if archive.described else {}
+    print(json.dumps({"file": file, **plain(archive.metadata), **described}, indent=2, ensure_ascii=False))
 
 
 def check(path: str) -> None:

@@ -68,6 +68,10 @@ pub(crate) struct Cli {
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
     pub(crate) center: Option<Triple>,
+    /// Draw heights this many times as tall: a number, or auto for a factor that is noted where the volume is nearly a
+    /// flat sheet, and else 1
+    #[arg(long, value_name = "Z", default_value = "auto", value_parser = parse_exaggeration, help_heading = "View")]
+    pub(crate) exaggerate: Exaggeration,
     /// Render only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
     pub(crate) frames: Option<FrameList>,
@@ -140,6 +144,23 @@ pub(crate) struct Cli {
     pub(crate) input: InputArgs,
     #[command(flatten)]
     pub(crate) common: CommonArgs,
+}
+
+/// How much taller than true heights are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Exaggeration {
+    /// As the volume needs.
+    Auto,
+    /// By this factor.
+    Factor(f64),
+}
+
+fn parse_exaggeration(text: &str) -> std::result::Result<Exaggeration, String> {
+    let factor = || text.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
+    match text {
+        "auto" => Ok(Exaggeration::Auto),
+        _ => factor().map(Exaggeration::Factor).ok_or_else(|| "auto, or a number above 0".into()),
+    }
 }
 
 /// The level of detail.

@@ -23,6 +23,7 @@ use std::process::ExitCode;
 use wavesplat::base::error::Result;
 use wavesplat::cli;
 use wavesplat::render::render;
+use wavesplat::render::sink::Provenance;
 
 fn main() -> ExitCode {
     cli::main(Program::run)
@@ -31,14 +32,17 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let Opened { mut scene, file, annotation, colours } = self.scene()?;
+        let Opened { mut scene, file, exaggeration, annotation, colours } = self.scene()?;
         let mut config = self.config(scene.as_ref(), file.as_deref(), colours.as_ref())?;
         let targets = self.targets(&config)?;
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
-        let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
+        let provenance = Provenance {
+            exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
+            ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
+        };
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let progress = self.common.progress("render", unit(&config.mode));
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;

@@ -1,9 +1,11 @@
 //! The scene to render: a coefficient file, or frames.
 
-use crate::args::{Cli, Detail, MethodName};
+use crate::args::{Cli, Detail, Exaggeration, MethodName};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use wavesplat::base::description::{coordinates, is_regular};
 use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::transfer_function;
 use wavesplat::colour::TransferFunction;
@@ -18,6 +20,8 @@ pub(crate) struct Opened {
     pub(crate) scene: Box<dyn Scene>,
     /// The coefficient file of the scene.
     pub(crate) file: Option<Arc<CoefficientFile>>,
+    /// The factor by which heights are drawn taller.
+    pub(crate) exaggeration: f64,
     /// The times of frames.
     pub(crate) annotation: Annotation,
     /// The colours of samples, applied before splatting or along the ray.
@@ -43,12 +47,15 @@ impl Cli {
         self.input.refuse_for_coefficients()?;
         self.along.check(false, self.colour.is_asked())?;
         let file = CoefficientFile::open_with(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
+        let exaggeration = self.exaggeration(&file.whole_grid());
+        let file = file.with_exaggeration(exaggeration);
         let lod = self.level_of_detail(&file)?;
         if self.lod == Detail::Auto {
             self.common.note(format_args!("--lod auto takes level {lod} of {}", file.coarsest_detail()));
         }
         let file = file.with_detail(lod)?;
         let file = Arc::new(if self.skip_damaged { file.skip_damaged()? } else { file });
+        self.note_irregular_axes(&file)?;
         let what = match self.method {
             MethodName::Coefficients => SplatSource::Coefficients,
             MethodName::Direct => SplatSource::Samples,
@@ -57,7 +64,31 @@ impl Cli {
         let annotation = Annotation { times: file.metadata().times.clone(), unit };
         let colours = self.along.of_file(self.colour.range, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), what));
-        Ok(Opened { scene, file: Some(file), annotation, colours })
+        Ok(Opened { scene, file: Some(file), exaggeration, annotation, colours })
+    }
+
+    /// The factor by which heights are drawn taller, with a note if nobody asked for it.
+    fn exaggeration(&self, grid: &Grid) -> f64 {
+        if let Exaggeration::Factor(factor) = self.exaggerate {
+            return factor;
+        }
+        let factor = grid.sensible_exaggeration();
+        if factor != 1.0 {
+            let what = "as tall as they are, since the volume is nearly flat";
+            self.common.note(format_args!("heights are drawn {factor} times {what}; --exaggerate 1 draws them true"));
+        }
+        factor
+    }
+
+    /// Says which axes have voxels that are not drawn at their places.
+    fn note_irregular_axes(&self, file: &CoefficientFile) -> Result<()> {
+        let Some(description) = file.description()? else { return Ok(()) };
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            if coordinates(&description, axis).is_some_and(|at| !is_regular(&at)) {
+                self.common.note(format_args!("voxels along {name} are not at regular places, but are drawn so"));
+            }
+        }
+        Ok(())
     }
 
     /// The level of detail: as given, or the coarsest whose voxels are no larger than a pixel of any view.
@@ -89,11 +120,14 @@ impl Cli {
             }
             None => None,
         };
+        let grid = source.archive().grid;
         let scene = match colours.clone().filter(|_| !self.along.mode.colours_samples()) {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };
-        Ok(Opened { scene: Box::new(scene), file: None, annotation, colours })
+        let exaggeration = self.exaggeration(&grid);
+        let scene = Box::new(scene.with_grid(grid.exaggerated(exaggeration)));
+        Ok(Opened { scene, file: None, exaggeration, annotation, colours })
     }
 
     /// An error if an option or the input is not for frames.

@@ -59,7 +59,7 @@ pub(crate) struct ExtractArgs {
     /// Channel of a file of colours: red, green or blue
     #[arg(long, value_name = "NAME", value_parser = parse_channel)]
     channel: Option<usize>,
-    /// Format: npy raw nrrd nhdr vti pvd nc nii nii.gz mha [default: by the extension of OUT; npy for -]
+    /// Format: npy raw nrrd nhdr vti pvd nc nii nii.gz mha vtr zarr [default: by the extension of OUT; npy for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     format: Option<SampleFormat>,
     /// Extract damaged and lost blocks as missing samples (NaN, or the declared value, or 0), and the rest; exit code 3

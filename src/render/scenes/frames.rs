@@ -51,6 +51,12 @@ impl FrameScene {
         let colour_transform = Some(ColourTransform { colours, sample, missing_value });
         Self { archive, colour_transform, missing_value: None, ..plain }
     }
+
+    /// The same frames on another grid of as many voxels.
+    pub fn with_grid(mut self, grid: Grid) -> Self {
+        self.archive.grid = Grid { dims: self.archive.grid.dims, ..grid };
+        self
+    }
 }
 
 impl Scene for FrameScene {

@@ -26,6 +26,8 @@ pub struct Provenance {
     pub tau: f64,
     /// Standard deviation of the kernel in world units.
     pub sigma: f64,
+    /// The factor by which heights are drawn taller, if they are.
+    pub exaggerate: Option<f64>,
     /// The level of detail, if pictures show every 2^lod-th voxel along each axis.
     pub lod: Option<u32>,
     /// The requested splat error. The stated error of each view is stored with the view.

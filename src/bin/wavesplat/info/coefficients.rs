@@ -1,8 +1,10 @@
 //! Describes a coefficient file.
 
+use super::description;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use wavesplat::base::description::Description;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
 use wavesplat::convert::{Bound, Packing, options};
@@ -43,10 +45,15 @@ struct Info {
     /// The options of `wavesplat convert` that reproduce the file, by name.
     options: BTreeMap<&'static str, String>,
     program: String,
+    /// What is kept of the source beside the samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    description: Option<serde_json::Value>,
+    #[serde(skip)]
+    described: Option<Description>,
 }
 
 pub(super) fn run(file: &CoefficientFile, common: &CommonArgs) -> Result<()> {
-    let info = Info::of(file);
+    let info = Info::of(file)?;
     if common.json {
         return common.report(&info, false);
     }
@@ -54,14 +61,15 @@ pub(super) fn run(file: &CoefficientFile, common: &CommonArgs) -> Result<()> {
 }
 
 impl Info {
-    fn of(file: &CoefficientFile) -> Self {
+    fn of(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let voxels: u64 = m.dims.iter().product();
         let windows: Vec<WindowReport> =
             m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
-        let nested = m.packing() == Packing::Nested;
-        Self {
-            format: if nested { "1.1" } else { "1.0" },
+        let described = file.description()?;
+        let has_features = m.packing() == Packing::Nested || described.is_some();
+        Ok(Self {
+            format: if has_features { "1.1" } else { "1.0" },
             id: file.id().to_string(),
             bytes: file.bytes(),
             dims: m.dims,
@@ -88,7 +96,9 @@ impl Info {
             settings: m.settings.clone(),
             options: options(m).into_iter().collect(),
             program: m.program.clone(),
-        }
+            description: described.as_ref().map(description::json),
+            described,
+        })
     }
 
     fn text(&self, bound: Bound, verbose: bool) -> String {
@@ -133,6 +143,7 @@ impl Info {
         if !units.is_empty() {
             let _ = writeln!(text, "units      {}", units.join(", "));
         }
+        text += &self.described.as_ref().map(|all| description::text(all, verbose)).unwrap_or_default();
         if let Some(colours) = &self.colours {
             let _ = writeln!(text, "colours    {} channels: {} by {colours}", self.channels, CHANNELS.join(", "));
         }

@@ -2,6 +2,7 @@
 
 mod archive;
 mod coefficients;
+mod description;
 mod variables;
 
 use clap::Args;
