@@ -93,7 +93,8 @@ impl FileHeader {
         same("places in the unit ", said(&self.units.space), said(&first.units.space))?;
         same("the missing value ", value(self.missing), value(first.missing))?;
         let is_timed = !self.times.is_empty() && !first.times.is_empty();
-        Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && self.units.times != first.units.times })
+        let counts = |file: &Self| (file.units.times.clone(), file.units.calendar.clone());
+        Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && counts(self) != counts(first) })
     }
 
     /// Whether voxels are where those of another file are, but for a small part of their distance.
@@ -112,7 +113,7 @@ impl FileHeader {
 pub(super) struct Mismatch {
     /// Its spacing or origin.
     pub(super) grid: bool,
-    /// What its times are measured in, or since when.
+    /// What its times are measured in, or since when, or by which calendar.
     pub(super) times: bool,
 }
 

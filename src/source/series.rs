@@ -6,13 +6,13 @@ use super::inputs::FrameFiles;
 use super::layout::Shape;
 use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
-use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats};
+use super::{Archive, FrameSource, FrameWindow, OpenOptions, formats, times};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
 use std::mem;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Files whose frames follow one another.
@@ -50,7 +50,11 @@ impl Series {
             let mut file = describe(path, options)?;
             let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
             placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
-            timed_otherwise = timed_otherwise.or(unlike.times.then_some(path));
+            if unlike.times
+                && let Err(why) = times::onto_clock(&mut file, &first.units)
+            {
+                timed_otherwise = timed_otherwise.or(Some(format!("{} {why}", path.display())));
+            }
             series.take(&mut file);
         }
         if let Some(path) = placed_otherwise {
@@ -92,7 +96,7 @@ impl Series {
         }
     }
 
-    fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
+    fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<String>, options: &OpenOptions) -> Result<Self> {
         for note in &files.notes {
             note_once(&mut self.archive.notes, note.clone());
         }
@@ -101,12 +105,13 @@ impl Series {
         };
         if frames == files.times.len() {
             self.archive.times.clone_from(&files.times);
-        } else if let Some(path) = timed_otherwise {
-            self.drop_times(&format!("{} has times of another unit or start than the first file", path.display()));
+        } else if let Some(why) = timed_otherwise.filter(|_| options.times.is_none()) {
+            self.drop_times(&why);
         }
         if self.archive.times.len() != frames {
             self.archive.times.clear();
         }
+        times::settle(&mut self.archive, options)?;
         self.check_times();
         check_grid(&self.archive.grid, options, &files.paths[0])?;
         Ok(self)
@@ -126,7 +131,7 @@ impl Series {
     /// Drops the times and their unit.
     fn drop_times(&mut self, why: &str) {
         self.archive.times.clear();
-        self.archive.units.times = None;
+        (self.archive.units.times, self.archive.units.calendar) = (None, None);
         note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));
     }
 
