@@ -92,32 +92,33 @@ fn places<'a>(lengths: &[usize], kept: impl Iterator<Item = &'a Kept>) -> Vec<us
     })
 }
 
-/// The description of the frames of `first`, then those of `next`: values along time follow each other, all else is that
-/// of `first`. Variables along time that `next` lacks, or has in another form, are left out; their names are returned.
-pub fn joined(first: &Description, next: &Description) -> (Description, Vec<String>) {
-    let (Some(time), Some(other)) = (frames_of(first), frames_of(next)) else { return (first.clone(), Vec::new()) };
-    let mut all = first.clone();
-    all.dimensions[time as usize].length += next.dimensions[other as usize].length;
-    let mut lost = Vec::new();
-    all.variables.retain_mut(|variable| {
-        if !variable.dimensions.contains(&time) {
-            return true;
-        }
-        let follower = next.variables.iter().find(|other| other.name == variable.name);
-        match follower.and_then(|follower| appended(variable, first, follower, next)) {
+/// The description of the frames of `first`, then those of each of `more`: values along time follow each other, all else
+/// is that of `first`. Variables along time that one lacks, or has in another form, are left out; their names are returned.
+pub fn joined(mut first: Description, more: &[Description]) -> (Description, Vec<String>) {
+    let Some(time) = frames_of(&first) else { return (first, Vec::new()) };
+    let (mut lost, mut kept) = (Vec::new(), Vec::new());
+    for mut variable in std::mem::take(&mut first.variables) {
+        let is_along_time = variable.dimensions.contains(&time);
+        match if is_along_time { appended(&variable, &first, more) } else { Some(variable.values.clone()) } {
             Some(values) => variable.values = values,
-            None => lost.push(variable.name.clone()),
+            None => {
+                lost.push(variable.name);
+                continue;
+            }
         }
-        lost.last() != Some(&variable.name)
-    });
-    (all, lost)
+        kept.push(variable);
+    }
+    let frames = |other: &Description| frames_of(other).map_or(0, |time| other.dimensions[time as usize].length);
+    first.dimensions[time as usize].length += more.iter().map(frames).sum::<u64>();
+    first.variables = kept;
+    (first, lost)
 }
 
 /// The description of so many frames in all, if nothing else is known of those that were added. Variables along time are left out, but for
 /// those of times; their names are returned.
-pub fn extended(first: &Description, frames: u64) -> (Description, Vec<String>) {
-    let (mut all, mut lost) = (first.clone(), Vec::new());
-    let Some(time) = frames_of(first) else { return (all, lost) };
+pub fn extended(mut all: Description, frames: u64) -> (Description, Vec<String>) {
+    let mut lost = Vec::new();
+    let Some(time) = frames_of(&all) else { return (all, lost) };
     all.dimensions[time as usize].length = frames;
     let is_lost =
         |variable: &Variable| variable.dimensions.contains(&time) && !matches!(variable.values, Values::Times(_));
@@ -147,22 +148,59 @@ pub fn frames_of(description: &Description) -> Option<u32> {
     description.axes.iter().find(|axis| axis.role == AxisRole::Frames).map(|axis| axis.dimension)
 }
 
-/// Values whose slowest dimension is that of frames, one after another; none if they cannot follow each other.
-fn appended(variable: &Variable, of: &Description, next: &Variable, of_next: &Description) -> Option<Values> {
-    let shape = |variable: &Variable, of: &Description| -> Vec<u64> {
-        variable.dimensions.iter().skip(1).map(|dimension| of.dimensions[*dimension as usize].length).collect()
-    };
-    let slowest = |variable: &Variable, of: &Description| variable.dimensions.first().copied() == frames_of(of);
-    if !slowest(variable, of) || !slowest(next, of_next) || shape(variable, of) != shape(next, of_next) {
-        return None;
+/// The values of a variable, then those of the same variable of each of `more`, if frames are the slowest axis of all; none
+/// if they cannot follow each other.
+fn appended(variable: &Variable, of: &Description, more: &[Description]) -> Option<Values> {
+    let mut all = Appender::new(&variable.values);
+    let shape = shape_after_time(variable, of)?;
+    for next in more {
+        let other = next.variables.iter().find(|other| other.name == variable.name)?;
+        let is_alike = shape_after_time(other, next)? == shape;
+        all.push(Some(&other.values).filter(|_| is_alike)?)?;
     }
-    match (&variable.values, &next.values) {
-        (Values::Times(ty), Values::Times(_)) => Some(Values::Times(*ty)),
-        (Values::Texts(a), Values::Texts(b)) => Some(Values::Texts([a.clone(), b.clone()].concat())),
-        (Values::Numbers(a), Values::Numbers(b)) if a.ty == b.ty => {
-            Some(Values::Numbers(Numbers::new(a.ty, &[a.bytes(), b.bytes()].concat())))
+    Some(all.values())
+}
+
+/// The lengths of the faster dimensions of a variable whose slowest one is that of frames.
+fn shape_after_time(variable: &Variable, of: &Description) -> Option<Vec<u64>> {
+    let (first, rest) = variable.dimensions.split_first()?;
+    let lengths = rest.iter().map(|dimension| of.dimensions[*dimension as usize].length).collect();
+    (Some(*first) == frames_of(of)).then_some(lengths)
+}
+
+/// Values that grow.
+enum Appender {
+    Texts(Vec<String>),
+    Numbers(NumberType, Vec<u8>),
+    Times(NumberType),
+}
+
+impl Appender {
+    fn new(first: &Values) -> Self {
+        match first {
+            Values::Texts(texts) => Self::Texts(texts.clone()),
+            Values::Numbers(numbers) => Self::Numbers(numbers.ty, numbers.bytes()),
+            Values::Times(ty) => Self::Times(*ty),
         }
-        _ => None,
+    }
+
+    /// None for values of another kind or type.
+    fn push(&mut self, next: &Values) -> Option<()> {
+        match (self, next) {
+            (Self::Texts(all), Values::Texts(texts)) => all.extend_from_slice(texts),
+            (Self::Numbers(ty, all), Values::Numbers(numbers)) if *ty == numbers.ty => all.extend(numbers.bytes()),
+            (Self::Times(_), Values::Times(_)) => {}
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn values(self) -> Values {
+        match self {
+            Self::Texts(texts) => Values::Texts(texts),
+            Self::Numbers(ty, bytes) => Values::Numbers(Numbers::new(ty, &bytes)),
+            Self::Times(ty) => Values::Times(ty),
+        }
     }
 }
 
@@ -249,11 +287,11 @@ mod tests {
 
     #[test]
     fn frames_follow_each_other() {
-        let (mut all, lost) = joined(&description(0.0), &description(2.0));
+        let (mut all, lost) = joined(description(0.0), &[description(2.0)]);
         assert_eq!((floats(&all, "bounds"), lost.len()), (vec![0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0], 0));
         assert_eq!((all.dimensions[0].length, floats(&all, "y")), (4, vec![30.0, 20.0, 10.0]));
         all.variables.retain(|variable| variable.name != "bounds");
-        let (without, lost) = joined(&description(0.0), &all);
+        let (without, lost) = joined(description(0.0), &[all]);
         assert_eq!((lost, without.variables.len()), (vec!["bounds".to_string()], 4));
     }
 }

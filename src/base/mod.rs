@@ -9,6 +9,11 @@ pub(crate) mod memory;
 pub(crate) mod zeroed;
 pub(crate) mod spread;
 pub(crate) mod half;
+mod calendar;
+pub(crate) mod clock;
+pub(crate) mod decimal;
+#[doc(hidden)]
+pub mod time_labels;
 pub mod sample;
 pub mod grid;
 pub mod description;

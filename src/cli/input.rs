@@ -2,7 +2,7 @@
 
 #[cfg(feature = "cli")]
 use super::{CommonArgs, note_text};
-use super::{Dims, FrameRange, RegionSpec, Triple};
+use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::Access;
 use crate::base::output::part_of;
@@ -65,6 +65,21 @@ pub struct InputArgs {
     /// World position of the first voxel, instead of that in the files: X,Y,Z
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Input")]
     pub origin: Option<Triple>,
+    /// Times of frames, instead of those in the files: START,STEP, or a text file with one number on each line
+    #[arg(
+        long,
+        value_name = "FILE|START,STEP",
+        allow_hyphen_values = true,
+        conflicts_with = "dt",
+        help_heading = "Input"
+    )]
+    pub times: Option<TimesSpec>,
+    /// Time from frame to frame, from 0 on, instead of the times in the files
+    #[arg(long, value_name = "STEP", value_parser = times::step, allow_hyphen_values = true, help_heading = "Input")]
+    pub dt: Option<f64>,
+    /// Unit of times, instead of that in the files: s, or "days since 2000-01-01"
+    #[arg(long, value_name = "TEXT", help_heading = "Input")]
+    pub time_unit: Option<String>,
     /// Accept gaps in the numbers of frame files
     #[arg(long, help_heading = "Input")]
     pub allow_gaps: bool,
@@ -85,6 +100,9 @@ impl InputArgs {
             (self.axes.is_some(), "--axes"),
             (self.spacing.is_some(), "--spacing"),
             (self.origin.is_some(), "--origin"),
+            (self.times.is_some(), "--times"),
+            (self.dt.is_some(), "--dt"),
+            (self.time_unit.is_some(), "--time-unit"),
             (self.allow_gaps, "--allow-gaps"),
         ];
         match given.into_iter().find(|(given, _)| *given) {
@@ -100,16 +118,16 @@ impl InputArgs {
 
     /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
-        source::open(inputs, &self.options(memory))
+        source::open(inputs, &self.options(memory)?)
     }
 
     /// The variables among which `--variable` must choose; none if the archive can be opened without it.
     pub fn undecided(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
-        source::undecided(inputs, &self.options(memory))
+        source::undecided(inputs, &self.options(memory)?)
     }
 
-    fn options(&self, memory: usize) -> OpenOptions {
-        OpenOptions {
+    fn options(&self, memory: usize) -> Result<OpenOptions> {
+        Ok(OpenOptions {
             access: self.access(),
             dims: self.dims.as_ref().map(|d| d.0.clone()),
             sample: self.dtype,
@@ -121,9 +139,12 @@ impl InputArgs {
             axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
+            times: self.given_times()?,
+            time_unit: self.time_unit.clone(),
+            clock: None,
             allow_gaps: self.allow_gaps,
             memory,
-        }
+        })
     }
 }
 
@@ -147,6 +168,8 @@ impl InputArgs {
             ("offset", self.offset.map(|bytes| bytes.to_string())),
             ("spacing", self.spacing.map(|s| s.to_string())),
             ("origin", self.origin.map(|o| o.to_string())),
+            (times::TIMES, self.times_setting()),
+            ("time-unit", self.time_unit.clone()),
         ];
         given.into_iter().filter_map(|(name, value)| Some((name, value?)))
     }
@@ -178,7 +201,8 @@ impl InputArgs {
         let options = OpenOptions {
             dims_are_remembered: !self.describes_layout(),
             variable_is_remembered: self.variable.is_none(),
-            ..self.completed(of)?.options(common.stream_memory())
+            clock: Some(times::units(of)),
+            ..self.completed(of)?.options(common.stream_memory())?
         };
         let source = source::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));
@@ -197,6 +221,7 @@ impl InputArgs {
         complete(&mut input.axes, of, "axes")?;
         complete(&mut input.spacing, of, "spacing")?;
         complete(&mut input.origin, of, "origin")?;
+        complete(&mut input.time_unit, of, "time-unit")?;
         // Without dims, dtype is the type of the samples before they were coloured.
         if setting(of.metadata(), "dims").is_some() {
             complete(&mut input.dims, of, "dims")?;

@@ -25,6 +25,7 @@ mod optional;
 mod program;
 #[cfg(feature = "cli")]
 mod terminal;
+mod times;
 mod values;
 
 #[cfg(feature = "cli")]
@@ -39,6 +40,7 @@ pub use messages::{of_error as error_text, of_note as note_text};
 pub use program::{command, main};
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
+pub use times::TimesSpec;
 pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
 
 use crate::base::error::{Error, Result};

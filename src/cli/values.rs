@@ -136,6 +136,11 @@ impl FrameRange {
         self.end.is_none() && self.start.is_some_and(|start| start == frames as i64)
     }
 
+    /// From one frame to the next.
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
     /// First frame, step and number of frames in an archive of `frames` frames. The number is None for an open range of
     /// a stream.
     pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {

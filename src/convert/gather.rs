@@ -215,7 +215,7 @@ impl<'a> WindowReader<'a> {
         let id = self.id(scan.digest)?;
         let index =
             u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;
-        let times = self.archive.times.get(first..first + window.frames()).unwrap_or_default().to_vec();
+        let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
         Ok(WindowJob { index, first_frame, id, features: self.features, codec, range, digest: scan.digest, times })

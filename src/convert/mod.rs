@@ -211,7 +211,7 @@ pub fn resume<W: Write>(
     let started = Instant::now();
     let Task { config, archive, colour_transform } = &Task::new(config, source.archive());
     let plan = Plan::new(config, archive, colour_transform.as_ref())?;
-    let done = WindowsDone::of(begun.as_ref(), &plan, name)?;
+    let done = WindowsDone::of(begun.as_ref(), (&plan, archive), name)?;
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
@@ -258,7 +258,7 @@ struct WindowsDone {
 }
 
 impl WindowsDone {
-    fn of(begun: Option<&PartialFile>, plan: &Plan<'_>, name: &Path) -> Result<Self> {
+    fn of(begun: Option<&PartialFile>, (plan, archive): (&Plan<'_>, &Archive), name: &Path) -> Result<Self> {
         let Some(PartialFile { complete, first_window, .. }) = begun else { return Ok(Self::default()) };
         let held = complete.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
@@ -266,6 +266,10 @@ impl WindowsDone {
         }
         if *first_window == 0 && held.start() != plan.start {
             return Err(Error::path(name, "was begun with other settings"));
+        }
+        let first = held.windows.get(*first_window).map_or(held.frames, |window| window.first_frame);
+        if !archive.begins_with_times(held.times.get(first as usize..).unwrap_or_default()) {
+            return Err(Error::path(name, "was begun with other times"));
         }
         Ok(Self {
             id: Some(complete.id()),

@@ -45,10 +45,10 @@ impl Descriptions {
     fn of_all(self, frames: u64) -> (Option<Description>, Vec<String>) {
         let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
         let before = with_frames(before, 1); // if there is no axis of frames, there is one
-        let added = added.map(|added| joined(&before, &with_frames(added.clone(), 1)));
+        let added = added.map(|added| joined(before.clone(), &[with_frames(added.clone(), 1)]));
         let is_whole =
             |(all, _): &(Description, _)| frames_of(all).is_some_and(|d| all.dimensions[d as usize].length == frames);
-        let (all, not_kept) = added.filter(is_whole).unwrap_or_else(|| extended(&before, frames));
+        let (all, not_kept) = added.filter(is_whole).unwrap_or_else(|| extended(before, frames));
         (Some(all), not_kept)
     }
 }

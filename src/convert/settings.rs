@@ -86,8 +86,9 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
     options.extend(file.missing_value.map(|value| ("missing-value", format!("{value:?}"))));
     options.push(("block", file.block_edge.to_string()));
     let is_option = |name: &&str| match *name {
-        "range" => colours.is_none(),               // that of brightness is fixed
-        "dtype" => setting(file, "dims").is_some(), // else of samples that were coloured
+        "range" => colours.is_none(),                      // that of brightness is fixed
+        "dtype" => setting(file, "dims").is_some(),        // else of samples that were coloured
+        "times" => setting(file, "times") != Some("list"), // of a file that has no name here
         _ => true,
     };
     options
@@ -96,7 +97,7 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
 }
 
 /// Settings of a file that are options by the same names.
-const STORED: [&str; 17] = [
+const STORED: [&str; 19] = [
     "range",
     "missing",
     "missing-value",
@@ -114,6 +115,8 @@ const STORED: [&str; 17] = [
     "offset",
     "spacing",
     "origin",
+    "times",
+    "time-unit",
 ];
 
 /// The first difference between two conversions, in words. The program's version counts only if `same_program`.

@@ -5,6 +5,7 @@ use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::{SampleType, join_ranges};
+use crate::base::time_labels::TimeLabels;
 use crate::codec::WindowCodec;
 use crate::codec::coarse;
 use crate::codec::decode::Block;
@@ -433,6 +434,11 @@ impl CoefficientFile {
 /// The value of one of a file's settings.
 pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
     file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+}
+
+/// The times of a file's frames, and how they are written.
+pub fn time_labels(file: &Metadata) -> TimeLabels {
+    TimeLabels::new(file.times.clone(), setting(file, "time-units"), setting(file, "calendar"))
 }
 
 /// What made the channels of a file; an error where it has several, and does not say of what.

@@ -14,4 +14,4 @@ pub mod repack;
 pub mod resume;
 
 pub(crate) use batch::BlockBatch;
-pub use coefficient_file::{CoefficientFile, setting};
+pub use coefficient_file::{CoefficientFile, setting, time_labels};

@@ -111,9 +111,10 @@ pub fn check(part: &Path) -> Result<()> {
 }
 
 /// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
-pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, frames: Option<usize>) -> Result<bool> {
+pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, archive: &Archive) -> Result<bool> {
     let file = CoefficientFile::open_with(path, Access::Read)?;
-    Ok(file.metadata().start() == *like && frames.is_none_or(|frames| frames == file.frames()))
+    let is_long = archive.frames.is_none_or(|frames| frames == file.frames());
+    Ok(is_long && file.metadata().start() == *like && archive.begins_with_times(&file.metadata().times))
 }
 
 /// Whether a file ends with windows of just the frames of `source`, by their digests; not of one that is read only once.

@@ -3,7 +3,7 @@
 use super::layout::Shape;
 use super::parts::Part;
 use super::{Advised, Parsed};
-use crate::base::description::{Description, with_frames};
+use crate::base::description::{Description, Values, with_frames};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::FileBytes;
@@ -79,6 +79,15 @@ impl FileHeader {
         self.parts.iter().map(|part| part.frames).sum()
     }
 
+    /// Leaves out the bounds of times, which are on the file's own clock.
+    pub(super) fn drop_bounds_of_times(&mut self) {
+        let Some(description) = &mut self.description else { return };
+        let of_times = description.variables.iter().filter(|variable| matches!(variable.values, Values::Times(_)));
+        let bounds = of_times.flat_map(|times| &times.attributes).filter(|attribute| attribute.name == "bounds");
+        let names: Vec<Values> = bounds.map(|attribute| attribute.value.clone()).collect();
+        description.variables.retain(|variable| !names.contains(&Values::text(&variable.name)));
+    }
+
     /// Describes the frames as those of an archive, in which others may follow.
     pub(super) fn stack_frames(&mut self) {
         let frames = self.frames();
@@ -108,7 +117,8 @@ impl FileHeader {
         same("places in the unit ", said(&self.units.space), said(&first.units.space))?;
         same("the missing value ", value(self.missing), value(first.missing))?;
         let is_timed = !self.times.is_empty() && !first.times.is_empty();
-        Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && self.units.times != first.units.times })
+        let counts = |file: &Self| (file.units.times.clone(), file.units.calendar.clone());
+        Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && counts(self) != counts(first) })
     }
 
     /// Whether voxels are where those of another file are, but for a small part of their distance.
@@ -127,7 +137,7 @@ impl FileHeader {
 pub(super) struct Mismatch {
     /// Its spacing or origin.
     pub(super) grid: bool,
-    /// What its times are measured in, or since when.
+    /// What its times are measured in, or since when, or by which calendar.
     pub(super) times: bool,
 }
 

@@ -21,6 +21,7 @@ mod series;
 mod stream;
 #[cfg(test)]
 mod testing;
+mod times;
 mod variables;
 
 pub use array::ArraySource;
@@ -33,6 +34,7 @@ pub use formats::{ArrayHeader, array_header, extensions};
 pub use inputs::files;
 pub use scan::value_range;
 pub use select::{Selection, select};
+pub use times::{GivenTimes, RegularTimes, with_times};
 pub use variables::{VariableAxis, VariableInfo};
 
 use crate::base::description::Description;
@@ -41,7 +43,9 @@ use crate::base::grid::{Grid, Region};
 use crate::base::mapped::Access;
 use crate::base::output::STANDARD;
 use crate::base::sample::SampleType;
+use crate::base::time_labels::TimeLabels;
 use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A result for one file. The error is a text that follows the file's name.
@@ -85,6 +89,12 @@ pub struct OpenOptions {
     pub spacing: Option<[f64; 3]>,
     /// World position of the first voxel, instead of those in the files.
     pub origin: Option<[f64; 3]>,
+    /// Times of frames, instead of those in the files.
+    pub times: Option<GivenTimes>,
+    /// The unit of times, perhaps since a date, instead of that in the files.
+    pub time_unit: Option<String>,
+    /// Units and calendar of an earlier archive, onto whose clock times are put where they can be.
+    pub clock: Option<Units>,
     /// Whether irregular numbers in the names of frame files are accepted.
     pub allow_gaps: bool,
     /// Bytes of memory for one window of a stream or of decoded frames. More go to a temporary file.
@@ -106,6 +116,9 @@ impl Default for OpenOptions {
             axes: None,
             spacing: None,
             origin: None,
+            times: None,
+            time_unit: None,
+            clock: None,
             allow_gaps: false,
             memory: 256 << 20,
         }
@@ -177,6 +190,8 @@ pub struct Archive {
     pub frames: Option<usize>,
     /// Time of each frame where the files say so, else empty.
     pub times: Vec<f64>,
+    /// The times of a stream whose number of frames is not known.
+    pub regular_times: Option<RegularTimes>,
     /// Name of the variable where the files say so.
     pub variable: Option<String>,
     /// Units of samples, times and places.
@@ -195,9 +210,47 @@ impl Archive {
     /// An archive without times, names and units.
     pub fn new(grid: Grid, sample: SampleType, frames: Option<usize>) -> Self {
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
-        let format = "frames";
-        let (variable, missing, description) = (None, None, None);
-        Self { format, grid, sample, frames, times, variable, units, missing, description, memory: 0, notes }
+        let (format, regular_times, variable) = ("frames", None, None);
+        let (missing, description, memory) = (None, None, 0);
+        Self {
+            format,
+            grid,
+            sample,
+            frames,
+            times,
+            regular_times,
+            variable,
+            units,
+            missing,
+            description,
+            memory,
+            notes,
+        }
+    }
+
+    /// Whether frames have times.
+    pub fn has_times(&self) -> bool {
+        !self.times.is_empty() || self.regular_times.is_some()
+    }
+
+    /// The times of some frames; empty if they have none.
+    pub(crate) fn times_of(&self, frames: Range<usize>) -> Vec<f64> {
+        match self.regular_times {
+            Some(times) => times.times(frames),
+            None => self.times.get(frames).unwrap_or_default().to_vec(),
+        }
+    }
+
+    /// Whether its first frames have just these times.
+    pub(crate) fn begins_with_times(&self, times: &[f64]) -> bool {
+        let own = self.times_of(0..times.len().min(self.frames.unwrap_or(usize::MAX)));
+        own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())
+    }
+
+    /// The times of the frames, and how they are written.
+    pub fn time_labels(&self) -> TimeLabels {
+        let Units { times, calendar, .. } = &self.units;
+        TimeLabels::new(self.times.clone(), times.as_deref(), calendar.as_deref())
     }
 
     /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the

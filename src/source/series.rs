@@ -6,14 +6,14 @@ use super::inputs::FrameFiles;
 use super::layout::Shape;
 use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
-use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, formats};
+use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, formats, times};
 use crate::base::description::{Description, Values, extended, joined};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
 use std::mem;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Files whose frames follow one another.
@@ -49,20 +49,26 @@ impl Series {
         }
         let mut series = Self::of(&mut first, options);
         let name = format!("the first frame ({})", first_path.display());
-        let (mut placed_otherwise, mut timed_otherwise) = (None, None);
+        let (mut placed_otherwise, mut timed_otherwise, mut more) = (None, None, Vec::new());
         for path in rest {
             let mut file = describe(path, options, Extent::AlongTime)?;
             let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
             placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
-            timed_otherwise = timed_otherwise.or(unlike.times.then_some(path));
+            if unlike.times {
+                file.drop_bounds_of_times();
+                if let Err(why) = times::onto_clock(&mut file, &first.units) {
+                    timed_otherwise = timed_otherwise.or(Some(format!("{} {why}", path.display())));
+                }
+            }
             file.stack_frames();
-            series.describe_more(&file);
+            more.push(file.description.take());
             series.take(&mut file);
         }
         if let Some(path) = placed_otherwise {
             let what = "the spacing and origin are those of the first file";
             note_once(&mut series.archive.notes, format!("{what}; {} has others", path.display()));
         }
+        series.describe_more(more);
         series.finish(files, timed_otherwise, options)
     }
 
@@ -99,12 +105,12 @@ impl Series {
         }
     }
 
-    /// Adds what another file says of its frames.
-    fn describe_more(&mut self, file: &FileHeader) {
-        let Some(description) = &self.archive.description else { return };
-        let (all, lost) = match &file.description {
-            Some(next) => joined(description, next),
-            None => extended(description, (self.archive.frames.unwrap_or(0) + file.frames()) as u64),
+    /// Adds what later files say of their frames, one for each file.
+    fn describe_more(&mut self, more: Vec<Option<Description>>) {
+        let Some(first) = self.archive.description.take().filter(|_| !more.is_empty()) else { return };
+        let (all, lost) = match more.into_iter().collect::<Option<Vec<_>>>() {
+            Some(more) => joined(first, &more),
+            None => extended(first, self.archive.frames.unwrap_or(0) as u64),
         };
         self.archive.description = Some(all);
         for name in lost {
@@ -112,7 +118,7 @@ impl Series {
         }
     }
 
-    fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<&PathBuf>, options: &OpenOptions) -> Result<Self> {
+    fn finish(mut self, files: &FrameFiles, timed_otherwise: Option<String>, options: &OpenOptions) -> Result<Self> {
         for note in &files.notes {
             note_once(&mut self.archive.notes, note.clone());
         }
@@ -121,17 +127,19 @@ impl Series {
         };
         if frames == files.times.len() {
             self.archive.times.clone_from(&files.times);
-        } else if let Some(path) = timed_otherwise {
-            self.drop_times(&format!("{} has times of another unit or start than the first file", path.display()));
+        } else if let Some(why) = timed_otherwise.filter(|_| options.times.is_none()) {
+            self.drop_times(&why);
         }
         if self.archive.times.len() != frames {
             self.archive.times.clear();
         }
+        times::settle(&mut self.archive, options)?;
         self.check_times();
-        self.check_description();
-        if let Some(description) = self.archive.description.as_mut().filter(|_| self.archive.times.is_empty()) {
+        let are_of_files = !self.archive.times.is_empty() && options.times.is_none() && options.time_unit.is_none();
+        if let Some(description) = self.archive.description.as_mut().filter(|_| !are_of_files) {
             description.variables.retain(|variable| !matches!(variable.values, Values::Times(_)));
         }
+        self.check_description();
         check_grid(&self.archive.grid, options, &files.paths[0])?;
         Ok(self)
     }
@@ -158,7 +166,7 @@ impl Series {
     /// Drops the times and their unit.
     fn drop_times(&mut self, why: &str) {
         self.archive.times.clear();
-        self.archive.units.times = None;
+        (self.archive.units.times, self.archive.units.calendar) = (None, None);
         note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));
     }
 

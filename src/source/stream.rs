@@ -6,7 +6,7 @@ use super::layout::Shape;
 use super::parts::Stored;
 use super::series::{check_grid, override_grid};
 use super::spill_buffer::{SpillBuffer, read_some};
-use super::{Archive, FrameSource, FrameWindow, OpenOptions};
+use super::{Archive, FrameSource, FrameWindow, OpenOptions, times};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::npy::MAGIC;
@@ -52,7 +52,8 @@ impl<R: Read> Stream<R> {
         override_grid(&mut grid, options);
         check_grid(&grid, options, Path::new(STANDARD))?;
         let memory = options.memory;
-        let archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
+        let mut archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
+        times::settle(&mut archive, options)?;
         let stored = Stored::plain(&shape, 1, big_endian).map_err(|e| Error::input(STANDARD, e))?;
         Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader })
     }

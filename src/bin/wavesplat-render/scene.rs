@@ -9,10 +9,9 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::transfer_function;
 use wavesplat::colour::TransferFunction;
-use wavesplat::file::{CoefficientFile, setting};
+use wavesplat::file::{CoefficientFile, time_labels};
 use wavesplat::render::annotate::Annotation;
 use wavesplat::render::{CoefficientScene, FrameScene, Scene, SplatSource};
-use wavesplat::source::Archive;
 use wavesplat::view::camera::Camera;
 
 /// The scene to render.
@@ -60,8 +59,7 @@ impl Cli {
             MethodName::Coefficients => SplatSource::Coefficients,
             MethodName::Direct => SplatSource::Samples,
         };
-        let unit = setting(file.metadata(), "time-units").map(String::from);
-        let annotation = Annotation { times: file.metadata().times.clone(), unit };
+        let annotation = Annotation { times: time_labels(file.metadata()) };
         let colours = self.along.of_file(self.colour.range, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), what));
         Ok(Opened { scene, file: Some(file), exaggeration, annotation, colours })
@@ -109,8 +107,7 @@ impl Cli {
         self.refuse_for_frames()?;
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
-        let Archive { times, units, .. } = source.archive().clone();
-        let annotation = Annotation { times, unit: units.times };
+        let annotation = Annotation { times: source.archive().time_labels() };
         let missing_value = source.archive().missing_value(self.missing_value);
         let colours = match self.along.colours() {
             Some(name) => {

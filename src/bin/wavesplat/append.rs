@@ -60,8 +60,9 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         args.common.note(format_args!("{}: there are no frames after {all} yet, nothing to add", args.file.display()));
         return Ok(());
     }
-    let mut source = narrow(source, args.frames, None)?;
-    let timed = source.archive().times.is_empty() == file.metadata().times.is_empty();
+    let source = narrow(source, args.frames, None)?;
+    let mut source = args.input.go_on_in_time(&file, source, args.frames.map_or(1, |frames| frames.step()))?;
+    let timed = source.archive().has_times() != file.metadata().times.is_empty();
     if !timed {
         return Err(Error::usage("either the file or the new frames have times: both must, or neither"));
     }

@@ -223,7 +223,7 @@ impl ConvertArgs {
     /// Checks that the output is complete, so that nothing is left to do.
     fn check_complete(&self, config: &ConvertConfig, archive: &Archive) -> Result<()> {
         let name = self.output.display();
-        if !resume::is_complete(&self.output, &open_partial(config, archive)?, archive.frames)? {
+        if !resume::is_complete(&self.output, &open_partial(config, archive)?, archive)? {
             let what = "is complete, but with other settings or frames; --force replaces it, append adds frames";
             return Err(Error::usage(format!("{name}: {what}")));
         }

@@ -5,27 +5,29 @@
 mod text;
 mod ticks;
 
+use crate::base::decimal;
+use crate::base::time_labels::TimeLabels;
 use crate::colour::{Rgb, Scale};
 use text::Letters;
 
 /// The annotations of a run's pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Annotation {
-    /// The time of each frame. Frames without a time show their number.
-    pub times: Vec<f64>,
-    /// Unit of the times.
-    pub unit: Option<String>,
+    /// The times of frames. Frames without a time show their number.
+    pub times: TimeLabels,
 }
 
 impl Annotation {
     /// The long and the short label of a frame.
     fn stamps(&self, frame: usize) -> [String; 2] {
-        let Some(time) = self.times.get(frame) else { return [format!("frame {frame}"), format!("{frame}")] };
-        let short = format!("t = {}", ticks::short(*time));
-        // Times since a reference date differ only in their last digits.
-        let unit = self.unit.as_deref().unwrap_or_default();
-        let long = if unit.contains(" since ") { format!("t = {time} {unit}") } else { format!("{short} {unit}") };
-        [long.trim_end().into(), short]
+        if let Some(date) = self.times.date(frame) {
+            let day = date.split(' ').next().unwrap_or_default().to_string();
+            return [date, day];
+        }
+        match (self.times.text(frame), self.times.number(frame)) {
+            (Some(long), Some(short)) => [format!("t = {long}"), format!("t = {short}")],
+            _ => [format!("frame {frame}"), format!("{frame}")],
+        }
     }
 
     /// Draws the time of `frame` at the top left and, if a `scale` is given, a colour bar at the right edge. A row has
@@ -123,7 +125,7 @@ impl<'a> Sheet<'a> {
     fn labels(&mut self, scale: &Scale, left: usize, top: usize, length: usize) {
         let Self { margin, letters, .. } = *self;
         let ticks = ticks::ticks(scale, (length / (2 * letters.height)).clamp(2, 8));
-        let labels: Vec<(String, f64)> = ticks.iter().map(|v| (ticks::short(*v), scale.share(*v))).collect();
+        let labels: Vec<(String, f64)> = ticks.iter().map(|v| (decimal::short(*v), scale.share(*v))).collect();
         let tick = margin / 2;
         let longest = labels.iter().map(|(text, _)| text.len() * letters.width).max().unwrap_or(0);
         if longest + tick + margin > left {
@@ -178,11 +180,14 @@ mod tests {
     #[test]
     fn frames_show_their_time_or_their_number() {
         let stamps = |unit: Option<&str>| {
-            let timed = Annotation { times: vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0], unit: unit.map(String::from) };
-            (0..5).map(|frame| timed.stamps(frame)[0].clone()).collect::<Vec<_>>()
+            let times = vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0];
+            let timed = Annotation { times: TimeLabels::new(times, unit, None) };
+            (0..5).map(|frame| timed.stamps(frame)).collect::<Vec<_>>()
         };
-        assert_eq!(stamps(None), ["t = 0", "t = 0.0125", "t = 0.3", "t = 1.051956e6", "frame 4"]);
-        assert_eq!(stamps(Some("s"))[1], "t = 0.0125 s");
-        assert_eq!(stamps(Some("hours since 1900-01-01"))[3], "t = 1051956 hours since 1900-01-01");
+        let long = |unit| stamps(unit).into_iter().map(|[long, _]| long).collect::<Vec<_>>();
+        assert_eq!(long(None), ["t = 0", "t = 0.0125", "t = 0.3", "t = 1051956", "frame 4"]);
+        assert_eq!(stamps(Some("s"))[1], ["t = 0.0125 s", "t = 0.0125"]);
+        assert_eq!(stamps(Some("hours since 1900-01-01"))[3], ["2020-01-03 12:00:00", "2020-01-03"]);
+        assert_eq!(long(Some("months since 1900-01-01"))[1], "t = 0.0125 months since 1900-01-01");
     }
 }

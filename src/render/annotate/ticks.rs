@@ -45,19 +45,10 @@ fn ten_to(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(f64::INFINITY)
 }
 
-/// A number as text, without digits that come from rounding.
-pub(super) fn short(v: f64) -> String {
-    let rounded: f64 = format!("{v:.11e}").parse().unwrap_or(v);
-    match rounded.abs() {
-        0.0 => "0".into(),
-        0.001..1e6 => rounded.to_string(),
-        _ => format!("{rounded:e}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::decimal::short;
     use crate::colour::TransferFunction;
 
     fn labels(range: (f64, f64), norm: Norm, wanted: usize) -> Vec<String> {

@@ -23,9 +23,14 @@ struct Info<'a> {
     sample: &'static str,
     frames: Option<usize>,
     times: &'a [f64],
+    #[serde(skip)]
+    span: Option<String>,
+    /// Of each time, where a calendar is known; else empty.
+    dates: Vec<String>,
     variable: Option<&'a str>,
     units: Option<&'a str>,
     time_units: Option<&'a str>,
+    calendar: Option<&'a str>,
     space_units: Option<&'a str>,
     /// The value of missing samples: a number, or "NaN".
     missing_value: Option<String>,
@@ -61,6 +66,7 @@ fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
 
 impl<'a> Info<'a> {
     fn of(archive: &'a Archive, estimate: Option<Estimate>) -> Self {
+        let labels = archive.time_labels();
         let frame = (archive.grid.whole().voxels() * archive.sample.size()) as u64;
         Self {
             format: archive.format,
@@ -71,9 +77,12 @@ impl<'a> Info<'a> {
             sample: archive.sample.name(),
             frames: archive.frames,
             times: &archive.times,
+            span: labels.span(),
+            dates: labels.dates(),
             variable: archive.variable.as_deref(),
             units: archive.units.samples.as_deref(),
             time_units: archive.units.times.as_deref(),
+            calendar: archive.units.calendar.as_deref(),
             space_units: archive.units.space.as_deref(),
             missing_value: archive.missing.map(|value| format!("{value:?}")),
             raw_bytes: archive.frames.and_then(|frames| frame.checked_mul(frames as u64)),
@@ -99,8 +108,8 @@ impl<'a> Info<'a> {
             self.sample,
             self.variable.unwrap_or("unnamed"),
         );
-        if let [first, .., last] | [first @ last] = self.times {
-            let _ = writeln!(text, "times      {first} to {last}{}", with(self.time_units, " "));
+        if let Some(span) = &self.span {
+            let _ = writeln!(text, "times      {span}");
         }
         if let Some(value) = &self.missing_value {
             let _ = writeln!(text, "missing    {value} stands for missing samples");

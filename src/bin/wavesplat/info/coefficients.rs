@@ -8,8 +8,8 @@ use wavesplat::base::description::Description;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
 use wavesplat::convert::{Bound, Packing, options};
-use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::{BoundReport, WindowReport};
+use wavesplat::file::{CoefficientFile, time_labels};
 use wavesplat::source::CHANNELS;
 
 /// The keys of `--json`.
@@ -27,6 +27,10 @@ struct Info {
     colours: Option<String>,
     frames: u64,
     times: Vec<f64>,
+    /// Of each time, where a calendar is known; else empty.
+    dates: Vec<String>,
+    #[serde(skip)]
+    span: Option<String>,
     variable: Option<String>,
     #[serde(flatten)]
     promise: BoundReport,
@@ -66,6 +70,7 @@ impl Info {
         let voxels: u64 = m.dims.iter().product();
         let windows: Vec<WindowReport> =
             m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
+        let times = time_labels(m);
         let described = file.description()?;
         let has_features = m.packing() == Packing::Nested || described.is_some();
         Ok(Self {
@@ -80,6 +85,8 @@ impl Info {
             colours: file.colour_transform().map(|painter| painter.colours.words()),
             frames: m.frames,
             times: m.times.clone(),
+            dates: times.dates(),
+            span: times.span(),
             variable: m.variable.clone(),
             promise: BoundReport::new(m.bound, m.tolerance, m.range()),
             range: m.range(),
@@ -133,8 +140,8 @@ impl Info {
             self.format
         );
         let unit = |name: &str| self.settings.iter().find(|(n, _)| n == name).map(|(_, unit)| unit.as_str());
-        if let [first, .., last] | [first @ last] = self.times.as_slice() {
-            let _ = writeln!(text, "times      {first} to {last} {}", unit("time-units").unwrap_or_default());
+        if let Some(span) = &self.span {
+            let _ = writeln!(text, "times      {span}");
         }
         let units: Vec<String> = [("samples in ", "units"), ("places in ", "space-units")]
             .into_iter()

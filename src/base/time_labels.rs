@@ -1,0 +1,224 @@
+//! Times as people read them: dates where a calendar is known, else numbers with the digits that tell frames apart.
+
+use super::calendar::Date;
+use super::clock::{Clock, DAY, MINUTE, SECOND};
+use super::decimal;
+use std::fmt::Write;
+
+/// Times are rounded to this part of the least step between neighbours.
+const PART: i128 = 1000;
+const PART_DIGITS: i32 = 3;
+
+/// Digits of a double that can be trusted.
+const DIGITS: i32 = 15;
+
+/// Digits of femtoseconds within a second.
+const SECOND_DIGITS: usize = 15;
+
+/// The times of frames, and how they are written.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TimeLabels {
+    times: Vec<f64>,
+    unit: String,
+    /// Decimals that tell frames apart; None if there is nothing to tell apart.
+    decimals: Option<usize>,
+    dates: Option<Dates>,
+}
+
+/// How the dates of a clock are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Dates {
+    clock: Clock,
+    /// Femtoseconds that they are rounded to.
+    grain: i128,
+    shown: Shown,
+}
+
+/// What is written of a date.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shown {
+    Day,
+    Minute,
+    /// Seconds with so many decimals.
+    Second(usize),
+}
+
+impl TimeLabels {
+    /// The times of frames in a unit, perhaps since a date of a calendar; no times if frames are numbered.
+    pub fn new(times: Vec<f64>, unit: Option<&str>, calendar: Option<&str>) -> Self {
+        let unit = unit.map(str::trim).unwrap_or_default().to_string();
+        let clock = Clock::of(&unit, calendar).ok();
+        let (decimals, dates) = (decimals(&times), clock.and_then(|clock| Dates::of(clock, &times)));
+        Self { times, unit, decimals, dates }
+    }
+
+    /// The times themselves.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The date of a frame, such as `2016-02-03 00:00`: with seconds only if some frame has them, and without a time of day
+    /// if all are at midnight. None if no date is known.
+    pub fn date(&self, frame: usize) -> Option<String> {
+        let Dates { clock, grain, shown } = self.dates?;
+        let (date, within) = clock.date(rounded(clock.instant(*self.times.get(frame)?)?, grain))?;
+        Some(written(date, within, shown))
+    }
+
+    /// The date of a frame, or its time with the unit; None if it has none.
+    pub fn text(&self, frame: usize) -> Option<String> {
+        let number = || Some(format!("{} {}", self.number(frame)?, self.unit).trim_end().to_string());
+        self.date(frame).or_else(number)
+    }
+
+    /// The time of a frame as a number, without digits that do not tell it from its neighbours.
+    pub fn number(&self, frame: usize) -> Option<String> {
+        let time = *self.times.get(frame)?;
+        Some(self.decimals.map_or_else(|| decimal::short(time), |decimals| decimal::rounded(time, decimals)))
+    }
+
+    /// The dates of all frames; empty if no dates are known.
+    pub fn dates(&self) -> Vec<String> {
+        (0..self.times.len()).filter_map(|frame| self.date(frame)).collect()
+    }
+
+    /// What `info` says: the first and the last time, with their dates. None without times.
+    pub fn span(&self) -> Option<String> {
+        let last = self.times.len().checked_sub(1)?;
+        let numbers = format!("{} to {} {}", self.number(0)?, self.number(last)?, self.unit);
+        let numbers = numbers.trim_end();
+        Some(match self.date(0).zip(self.date(last)) {
+            Some((first, last)) => format!("{first} to {last} ({numbers})"),
+            None => numbers.into(),
+        })
+    }
+}
+
+impl Dates {
+    /// None if not all times have a date.
+    fn of(clock: Clock, times: &[f64]) -> Option<Self> {
+        let instants = times.iter().map(|time| clock.instant(*time)).collect::<Option<Vec<_>>>()?;
+        let step = instants.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0).min();
+        let blur = (largest(times) * f64::EPSILON * clock.unit as f64) as i128;
+        let mut grain = SECOND;
+        while grain > 1 && grain * PART > step.unwrap_or(SECOND) && grain > 2 * blur {
+            grain /= 10;
+        }
+        let all: Vec<i128> = instants.into_iter().map(|instant| rounded(instant, grain)).collect();
+        clock.date(*all.iter().min()?).and(clock.date(*all.iter().max()?))?;
+        Some(Self { clock, grain, shown: Shown::of(&all) })
+    }
+}
+
+impl Shown {
+    /// The least that tells all of some instants.
+    fn of(instants: &[i128]) -> Self {
+        let are = |length: i128| instants.iter().all(|instant| instant % length == 0);
+        let least = |decimals: &usize| are(SECOND / 10_i128.pow(*decimals as u32));
+        match (are(DAY), are(MINUTE)) {
+            (true, _) => Self::Day,
+            (false, true) => Self::Minute,
+            (false, false) => Self::Second((0..SECOND_DIGITS).find(least).unwrap_or(SECOND_DIGITS)),
+        }
+    }
+}
+
+/// Decimals that tell the nearest neighbours apart, of those that doubles have; None if all times are the same.
+fn decimals(times: &[f64]) -> Option<usize> {
+    let steps = times.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
+    let step = steps.min_by(f64::total_cmp).filter(|step| step.is_finite())?;
+    let decimals = (PART_DIGITS - exponent(step)).min(DIGITS - 1 - exponent(largest(times)));
+    Some(decimals.max(0) as usize)
+}
+
+fn largest(times: &[f64]) -> f64 {
+    times.iter().fold(0.0, |most: f64, time| most.max(time.abs()))
+}
+
+/// The power of ten at or below a positive number.
+fn exponent(v: f64) -> i32 {
+    format!("{v:e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
+}
+
+/// The multiple of `grain` next to an instant.
+fn rounded(instant: i128, grain: i128) -> i128 {
+    instant.saturating_add(grain / 2).div_euclid(grain).saturating_mul(grain)
+}
+
+fn written(Date { year, month, day }: Date, within: i128, shown: Shown) -> String {
+    let sign = if year < 0 { "-" } else { "" };
+    let mut text = format!("{sign}{:04}-{month:02}-{day:02}", year.unsigned_abs());
+    let (minutes, seconds) = (within / MINUTE, within % MINUTE);
+    if shown != Shown::Day {
+        let _ = write!(text, " {:02}:{:02}", minutes / 60, minutes % 60);
+    }
+    if let Shown::Second(decimals) = shown {
+        let _ = write!(text, ":{:02}", seconds / SECOND);
+        if decimals > 0 {
+            let _ = write!(text, ".{}", &format!("{:015}", seconds % SECOND)[..decimals]);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(times: &[f64], unit: &str, calendar: Option<&str>) -> Vec<String> {
+        let labels = TimeLabels::new(times.to_vec(), Some(unit), calendar);
+        (0..times.len()).filter_map(|frame| labels.text(frame)).collect()
+    }
+
+    #[test]
+    fn dates_have_as_much_of_the_time_of_day_as_some_frame_needs() {
+        let days = |times: &[f64]| labels(times, "days since 2016-02-28", None);
+        assert_eq!(days(&[0.0, 1.0, 2.0]), ["2016-02-28", "2016-02-29", "2016-03-01"]);
+        assert_eq!(days(&[0.0, 0.25, 1.0 / 3.0])[1..], ["2016-02-28 06:00", "2016-02-28 08:00"]);
+        assert_eq!(days(&[1.0, 1.0 + 90.0 / 86400.0]), ["2016-02-29 00:00:00", "2016-02-29 00:01:30"]);
+        assert_eq!(labels(&[1_454_500_800.0], "seconds since 1970-01-01", None), ["2016-02-03 12:00"]);
+        let film: Vec<f64> = (0..4).map(|t| 20_000.0 + f64::from(t) * 0.04 / 86400.0).collect();
+        let film = labels(&film, "days since 1970-01-01", Some("standard"));
+        assert_eq!(film[1..3], ["2024-10-04 00:00:00.04", "2024-10-04 00:00:00.08"]);
+        assert_eq!(labels(&[0.0, 5e-15], "s since 2000-01-01", None)[1], "2000-01-01 00:00:00.000000000000005");
+    }
+
+    #[test]
+    fn digits_that_come_from_rounding_are_not_written() {
+        let hourly: Vec<f64> = (0..2000).map(|hour| 735_000.0 + f64::from(hour) / 24.0).collect();
+        for (hour, label) in labels(&hourly, "days since 0001-01-01", Some("noleap")).into_iter().enumerate() {
+            assert!(label.ends_with(&format!(" {:02}:00", hour % 24)), "{label}");
+        }
+        let single: Vec<f64> = (0..300).map(|t| f64::from(t as f32 * 0.01)).collect();
+        assert_eq!(labels(&single, "s", None)[254], "2.54 s");
+        assert_eq!(labels(&[5.07999992371, 5.1], "", None), ["5.08", "5.1"]);
+        assert_eq!(labels(&[5.079_999_999_999_9], "ms", None), ["5.08 ms"]);
+        assert_eq!(labels(&[1e9, 1e9 + 0.25], "s", None), ["1000000000 s", "1000000000.25 s"]);
+        assert_eq!(labels(&[0.0, 2e-9, 3e-9], "s", None), ["0 s", "2e-9 s", "3e-9 s"]);
+        assert_eq!(labels(&[3.0, 3.0], "days", None), ["3 days", "3 days"]);
+    }
+
+    #[test]
+    fn times_without_a_known_calendar_are_numbers() {
+        let number = |unit, calendar| labels(&[0.5], unit, calendar);
+        assert_eq!(number("months since 2000-01-01", None), ["0.5 months since 2000-01-01"]);
+        assert_eq!(number("days since 2000-01-01", Some("lunar")), ["0.5 days since 2000-01-01"]);
+        assert_eq!(number("days since 2000-02-30", Some("360_day")), ["2000-02-30 12:00"]);
+        let far = labels(&[1e300, -1e300, f64::MAX], "days since 2000-01-01", None);
+        assert_eq!(far[0], "1e300 days since 2000-01-01");
+        assert_eq!(labels(&[1e25, -1e25], "weeks since 2000-01-01", None).len(), 2);
+        assert!(labels(&[f64::NAN, f64::INFINITY], "s", None).len() == 2 && labels(&[], "s", None).is_empty());
+    }
+
+    #[test]
+    fn a_span_has_dates_and_numbers() {
+        let span = |times: &[f64], unit| TimeLabels::new(times.to_vec(), unit, None).span();
+        let days = "days since 2000-01-01";
+        assert_eq!(
+            span(&[0.5, 2.5], Some(days)).as_deref(),
+            Some("2000-01-01 12:00 to 2000-01-03 12:00 (0.5 to 2.5 days since 2000-01-01)")
+        );
+        assert_eq!(span(&[0.1 + 0.2, 2.5], None).as_deref(), Some("0.3 to 2.5"));
+        assert_eq!(span(&[], None), None);
+    }
+}
