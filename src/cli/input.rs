@@ -56,6 +56,9 @@ pub struct InputArgs {
     /// Array of the files to read
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub variable: Option<String>,
+    /// Read the length of a vector: names of the arrays of its components, separated by commas
+    #[arg(long, value_name = "NAMES", conflicts_with = "variable", value_delimiter = ',', help_heading = "Input")]
+    pub magnitude: Vec<String>,
     /// Meaning of the axes of an array in HDF5, NetCDF or Zarr, slowest first: letters of tzyx, c for another axis
     #[arg(long, value_name = "LETTERS", help_heading = "Input")]
     pub axes: Option<String>,
@@ -97,6 +100,7 @@ impl InputArgs {
             (self.endian.is_some(), "--endian"),
             (self.offset.is_some(), "--offset"),
             (self.variable.is_some(), "--variable"),
+            (!self.magnitude.is_empty(), "--magnitude"),
             (self.axes.is_some(), "--axes"),
             (self.spacing.is_some(), "--spacing"),
             (self.origin.is_some(), "--origin"),
@@ -136,6 +140,7 @@ impl InputArgs {
             dims_are_remembered: false,
             variable: self.variable.clone(),
             variable_is_remembered: false,
+            magnitude: self.magnitude.clone(),
             axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
@@ -161,6 +166,7 @@ impl InputArgs {
     pub fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
         let given = [
             ("variable", self.variable.clone()),
+            ("magnitude", (!self.magnitude.is_empty()).then(|| self.magnitude.join(","))),
             ("axes", self.axes.clone()),
             ("dims", self.dims.as_ref().map(ToString::to_string)),
             ("dtype", self.dtype.map(|ty| ty.to_string())),
@@ -218,6 +224,10 @@ impl InputArgs {
     fn completed(&self, of: &CoefficientFile) -> Result<Self> {
         let mut input = self.clone();
         complete(&mut input.variable, of, "variable")?;
+        if input.magnitude.is_empty() && self.variable.is_none() {
+            let names = setting(of.metadata(), "magnitude").unwrap_or_default();
+            input.magnitude = names.split(',').filter(|name| !name.is_empty()).map(String::from).collect();
+        }
         complete(&mut input.axes, of, "axes")?;
         complete(&mut input.spacing, of, "spacing")?;
         complete(&mut input.origin, of, "origin")?;

@@ -97,7 +97,7 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
 }
 
 /// Settings of a file that are options by the same names.
-const STORED: [&str; 19] = [
+const STORED: [&str; 20] = [
     "range",
     "missing",
     "missing-value",
@@ -108,6 +108,7 @@ const STORED: [&str; 19] = [
     "frames",
     "region",
     "variable",
+    "magnitude",
     "axes",
     "dims",
     "dtype",

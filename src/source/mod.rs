@@ -12,6 +12,7 @@ mod frames;
 mod spill_buffer;
 mod inputs;
 mod layout;
+mod magnitude;
 mod numbering;
 mod packing;
 mod parts;
@@ -83,6 +84,9 @@ pub struct OpenOptions {
     pub variable: Option<String>,
     /// Whether `variable` is that of an earlier archive. Then files with one array without a name ignore it.
     pub variable_is_remembered: bool,
+    /// Variables whose squares are summed, and the sum's square root taken: the length of a vector. Empty for one
+    /// variable.
+    pub magnitude: Vec<String>,
     /// The meaning of each axis of an array, slowest first: letters of t z y x, or another letter for another axis.
     pub axes: Option<String>,
     /// World units between voxels along x, y, z, instead of those in the files.
@@ -113,6 +117,7 @@ impl Default for OpenOptions {
             dims_are_remembered: false,
             variable: None,
             variable_is_remembered: false,
+            magnitude: Vec::new(),
             axes: None,
             spacing: None,
             origin: None,
@@ -146,6 +151,9 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
     {
         return open_stream(std::io::stdin(), options);
     }
+    if !options.magnitude.is_empty() {
+        return magnitude::open(inputs, options);
+    }
     if options.dims_are_remembered && inputs::have_headers(inputs, options) {
         return open_files(inputs, &options.for_headers());
     }
@@ -163,7 +171,11 @@ fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Frame
 /// # Errors
 /// Files that are absent, damaged or of a format that is not supported.
 pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
-    if options.variable.is_some() || options.dims.is_some() || inputs == [Path::new(STANDARD)] {
+    if options.variable.is_some()
+        || !options.magnitude.is_empty()
+        || options.dims.is_some()
+        || inputs == [Path::new(STANDARD)]
+    {
         return Ok(Vec::new());
     }
     formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)

@@ -1,5 +1,6 @@
 //! `wavesplat convert`
 
+use super::several;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -16,7 +17,7 @@ use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{Archive, FrameSource, extensions};
 
 /// Convert frames to a coefficient file
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     before_help = "\
 Examples:
@@ -26,6 +27,7 @@ Examples:
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
   wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
+  wavesplat convert run.nc -o run_%n.wspl --variable u,v,w
   wavesplat convert old.wspl -o new.wspl",
     after_help = after_help()
 )]
@@ -33,10 +35,10 @@ pub(crate) struct ConvertArgs {
     /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input; or a coefficient
     /// file, to pack it as this version does, with the same samples
     #[arg(required = true)]
-    inputs: Vec<PathBuf>,
-    /// Coefficient file to write, or - for standard output
+    pub(super) inputs: Vec<PathBuf>,
+    /// Coefficient file to write, or - for standard output. With several variables %n stands for the name of each
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
-    output: PathBuf,
+    pub(super) output: PathBuf,
     /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
     #[arg(long, help_heading = "Output")]
     force: bool,
@@ -75,7 +77,7 @@ pub(crate) struct ConvertArgs {
     #[command(flatten)]
     select: SelectArgs,
     #[command(flatten)]
-    input: InputArgs,
+    pub(super) input: InputArgs,
     /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's
     /// file. The tolerance is then a share of full brightness
     #[arg(long, value_name = "F", help_heading = CODING)]
@@ -96,7 +98,7 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=19), help_heading = CODING)]
     level: i32,
     #[command(flatten)]
-    common: CommonArgs,
+    pub(super) common: CommonArgs,
 }
 
 /// The headings of the help.
@@ -169,6 +171,13 @@ enum MissingName {
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;
+    match several::commands(args)? {
+        Some(commands) => commands.iter().try_for_each(run_one),
+        None => run_one(args),
+    }
+}
+
+fn run_one(args: &ConvertArgs) -> Result<()> {
     if let Some(file) = args.input.coefficients(&args.inputs)? {
         return args.repack(&file);
     }

@@ -6,6 +6,7 @@ mod convert;
 mod extract;
 mod info;
 mod recover;
+mod several;
 mod verify;
 
 use clap::{Parser, Subcommand};
