@@ -131,9 +131,13 @@ impl Contents {
         Lattice { dims: std::array::from_fn(|_| lengths.next().unwrap_or(1)), first, directions, spacing, space }
     }
 
-    /// The coordinates of an axis of voxels, ascending: those of the source, or those of the lattice.
+    /// The coordinates of an axis of voxels, ascending: those of the source, or those of the lattice. Depths become negative
+    /// heights.
     pub(super) fn coordinates(&self, axis: usize) -> Vec<f64> {
-        let own = self.description.as_ref().and_then(|description| coordinates(description, axis));
+        let mut own = self.description.as_ref().and_then(|description| coordinates(description, axis));
+        if let Some(at) = own.as_mut().filter(|at| at.last() < at.first()) {
+            at.iter_mut().for_each(|at| *at = -*at);
+        }
         own.unwrap_or_else(|| (0..self.grid.dims[axis]).map(|i| self.grid.position([i; 3])[axis]).collect())
     }
 

@@ -31,6 +31,7 @@ mod progress;
 mod recover;
 mod render;
 mod resume;
+mod several;
 mod streams;
 mod usage;
 

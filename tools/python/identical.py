@@ -124,13 +124,15 @@ def check_netcdf(name, run, folder, engine="netcdf4"):
     run("convert", source, "-o", folder / f"{name}.wspl", "--variable", variable, "--tolerance", TOLERANCE, *extra, "--force")
     run("extract", folder / f"{name}.wspl", "-o", back, "--force")
     compare(source, back, variable)
+    run("extract", folder / f"{name}.wspl", "-o", folder / f"{name}.zarr", "--force")
+    compare(source, folder / f"{name}.zarr", variable)
 
 
 def compare(source, back, variable):
     """Both files say the same, but for the samples' error."""
     sources = [xr.load_dataset(path) for path in (source if isinstance(source, list) else [source])]
     before = sources[0] if len(sources) == 1 else xr.concat(sources, "time", data_vars="minimal")
-    after = xr.load_dataset(back)
+    after = xr.open_zarr(back, chunks=None).load() if back.suffix == ".zarr" else xr.load_dataset(back)
     a, b = before[variable], after[variable]
     assert a.dims == b.dims, f"{a.dims} became {b.dims}"
     bound = TOLERANCE * float(a.max() - a.min())
@@ -256,6 +258,30 @@ def check_metaimage(run, folder):
     run("convert", folder / "scan_back.nrrd", "-o", folder / "again.wspl", "--tolerance", TOLERANCE, "--force")
     run("extract", folder / "again.wspl", "-o", folder / "again.nrrd", "--force")
     np.testing.assert_allclose(image.GetDirection(), itk.ReadImage(str(folder / "again.nrrd")).GetDirection(), atol=1e-12)
+
+
+def check_vtr(run, folder):
+    """Depths of a model as a rectilinear grid, read back by VTK; an oblique image as .vti."""
+    import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    data, variable, options = dataset_turned()
+    data.isel(snapshot=[0]).to_netcdf(folder / "deep.nc")
+    run("convert", folder / "deep.nc", "-o", folder / "deep.wspl", "--axes", "xyzt", "--tolerance", TOLERANCE, "--force")
+    run("extract", folder / "deep.wspl", "-o", folder / "deep.vtr", "--force")
+    reader = vtk.vtkXMLRectilinearGridReader()
+    reader.SetFileName(str(folder / "deep.vtr"))
+    reader.Update()
+    grid = reader.GetOutput()
+    np.testing.assert_array_equal(vtk_to_numpy(grid.GetZCoordinates()), np.sort(-data.depth.values if is_down(data) else data.depth.values))
+    samples = vtk_to_numpy(grid.GetPointData().GetArray(variable)).reshape(grid.GetDimensions()[::-1])
+    expected = np.moveaxis(data[variable].values[..., 0], [0, 1, 2], [2, 1, 0])
+    check_samples(expected[::-1] if is_down(data) else expected, samples)
+
+
+def is_down(data):
+    """Whether depths are counted downwards, so that wavesplat turns the axis."""
+    return data.depth.attrs.get("positive") == "down"
 
 
 def main():
