@@ -248,6 +248,14 @@ impl Description {
         self.encoded().map(drop)
     }
 
+    /// Decodes and checks a record that must take up all of `bytes`, for the file with this metadata.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with the reason.
+    pub fn decode(bytes: &[u8], metadata: &Metadata) -> Result<Self> {
+        Self::parse(bytes, metadata).map_err(Error::Invalid)
+    }
+
     pub(crate) fn parse(bytes: &[u8], metadata: &Metadata) -> ParseResult<Self> {
         let description: Self = decode_exact(bytes, "description")?;
         description.check(metadata)?;
@@ -301,6 +309,11 @@ impl Description {
             Values::Numbers(numbers) => numbers.count() as u64,
             Values::Times(_) => metadata.frames,
         };
+        if matches!(variable.values, Values::Times(_)) {
+            let of_frames = self.axes.iter().find(|axis| axis.role == AxisRole::Frames).map(|axis| axis.dimension);
+            let is_along = variable.dimensions.iter().copied().eq(of_frames) || variable.dimensions.is_empty();
+            ensure(is_along, || "times along another axis than that of frames".into())?;
+        }
         variable.values.check()?;
         ensure(held == count, || format!("{held} values instead of {count}"))
     }
@@ -386,7 +399,8 @@ mod tests {
     #[test]
     fn contradictions_are_refused() {
         type Change = fn(&mut Description);
-        let changes: [(Change, &str); 8] = [
+        let changes: [(Change, &str); 9] = [
+            (|d| d.variables[0].dimensions = vec![0], "times along another axis"),
             (|d| d.dimensions[0].length += 1, "axis 0 has"),
             (|d| d.axes[1].role = AxisRole::X, "axis 1"),
             (|d| d.axes[3].dimension = 9, "there is no dimension 9"),

@@ -185,7 +185,7 @@ fn missing(file: &CoefficientFile, config: &ExtractConfig) -> Option<f64> {
 }
 
 /// Text fit for one line of a header.
-fn plain(text: &str) -> String {
+pub(super) fn plain(text: &str) -> String {
     text.trim().chars().filter(|c| !c.is_control()).collect()
 }
 

@@ -73,7 +73,7 @@ impl Dataset {
     /// Dimensions, variables and attributes as the source has them.
     fn of_source(contents: &Contents, description: &Description, ty: SampleType) -> Self {
         let dimensions = named_dimensions(description);
-        let mut names: BTreeSet<String> = BTreeSet::from([contents.name.clone()]);
+        let mut names: BTreeSet<String> = BTreeSet::from([sound(&contents.name)]);
         let is_new = |name: &String| names.insert(name.clone());
         let own = description.variables.iter().filter_map(|variable| {
             let values = match &variable.values {
@@ -81,7 +81,7 @@ impl Dataset {
                 values => values.clone(),
             };
             let dimensions = variable.dimensions.iter().map(|dimension| *dimension as usize).collect();
-            let (name, attributes) = (variable.name.clone(), variable.attributes.clone());
+            let (name, attributes) = (sound(&variable.name), variable.attributes.clone());
             Some(DatasetVariable { name, dimensions, attributes, values })
         });
         let mut variables: Vec<DatasetVariable> = own.chain(lattice(contents, description, &dimensions)).collect();
@@ -90,7 +90,7 @@ impl Dataset {
             move |variable| is_new(&variable.name)
         });
         let samples = SamplesVariable {
-            name: contents.name.clone(),
+            name: sound(&contents.name),
             dimensions: description.axes.iter().map(|axis| axis.dimension as usize).collect(),
             ty,
             attributes: samples_attributes(contents, description),
@@ -120,7 +120,7 @@ fn named_dimensions(description: &Description) -> Vec<(String, u64)> {
             Some(role) => role.voxels().map_or_else(|| format!("dim_{number}"), |axis| NAMES[axis + 1].into()),
             None => format!("dim_{number}"),
         };
-        let wanted = if dimension.name.is_empty() { fallback } else { dimension.name.clone() };
+        let wanted = if dimension.name.is_empty() { fallback } else { sound(&dimension.name) };
         let mut name = wanted.clone();
         while !taken.insert(name.clone()) {
             name = format!("{wanted}_{number}");
@@ -178,6 +178,12 @@ fn axis_attributes(contents: &Contents, name: &str) -> Vec<Attribute> {
 
 fn text(name: &str, value: &str) -> Attribute {
     Attribute { name: name.into(), value: Values::text(value) }
+}
+
+/// A name of a variable or dimension without what no format takes in names.
+fn sound(name: &str) -> String {
+    let name: String = name.chars().map(|c| if c.is_control() || c == '/' { '_' } else { c }).collect();
+    if name.is_empty() { "unnamed".into() } else { name }
 }
 
 /// The variable's name in letters, digits and underscores, different from all dimensions.

@@ -1,6 +1,6 @@
 //! The header of a MetaImage with its samples in the same file.
 
-use super::contents::{Contents, Lattice};
+use super::contents::{Contents, Lattice, plain};
 use crate::base::description::{RAS, Values};
 use crate::base::sample::SampleType;
 use std::io::{self, Write};
@@ -36,7 +36,7 @@ fn write_texts(contents: &Contents, out: &mut impl Write) -> io::Result<()> {
     let of_source = contents.description.as_ref().filter(|description| description.source == "MetaImage");
     for attribute in of_source.iter().flat_map(|description| &description.global) {
         if let Values::Texts(texts) = &attribute.value {
-            writeln!(out, "{} = {}", attribute.name, texts.join(" "))?;
+            writeln!(out, "{} = {}", plain(&attribute.name), plain(&texts.join(" ")))?;
         }
     }
     Ok(())

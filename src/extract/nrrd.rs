@@ -1,6 +1,6 @@
 //! Writes the header of a NRRD.
 
-use super::contents::{Contents, Lattice};
+use super::contents::{Contents, Lattice, plain};
 use crate::base::description::Values;
 use crate::base::sample::SampleType;
 use std::fmt::Display;
@@ -19,7 +19,7 @@ pub(super) fn write_header(
     let one = frames == 1;
     let space = match lattice.space.as_str() {
         "" => "space dimension: 3".into(),
-        space => format!("space: {space}"),
+        space => format!("space: {}", plain(space)),
     };
     writeln!(out, "NRRD0004\ncontent: {}\ntype: {}", contents.name, name_of(ty))?;
     match one {
@@ -49,7 +49,7 @@ fn write_keys(contents: &Contents, out: &mut impl Write) -> io::Result<()> {
     let of_source = contents.description.as_ref().filter(|description| description.source == "NRRD");
     for attribute in of_source.iter().flat_map(|description| &description.global) {
         if let Values::Texts(texts) = &attribute.value {
-            writeln!(out, "{}:={}", attribute.name, texts.join(" "))?;
+            writeln!(out, "{}:={}", plain(&attribute.name), plain(&texts.join(" ")))?;
         }
     }
     Ok(())

@@ -33,7 +33,7 @@ fn the_length_of_a_vector_is_that_of_its_components() {
     let component = |name: &str| {
         work.wavesplat(&format!("convert {source} -o {name}.wspl --variable velocity[{name}] --tolerance 0")).ok();
         work.wavesplat(&format!("extract {name}.wspl -o {name}.npy")).ok();
-        floats(&read_npy(&work.read(format!("{name}.npy"))).1)
+        floats(&read_npy(&work.read(&format!("{name}.npy"))).1)
     };
     let [x, y, z] = ["0", "1", "2"].map(component);
     let names = "velocity[0],velocity[1],velocity[2]";

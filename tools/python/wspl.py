@@ -1036,6 +1036,8 @@ def read_description(r: Record, m) -> dict:
         values, count = described_values(r, m.frames)
         expected = math.prod(dimensions[number]["length"] for number in of)
         need(count == expected, r.place, f"variable {name} has {count} values, not {expected}")
+        along = [axis["dimension"] for axis in axes if axis["role"] == "frames"]
+        need(not isinstance(values, dict) or of in ([], along), r.place, "times along another axis")
         variables.append({"name": name, "dimensions": of, "values": values, "attributes": attributes()})
     places = ["first", "directions", "spacing"]
     orientation = r.option(lambda: {"space": r.string(), **dict(zip(places, (r.get("3d"), r.get("9d"), r.get("3d"))))})

@@ -134,6 +134,7 @@ fn seeds_are_made() {
             corpus.push(("metadata", name.to_string(), metadata));
         }
     }
+    corpus.push(("description", "every_kind".into(), description(&files[0].1)));
     changes(&mut corpus);
     payloads(&mut corpus);
     inputs(&mut corpus);
@@ -142,6 +143,40 @@ fn seeds_are_made() {
         fs::create_dir_all(&folder).unwrap();
         keep(&folder.join(name), &bytes);
     }
+}
+
+/// A description with values of every kind, of the file of the target.
+fn description(file: &[u8]) -> Vec<u8> {
+    let reader = Reader::open(file).unwrap();
+    let (metadata, text) = (reader.metadata(), |name: &str| Attribute { name: name.into(), value: Values::text("m") });
+    let [x, y, z] = metadata.dims;
+    let lengths = [("time", metadata.frames), ("z", z), ("y", y), ("x", x), ("nv", 2)];
+    let dimension = |(name, length): (&str, u64)| Dimension { name: name.into(), length, unlimited: name == "time" };
+    let roles = [AxisRole::Frames, AxisRole::Z, AxisRole::Y, AxisRole::X];
+    let axis = |(dimension, role)| ArrayAxis { dimension, role, reversed: role == AxisRole::Y };
+    let variable = |name: &str, dimensions: &[u32], values| Variable {
+        name: name.into(),
+        dimensions: dimensions.to_vec(),
+        values,
+        attributes: vec![text("units")],
+    };
+    let floats = |count: u64| Values::floats(&(0..count).map(|i| i as f64 / 4.0).collect::<Vec<_>>());
+    let (directions, spacing) = ([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]], [0.5, 1.0, 2.0]);
+    let description = Description {
+        source: "NetCDF".into(),
+        dimensions: lengths.map(dimension).into(),
+        axes: (0..).zip(roles).map(axis).collect(),
+        attributes: vec![text("long_name")],
+        global: vec![text("title")],
+        variables: vec![
+            variable("time", &[0], Values::Times(NumberType::I64)),
+            variable("bounds", &[0, 4], floats(2 * metadata.frames)),
+            variable("lat", &[2, 3], floats(x * y)),
+            variable("name", &[1], Values::Texts(vec!["level".into(); z as usize])),
+        ],
+        orientation: Some(Orientation { space: "RAS".into(), first: [1.0; 3], directions, spacing }),
+    };
+    description.encode(metadata).unwrap()
 }
 
 /// A file of version 1.1 whose blocks have ghost nodes.

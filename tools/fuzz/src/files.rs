@@ -6,6 +6,7 @@ use super::seeds::seed;
 use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
+use wavesplat::base::description::{joined, narrowed, with_frames};
 use wavesplat::base::grid::Region;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
@@ -42,6 +43,24 @@ pub fn metadata(data: &[u8]) {
             geometry.max_raw_len(PartKind::Level(level));
         }
     }
+}
+
+/// A description: a record that parses must encode to the same bytes, and its part for some frames and voxels is sound.
+pub fn description(data: &[u8]) {
+    let reader = Reader::open(seed(0).0).expect("a sound file");
+    let metadata = reader.metadata();
+    let Ok(description) = Description::decode(data, metadata) else { return };
+    assert_eq!(description.encode(metadata).expect("it was read"), data);
+    let frames: Vec<usize> = (0..metadata.frames as usize).step_by(2).collect();
+    let region = Region { start: [1, 0, 1], end: metadata.dims.map(|n| n as usize) };
+    let narrow = narrowed(&description, &frames, &region, 1);
+    let dims = std::array::from_fn(|axis| region.dims()[axis] as u64);
+    let part = Metadata { dims, frames: frames.len() as u64, ..metadata.clone() };
+    // a variable may be along one dimension twice, or along that of frames without being an axis: both stay as they are
+    let is_alike = |other: &Description| other.variables.len() == description.variables.len();
+    assert!(is_alike(&narrow) && narrow.check_size().is_ok() && part.dims.iter().all(|n| *n > 0));
+    let (both, lost) = joined(with_frames(description.clone(), 1), &[with_frames(description.clone(), 1)]);
+    assert_eq!(both.variables.len() + lost.len(), description.variables.len());
 }
 
 /// A valid file with changes and updated checksums, read by the format package.

@@ -17,9 +17,10 @@ pub mod values;
 pub type Target = fn(&[u8]);
 
 /// Every target by name; its folders in `corpus/` and `regressions/` have the same name.
-pub const TARGETS: [(&str, Target); 14] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("file", files::file),
     ("metadata", files::metadata),
+    ("description", files::description),
     ("codes", payloads::codes),
     ("cells", payloads::cells),
     ("payloads", payloads::payloads),
