@@ -31,6 +31,7 @@ mod recover;
 mod render;
 mod resume;
 mod streams;
+mod times;
 mod usage;
 
 use std::ffi::OsStr;

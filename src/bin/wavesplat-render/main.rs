@@ -38,8 +38,7 @@ impl Cli {
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
-        let provenance =
-            self.provenance(scene.as_ref(), &config, (file.as_deref(), annotation.times.times()), &colouring);
+        let provenance = self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring);
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let progress = self.common.progress("render", unit(&config.mode));
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
