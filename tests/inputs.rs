@@ -31,6 +31,8 @@ struct Case {
     origin: Option<[f64; 3]>,
     #[serde(default)]
     times: Vec<f64>,
+    #[serde(default)]
+    dates: Vec<String>,
     units: Option<String>,
     #[serde(default)]
     values: String,
@@ -112,6 +114,7 @@ impl Case {
             of(key, format!("{found:?}"), format!("{expected:?}"), good)?;
         }
         let factor = match units.times.as_deref().unwrap_or_default() {
+            unit if unit.starts_with("day") => 86400.0,
             unit if unit.starts_with("hour") => 3600.0,
             unit if unit.starts_with("ms") => 1e-3,
             _ => 1.0,
@@ -120,6 +123,8 @@ impl Case {
             && times.iter().zip(&self.times).all(|(a, b)| (a * factor - b).abs() < 1e-6);
         let expected = format!("{:?}", self.times);
         of("times", format!("{times:?}"), expected, same || lacks("times") && times.is_empty())?;
+        let dates = found.time_labels().dates();
+        of("dates", format!("{dates:?}"), format!("{:?}", self.dates), self.dates.is_empty() || self.dates == dates)?;
         let same = units.samples == self.units || lacks("units") && units.samples.is_none();
         of("unit", format!("{:?}", units.samples), format!("{:?}", self.units), same)
     }

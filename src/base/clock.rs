@@ -172,50 +172,6 @@ fn whole(text: &str) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::time_labels::TimeLabels;
-
-    /// Calendar, unit, time, and `cftime.num2date(time, unit, calendar)` of Python's cftime 1.6.6.
-    const DATES: [(&str, &str, f64, &str); 39] = [
-        ("standard", "days since 1582-10-01", 3.0, "1582-10-04 00:00:00.000000"),
-        ("standard", "days since 1582-10-01", 4.0, "1582-10-15 00:00:00.000000"),
-        ("standard", "days since 1582-10-01", 10.5, "1582-10-21 12:00:00.000000"),
-        ("standard", "hours since 1900-01-01 00:00:0.0", 1051956.0, "2020-01-03 12:00:00.000000"),
-        ("standard", "hours since 1900-01-01 00:00:0.0", -1.5, "1899-12-31 22:30:00.000000"),
-        ("gregorian", "seconds since 1970-01-01 00:00:00 UTC", 1454500800.0, "2016-02-03 12:00:00.000000"),
-        ("gregorian", "seconds since 1970-01-01 00:00:00 UTC", -1.0, "1969-12-31 23:59:59.000000"),
-        ("gregorian", "seconds since 1970-01-01 00:00:00 UTC", 951782400.0, "2000-02-29 00:00:00.000000"),
-        ("standard", "days since 0001-01-01 00:00:00", 577736.0, "1582-10-04 00:00:00.000000"),
-        ("standard", "days since 0001-01-01 00:00:00", 735964.25, "2015-12-31 06:00:00.000000"),
-        ("proleptic_gregorian", "days since 0001-01-01 00:00:00", 577736.0, "1582-10-16 00:00:00.000000"),
-        ("proleptic_gregorian", "days since 0001-01-01 00:00:00", 735964.25, "2016-01-02 06:00:00.000000"),
-        ("proleptic_gregorian", "days since 0000-03-01", 0.0, "0000-03-01 00:00:00.000000"),
-        ("proleptic_gregorian", "days since 0000-03-01", -60.0, "0000-01-01 00:00:00.000000"),
-        ("proleptic_gregorian", "days since 0000-03-01", 730424.0, "1999-12-31 00:00:00.000000"),
-        ("proleptic_gregorian", "days since -4-3-1", 1.0, "-0004-03-02 00:00:00.000000"),
-        ("julian", "days since 1900-02-28 12:00", 0.5, "1900-02-29 00:00:00.000000"),
-        ("julian", "days since 1900-02-28 12:00", 1.5, "1900-03-01 00:00:00.000000"),
-        ("julian", "days since 1900-02-28 12:00", 40000.0, "2009-09-03 12:00:00.000000"),
-        ("julian", "minutes since 2000-01-01T06:00:00Z", 44640.0, "2000-02-01 06:00:00.000000"),
-        ("noleap", "days since 2000-01-01", 59.0, "2000-03-01 00:00:00.000000"),
-        ("noleap", "days since 2000-01-01", 365.0, "2001-01-01 00:00:00.000000"),
-        ("noleap", "days since 2000-01-01", -1.0, "1999-12-31 00:00:00.000000"),
-        ("noleap", "days since 2000-01-01", 3650.125, "2010-01-01 03:00:00.000000"),
-        ("365_day", "hours since 1850-01-01 00:00:00", 1314000.0, "2000-01-01 00:00:00.000000"),
-        ("all_leap", "days since 2001-01-01", 59.0, "2001-02-29 00:00:00.000000"),
-        ("all_leap", "days since 2001-01-01", 366.0, "2002-01-01 00:00:00.000000"),
-        ("all_leap", "days since 2001-01-01", -366.0, "2000-01-01 00:00:00.000000"),
-        ("366_day", "seconds since 2001-02-28", 86400.0, "2001-02-29 00:00:00.000000"),
-        ("366_day", "seconds since 2001-02-28", 172800.0, "2001-03-01 00:00:00.000000"),
-        ("360_day", "days since 1850-01-30", 0.0, "1850-01-30 00:00:00.000000"),
-        ("360_day", "days since 1850-01-30", 30.0, "1850-02-30 00:00:00.000000"),
-        ("360_day", "days since 1850-01-30", 54000.75, "2000-01-30 18:00:00.000000"),
-        ("360_day", "days since 1850-01-30", -31.0, "1849-12-29 00:00:00.000000"),
-        ("standard", "hours since 2000-01-01 00:00:00 +02:00", 1.0, "1999-12-31 23:00:00.000000"),
-        ("standard", "hours since 2000-1-1 6:00:00.25 -6:00", 1.0, "2000-01-01 07:00:00.250000"),
-        ("standard", "hours since 2000-01-01 00:00 -0130", 1.0, "2000-01-01 02:30:00.000000"),
-        ("standard", "milliseconds since 2000-01-01 12:30:15.5", 1.0, "2000-01-01 12:30:15.501000"),
-        ("standard", "milliseconds since 2000-01-01 12:30:15.5", 86400000.0, "2000-01-02 12:30:15.500000"),
-    ];
 
     /// Calendar, unit, time, another unit, and the time there: `cftime.date2num` of `cftime.num2date`, which rounds to
     /// microseconds.
@@ -241,16 +197,6 @@ mod tests {
 
     fn clock(unit: &str, calendar: &str) -> Clock {
         Clock::of(unit, Some(calendar)).expect("a unit")
-    }
-
-    #[test]
-    fn dates_are_those_of_cftime() {
-        for (calendar, unit, time, date) in DATES {
-            let labels = TimeLabels::new(vec![time], Some(unit), Some(calendar));
-            let found = labels.date(0).expect("a date");
-            let rest = date.strip_prefix(&found).unwrap_or_else(|| panic!("{found}, {date}: {unit}, {calendar}"));
-            assert!(rest.chars().all(|c| " :.0".contains(c)), "{found}, {date}");
-        }
     }
 
     #[test]
@@ -299,7 +245,7 @@ mod tests {
         ] {
             assert_eq!(product(number, unit), expected, "{number}");
         }
-        assert_eq!(product(0.1, 1 << 60), Some(((1_i128 << 60) * 0x1999_9999_9999_9a + (1 << 55)) >> 56));
+        assert_eq!(product(0.1, 1 << 60), Some(((1_i128 << 60) * 0x0019_9999_9999_999a + (1 << 55)) >> 56));
     }
 
     #[test]

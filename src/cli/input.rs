@@ -122,16 +122,17 @@ impl InputArgs {
 
     /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
-        source::open(inputs, &self.options(memory)?)
+        source::open(inputs, &OpenOptions { times: self.given_times()?, ..self.options(memory) })
     }
 
     /// The variables among which `--variable` must choose; none if the archive can be opened without it.
     pub fn undecided(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
-        source::undecided(inputs, &self.options(memory)?)
+        source::undecided(inputs, &self.options(memory))
     }
 
-    fn options(&self, memory: usize) -> Result<OpenOptions> {
-        Ok(OpenOptions {
+    /// All options but times, which may be in a file.
+    fn options(&self, memory: usize) -> OpenOptions {
+        OpenOptions {
             access: self.access(),
             dims: self.dims.as_ref().map(|d| d.0.clone()),
             sample: self.dtype,
@@ -144,12 +145,12 @@ impl InputArgs {
             axes: self.axes.clone(),
             spacing: self.spacing.map(|s| s.0),
             origin: self.origin.map(|o| o.0),
-            times: self.given_times()?,
+            times: None,
             time_unit: self.time_unit.clone(),
             clock: None,
             allow_gaps: self.allow_gaps,
             memory,
-        })
+        }
     }
 }
 
@@ -208,7 +209,8 @@ impl InputArgs {
             dims_are_remembered: !self.describes_layout(),
             variable_is_remembered: self.variable.is_none(),
             clock: Some(times::units(of)),
-            ..self.completed(of)?.options(common.stream_memory())?
+            times: self.given_times()?,
+            ..self.completed(of)?.options(common.stream_memory())
         };
         let source = source::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));

@@ -38,9 +38,11 @@ pub(super) fn step(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// The setting of times.
+#[cfg(feature = "cli")]
 pub(super) const TIMES: &str = "times";
 
 /// Its value for times from a file: other frames need others.
+#[cfg(feature = "cli")]
 const LIST: &str = "list";
 
 impl InputArgs {
@@ -51,15 +53,6 @@ impl InputArgs {
             (Some(TimesSpec::Regular(Numbers([start, step]))), _) => regular(*start, *step).map(Some),
             (None, Some(step)) => regular(0.0, step).map(Some),
             (None, None) => Ok(None),
-        }
-    }
-
-    /// What is stored of them.
-    pub(super) fn times_setting(&self) -> Option<String> {
-        match (&self.times, self.dt) {
-            (Some(TimesSpec::File(_)), _) => Some(LIST.into()),
-            (Some(TimesSpec::Regular(times)), _) => Some(times.to_string()),
-            (None, step) => step.map(|step| Numbers([0.0, step]).to_string()),
         }
     }
 }
@@ -114,6 +107,15 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
 
 #[cfg(feature = "cli")]
 impl InputArgs {
+    /// What is stored of the times that are given.
+    pub(super) fn times_setting(&self) -> Option<String> {
+        match (&self.times, self.dt) {
+            (Some(TimesSpec::File(_)), _) => Some(LIST.into()),
+            (Some(TimesSpec::Regular(times)), _) => Some(times.to_string()),
+            (None, step) => step.map(|step| Numbers([0.0, step]).to_string()),
+        }
+    }
+
     /// Frames that are appended to a file: their times go on in its steps, if it was converted with such. Every
     /// `every`-th frame of their archive is taken.
     pub fn go_on_in_time(

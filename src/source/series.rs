@@ -131,6 +131,9 @@ impl Series {
             self.drop_times(&why);
         }
         if self.archive.times.len() != frames {
+            if !self.archive.times.is_empty() && options.times.is_none() {
+                note_once(&mut self.archive.notes, "some frames have no time: frames are numbered");
+            }
             self.archive.times.clear();
         }
         times::settle(&mut self.archive, options)?;

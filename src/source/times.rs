@@ -4,6 +4,7 @@ use super::file_header::{FileHeader, Units};
 use super::{Archive, FrameSource, FrameWindow, OpenOptions};
 use crate::base::clock::Clock;
 use crate::base::error::{Error, Result};
+use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -63,6 +64,12 @@ impl RegularTimes {
     /// The times of frames.
     pub(super) fn times(self, frames: Range<usize>) -> Vec<f64> {
         frames.map(|frame| self.at(frame)).collect()
+    }
+}
+
+impl fmt::Display for RegularTimes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "from {} on, in steps of {}", self.at(0), self.step * self.every as f64)
     }
 }
 
@@ -165,5 +172,70 @@ impl FrameSource for Timed {
 
     fn window_of(&mut self, first: usize, count: usize, step: usize) -> Result<Box<dyn FrameWindow>> {
         self.source.window_of(first, count, step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::grid::Grid;
+    use crate::base::sample::SampleType;
+
+    fn units(times: &str, calendar: Option<&str>) -> Units {
+        Units { times: Some(times.into()), calendar: calendar.map(String::from), ..Units::default() }
+    }
+
+    #[test]
+    fn regular_times_of_some_frames_are_those_of_all() {
+        let all = RegularTimes::new(0.5, 0.1).expect("a step");
+        let times = all.times(0..100);
+        let some = all.of(3, 4).of(2, 5);
+        assert_eq!(some.times(0..4), [11, 31, 51, 71].map(|frame| times[frame]));
+        assert_eq!(some.after(some.at(3), 20).times(0..1), [times[91]]);
+        assert_eq!(all.after(times[41], 1).times(0..50), times[42..92]);
+        let refused = [(0.0, 0.0), (0.0, -1.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)];
+        assert!(refused.into_iter().all(|(start, step)| RegularTimes::new(start, step).is_err()));
+    }
+
+    #[test]
+    fn the_users_times_have_the_users_unit_or_none() {
+        let archive = |frames: Option<usize>| {
+            let units = units("days since 2000-01-01", Some("noleap"));
+            let times = frames.map_or(Vec::new(), |frames| vec![1.0; frames]);
+            Archive { units, times, ..Archive::new(Grid::unit([1; 3]), SampleType::U8, frames) }
+        };
+        let settled = |frames, times: GivenTimes, unit: Option<&str>| {
+            let (mut archive, time_unit) = (archive(frames), unit.map(String::from));
+            let options = OpenOptions { times: Some(times), time_unit, ..OpenOptions::default() };
+            settle(&mut archive, &options).map(|()| archive)
+        };
+        let steps = || GivenTimes::Regular(RegularTimes::new(1.0, 2.0).expect("a step"));
+        let list = |times: &[f64]| GivenTimes::List(times.into());
+        let found = settled(Some(2), steps(), None).expect("times");
+        assert_eq!((found.times, found.units), (vec![1.0, 3.0], Units::default()));
+        let found = settled(None, steps(), Some("s")).expect("times");
+        assert!(found.has_times() && found.times.is_empty() && found.times_of(3..5) == [7.0, 9.0]);
+        assert_eq!(found.units, units("s", None));
+        assert_eq!(settled(Some(2), list(&[5.0, 4.0]), None).expect("times").times, [5.0, 4.0]);
+        assert!(settled(Some(3), list(&[5.0, 4.0]), None).is_err() && settled(None, list(&[5.0]), None).is_err());
+        assert!(settled(Some(1), list(&[f64::NAN]), None).is_err());
+    }
+
+    #[test]
+    fn times_go_onto_an_earlier_clock_where_they_can() {
+        let settled = |own: Units, earlier: Units| {
+            let plain = Archive::new(Grid::unit([1; 3]), SampleType::U8, Some(2));
+            let mut archive = Archive { units: own, times: vec![0.0, 0.5], ..plain };
+            let options = OpenOptions { clock: Some(earlier), ..OpenOptions::default() };
+            settle(&mut archive, &options).expect("nothing refused");
+            (archive.times, archive.units)
+        };
+        let (days, hours) = (units("days since 2000-03-01", None), units("hours since 2000-02-28", Some("standard")));
+        assert_eq!(settled(days.clone(), hours.clone()), (vec![48.0, 60.0], hours.clone()));
+        for earlier in
+            [units("months since 2000-01-01", None), units("s", None), units("hours since 2000-02-28", Some("noleap"))]
+        {
+            assert_eq!(settled(days.clone(), earlier), (vec![0.0, 0.5], days.clone()));
+        }
     }
 }

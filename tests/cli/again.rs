@@ -11,7 +11,7 @@ fn headerless(archive: &Archive) -> Vec<u8> {
 }
 
 /// The frames from `first` to `end`.
-fn part(archive: &Archive, first: usize, end: usize) -> Archive {
+pub(super) fn part(archive: &Archive, first: usize, end: usize) -> Archive {
     let voxels = archive.frame_len();
     Archive { frames: end - first, values: archive.values[first * voxels..end * voxels].to_vec(), ..archive.clone() }
 }

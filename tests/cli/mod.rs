@@ -33,6 +33,7 @@ mod render;
 mod resume;
 mod several;
 mod streams;
+mod times;
 mod usage;
 
 use std::ffi::OsStr;

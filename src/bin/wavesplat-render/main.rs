@@ -41,7 +41,7 @@ impl Cli {
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = Provenance {
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
-            ..self.provenance(scene.as_ref(), &config, (file.as_deref(), annotation.times.times()), &colouring)
+            ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let progress = self.common.progress("render", unit(&config.mode));

@@ -3,6 +3,7 @@
 use crate::along::ModeName;
 use crate::args::{Cli, ErrorName, MethodName, QuantityName};
 use crate::colouring::Colouring;
+use wavesplat::base::time_labels::TimeLabels;
 use wavesplat::colour::{Norm, Scale};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::BoundReport;
@@ -15,7 +16,7 @@ impl Cli {
         &self,
         scene: &dyn Scene,
         config: &RenderConfig,
-        (file, times): (Option<&CoefficientFile>, &[f64]),
+        (file, times): (Option<&CoefficientFile>, &TimeLabels),
         colouring: &Colouring,
     ) -> Provenance {
         let provenance = Provenance {
@@ -32,7 +33,8 @@ impl Cli {
             region: config.region.map(|r| [0, 1, 2].map(|a| format!("{}:{}", r.start[a], r.end[a])).join(",")),
             missing_value: self.missing_value,
             frames: config.frames.clone(),
-            times: config.frames.iter().filter_map(|frame| times.get(*frame)).copied().collect(),
+            times: config.frames.iter().filter_map(|frame| times.times().get(*frame)).copied().collect(),
+            dates: config.frames.iter().filter_map(|frame| times.date(*frame)).collect(),
             ..self.of_modes()
         };
         let provenance = of_transfer(provenance, scene, (config, file), colouring);

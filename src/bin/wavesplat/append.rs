@@ -62,9 +62,12 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     }
     let source = narrow(source, args.frames, None)?;
     let mut source = args.input.go_on_in_time(&file, source, args.frames.map_or(1, |frames| frames.step()))?;
-    let timed = source.archive().has_times() != file.metadata().times.is_empty();
-    if !timed {
-        return Err(Error::usage("either the file or the new frames have times: both must, or neither"));
+    match (source.archive().has_times(), !file.metadata().times.is_empty()) {
+        (true, false) => return Err(Error::usage("the new frames have times, but the file has none")),
+        (false, true) => {
+            return Err(Error::usage("the file has times, but the new frames have none; --times gives them"));
+        }
+        _ => {}
     }
     spare_inputs(&args.inputs, &path)?;
     if !args.force && !part_of(&path).exists() && args.has_them(&file, source.as_mut())? {

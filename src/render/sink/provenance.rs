@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::fmt::Display;
 
-/// How the pictures of a run were made. It has no paths and no dates, and does not depend on threads or memory. Keys
+/// How the pictures of a run were made. It has no paths, says not when, and does not depend on threads or memory. Keys
 /// have the names of the options, and values have the form that the options accept.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Provenance {
@@ -66,6 +66,9 @@ pub struct Provenance {
     pub frames: Vec<usize>,
     /// Times of the frames, or empty.
     pub times: Vec<f64>,
+    /// Dates of the frames where a calendar is known, else empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dates: Vec<String>,
 }
 
 /// The result of a rendering that a sink shows.
@@ -100,7 +103,7 @@ impl SinkConfig {
 
     fn texts(&self, shown: &[(usize, usize)], views: &[ViewReport]) -> Vec<(String, String)> {
         let Ok(Value::Object(all)) = serde_json::to_value(self.provenance.as_ref()) else { return Vec::new() };
-        let of_run = all.iter().filter(|(key, _)| !["software", "frames", "times"].contains(&key.as_str()));
+        let of_run = all.iter().filter(|(key, _)| !["software", "frames", "times", "dates"].contains(&key.as_str()));
         let mut texts: Vec<(&str, String)> = of_run.map(|(key, value)| (key.as_str(), text(value))).collect();
         texts.extend(of_views(views, shown));
         texts.extend(self.of_frames(shown));
@@ -109,13 +112,14 @@ impl SinkConfig {
         std::iter::once(("Software".into(), self.provenance.software.clone())).chain(named).collect()
     }
 
-    /// The frame numbers, and the time of a single frame.
+    /// The frame numbers, and the time and date of a single frame.
     fn of_frames(&self, shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
         let mut frames: Vec<usize> = shown.iter().map(|(_, frame)| *frame).collect();
         frames.dedup();
         let at = self.provenance.frames.iter().position(|frame| [*frame] == frames[..]);
         let time = at.and_then(|at| self.provenance.times.get(at)).map(f64::to_string);
-        vec![("frames", spans(&frames)), ("time", time.unwrap_or_default())]
+        let date = at.and_then(|at| self.provenance.dates.get(at)).cloned();
+        vec![("frames", spans(&frames)), ("time", time.unwrap_or_default()), ("date", date.unwrap_or_default())]
     }
 }
 

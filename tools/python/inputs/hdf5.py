@@ -49,6 +49,7 @@ def write(folder: Path) -> list:
         *several(folder),
         *other_axes(folder),
         scales(folder),
+        *times_beside(folder),
         groups(folder),
         openpmd(folder),
         series(folder),
@@ -122,6 +123,37 @@ def scales(folder: Path) -> Case:
             data.dims[at].label = name
     may = {"may_lack": ["spacing", "origin", "times", "units"]}
     return Case("scales.h5", H5PY, "dimension scales and labels t, z, y, x", times=TIMES, units=UNITS, more=may)
+
+
+def times_beside(folder: Path) -> list:
+    """Times that no label ties to the frames."""
+    with h5py.File(folder / "times.h5", "w", libver=SMALL) as file:  # as py-pde writes its storage
+        file.create_dataset("data", data=frames(), maxshape=(None, 3, 5, 7), chunks=(1, 3, 5, 7))
+        file.create_dataset("times", data=TIMES, maxshape=(None,), chunks=(FRAMES,))
+    with h5py.File(folder / "times_scale.h5", "w", libver=SMALL) as file:
+        file["when"] = np.array(TIMES) * 1000
+        file["when"].attrs["units"] = "ms"
+        file["when"].make_scale()
+        file[NAME] = frames("i16")
+        file[NAME].dims[0].attach_scale(file["when"])
+    with h5py.File(folder / "times_differ.h5", "w", libver=SMALL) as file:
+        group(file, "run")[NAME] = frames("i16")
+        file["run/timesteps"] = np.arange(FRAMES)
+        file["Time"] = TIMES
+    with h5py.File(folder / "times_groups.h5", "w", libver=SMALL) as file:
+        for t in range(FRAMES):
+            group(file, f"step_{t}")[NAME] = frame("i16", t)
+        file["t"] = TIMES
+        file["t"].attrs["units"] = "s"
+    return [
+        Case("times.h5", H5PY, "data, and times beside it, as py-pde writes them", times=TIMES, **BARE),
+        Case("times_scale.h5", H5PY, "a dimension scale of times in ms, without a label", "i16", times=TIMES, **BARE),
+        Case("times_differ.h5", H5PY, "timesteps in the group, and another Time in the root", "i16", **BARE),
+        Case(
+            "times_groups.h5", H5PY, "a group for each step, and t in the root", "i16",
+            variable=f"step_%T/{NAME}", times=TIMES, **BARE,
+        ),
+    ]
 
 
 def groups(folder: Path) -> Case:

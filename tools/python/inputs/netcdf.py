@@ -6,6 +6,7 @@ import netCDF4
 import numpy as np
 
 from .case import DIMS, FRAMES, MISSING, NAME, ORIGIN, SPACING, TIMES, UNITS, Case, Refused, axes, by, frames, without
+from .netcdf_daily import daily
 from .netcdf_xarray import era5
 
 FOLDER = "netcdf"
@@ -35,6 +36,7 @@ def write(folder: Path) -> list:
         bounds(folder),
         in_group(folder),
         series(folder),
+        *daily(folder),
         era5(folder),
         *refused(folder),
     ]

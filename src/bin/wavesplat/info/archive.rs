@@ -77,7 +77,7 @@ impl<'a> Info<'a> {
             sample: archive.sample.name(),
             frames: archive.frames,
             times: &archive.times,
-            span: labels.span(),
+            span: labels.span().or(archive.regular_times.map(|times| times.to_string())),
             dates: labels.dates(),
             variable: archive.variable.as_deref(),
             units: archive.units.samples.as_deref(),

@@ -125,7 +125,7 @@ pub(super) fn of_coordinate(coordinate: &Variable) -> Option<Counts> {
     by_axis.or(by_name).or(by_unit).or(vertical)
 }
 
-fn of_name(dim: &str) -> Option<Counts> {
+pub(super) fn of_name(dim: &str) -> Option<Counts> {
     Some(match dim.to_lowercase().as_str() {
         "t" | "time" | "times" | "valid_time" | "step" | "steps" | "timestep" | "frame" | "frames" => Counts::Frames,
         "z" | "lev" | "level" | "levels" | "depth" | "height" | "alt" | "altitude" | "plev" | "pressure" | "layer"

@@ -29,6 +29,11 @@ impl<'a> Choice<'a> {
         self.arrays[0].name()
     }
 
+    /// The group of its steps.
+    pub(super) fn group(&self) -> &str {
+        self.path.split(STEP).next().and_then(|before| before.rsplit_once('/')).map_or("", |(group, _)| group)
+    }
+
     /// Name, size, type and unit for users.
     fn info(&self) -> source::VariableInfo {
         let first = self.arrays[0];

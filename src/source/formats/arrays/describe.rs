@@ -2,7 +2,8 @@
 
 use super::{ArrayFile, Variable};
 use crate::base::description::{
-    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Values, Variable as Described, select,
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Values, Variable as Described, frames_of,
+    select,
 };
 use crate::source::layout::Counts;
 use crate::source::{Extent, Parsed};
@@ -137,7 +138,10 @@ impl Builder<'_> {
             false => voxels < 3 && count(other).saturating_mul(size_of::<f64>()) <= 2 * MOST_BYTES,
         };
         let is_named = other.dims.iter().zip(&other.lengths).all(|(dim, length)| !dim.is_empty() || *length == 1);
-        let is_read = *extent == Extent::Whole || along_time || *times == Some(other.path.as_str());
+        if *times == Some(other.path.as_str()) {
+            return true;
+        }
+        let is_read = *extent == Extent::Whole || along_time;
         other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_small && is_read
     }
 
@@ -167,6 +171,10 @@ impl Builder<'_> {
         let kept: Vec<(String, usize)> = variable.dims.iter().cloned().zip(variable.lengths.iter().copied()).collect();
         let kept = kept.into_iter().filter(|(dim, _)| self.chosen(dim).is_none() && !dim.is_empty());
         let dimensions = kept.collect::<Vec<_>>().iter().map(|(dim, length)| self.dimension(dim, *length)).collect();
+        let dimensions: Vec<u32> = match values {
+            Values::Times(_) => frames_of(&self.found).into_iter().collect(), // whatever their own axis is called
+            _ => dimensions,
+        };
         let attributes = self.file.described(&variable.path).into_iter().filter(is_users).collect();
         self.found.variables.push(Described { name: variable.name().into(), dimensions, values, attributes });
     }

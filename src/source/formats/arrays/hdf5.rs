@@ -1,6 +1,7 @@
 //! HDF5 files, as [`super::ArrayFile`].
 
 use super::describe::numbers;
+use super::scales::Scales;
 use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
 use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
@@ -62,6 +63,7 @@ impl ArrayFile for Hdf5ArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
         let mut listing = Listing::default();
         listing.add(&self.0.root_group().map_err(|e| e.to_string())?, "", 0)?;
+        listing.scales.name(&mut listing.variables);
         Ok(listing.variables)
     }
 
@@ -132,6 +134,7 @@ pub(super) fn reason(error: &Hdf5Error) -> String {
 #[derive(Default)]
 struct Listing {
     variables: Vec<Variable>,
+    scales: Scales,
     /// Addresses of groups that were looked at: links may lead in circles.
     seen: HashSet<u64>,
 }
@@ -146,6 +149,7 @@ impl Listing {
         }
         let (groups, arrays) = group.members().map_err(|e| format!("group {path}/: {e}"))?;
         for array in arrays {
+            self.scales.add(&array, group.offset_size());
             self.variables.push(variable(&array, format!("{path}/{}", array.name())));
         }
         groups.iter().try_for_each(|group| self.add(group, &format!("{path}/{}", group.name()), depth + 1))

@@ -4,6 +4,7 @@
 //! positions of voxels and frames, [`values`] the meaning of its numbers, and [`chunks`] reads it.
 
 mod axes;
+mod beside;
 mod choose;
 mod chunks;
 mod describe;
@@ -13,6 +14,8 @@ mod hdf5;
 mod netcdf;
 mod openpmd;
 mod places;
+#[cfg(feature = "hdf5")]
+mod scales;
 mod values;
 mod vtkhdf;
 #[cfg(feature = "zarr")]
@@ -276,10 +279,26 @@ impl ArrayArchive {
             (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
         }
         if choice.arrays.len() > 1 {
+            take_times(&mut described, (self.file.as_ref(), &all), &choice);
             described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
         }
         Ok(described)
     }
+}
+
+/// Takes the times beside arrays for the steps, if these have none.
+fn take_times(described: &mut FileHeader, (file, all): (&dyn ArrayFile, &[Variable]), choice: &Choice<'_>) {
+    let count = choice.arrays.len();
+    if described.times.len() == count {
+        return;
+    }
+    let mut places = Places::default();
+    places.take_times_beside((file, all), &beside::Frames { group: choice.group(), axis: "", count });
+    if places.times.len() == count {
+        (described.times, described.units.times) = (places.times, places.time_unit);
+        described.units.calendar = places.calendar;
+    }
+    described.notes.extend(places.notes);
 }
 
 /// The name of the active array of an image.

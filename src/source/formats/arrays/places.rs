@@ -1,5 +1,6 @@
 //! Where voxels and frames are, by the coordinates of a variable's axes.
 
+use super::beside::Frames;
 use super::{ArrayFile, Variable, axes};
 use crate::base::error::{Note, Remedy};
 use crate::source::Parsed;
@@ -68,6 +69,7 @@ impl Places {
             let coordinate = variable.coordinate(axis, all);
             match (counts, coordinate) {
                 (Counts::Frames, Some(times)) => places.take_times(file, times),
+                (Counts::Frames, None) => places.take_times_beside((file, all), &Frames::along(variable, axis)),
                 (Counts::Voxels(along), Some(coordinate)) => lines[*along] = places.line(file, coordinate),
                 _ => {}
             }
@@ -105,6 +107,15 @@ impl Places {
         self.calendar = times.text("calendar").map(String::from);
     }
 
+    /// Takes the times beside frames, if there are any.
+    pub(super) fn take_times_beside(&mut self, (file, all): (&dyn ArrayFile, &[Variable]), frames: &Frames<'_>) {
+        match frames.times(file, all) {
+            Ok(Some(times)) => self.take_times(file, times),
+            Ok(None) => {}
+            Err(note) => self.notes.push(note),
+        }
+    }
+
     fn take_lines(&mut self, lines: &[Option<AxisCoordinates>; 3], spaced: bool) {
         for (along, line) in lines.iter().enumerate() {
             self.backwards[along] = line.as_ref().is_some_and(|line| line.backwards);
@@ -137,7 +148,7 @@ impl Places {
 }
 
 /// The numbers of a coordinate, which are no more than an axis can have.
-fn numbers(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
+pub(super) fn numbers(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
     match coordinate.lengths.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)) {
         Some(count) if count <= MOST => file.numbers(&coordinate.path),
         _ => Err(format!("{} is too long", coordinate.path)),
