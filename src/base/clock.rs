@@ -249,6 +249,14 @@ mod tests {
     }
 
     #[test]
+    fn zones_may_have_one_digit_as_in_the_cf_conventions() {
+        // cftime leaves such a zone out.
+        let of = |date: &str| clock(&format!("seconds since {date}"), "");
+        assert_eq!(of("1992-10-8 15:15:42.5 -6:00"), of("1992-10-08 21:15:42.5"));
+        assert_eq!(of("1992-10-8 15:15 +0530"), of("1992-10-08 9:45"));
+    }
+
+    #[test]
     fn what_is_no_unit_is_refused() {
         for unit in [
             "",
