@@ -214,7 +214,7 @@ fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
 
 #[test]
 fn damaged_files_are_read_or_refused() {
-    for format in ["npy", "metaimage", "vtk", "vti", "nifti", "nrrd"] {
+    for format in ["npy", "npz", "metaimage", "vtk", "vti", "vtr", "nifti", "nrrd"] {
         check_damaged(format);
     }
 }
@@ -233,6 +233,11 @@ fn npy_is_read() {
 }
 
 #[test]
+fn npz_is_read() {
+    check_all("npz");
+}
+
+#[test]
 fn metaimage_is_read() {
     check_all("metaimage");
 }
@@ -245,6 +250,11 @@ fn vtk_is_read() {
 #[test]
 fn vti_is_read() {
     check_all("vti");
+}
+
+#[test]
+fn vtr_is_read() {
+    check_all("vtr");
 }
 
 #[test]

@@ -10,6 +10,7 @@ pub(crate) mod zeroed;
 pub(crate) mod spread;
 pub(crate) mod half;
 pub mod sample;
+pub(crate) mod stored;
 pub mod grid;
 pub mod mapped;
 #[doc(hidden)]

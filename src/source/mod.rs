@@ -22,6 +22,7 @@ mod stream;
 #[cfg(test)]
 mod testing;
 mod variables;
+mod wide;
 
 pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
@@ -146,7 +147,8 @@ pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variab
     formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)
 }
 
-/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`.
+/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each
+/// frame.
 ///
 /// # Errors
 /// As [`open`]; messages call the stream `-`.

@@ -15,6 +15,7 @@ pub(in crate::source) mod file_series;
 mod metaimage;
 mod nifti;
 pub(in crate::source) mod npy;
+mod npz;
 mod nrrd;
 pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
@@ -32,8 +33,9 @@ use crate::source::file_header::{FileHeader, head};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
-const EXTENSIONS: [(&str, Format); 26] = [
+const EXTENSIONS: [(&str, Format); 29] = [
     ("npy", Format::Npy),
+    ("npz", Format::Npz),
     ("nrrd", Format::Nrrd),
     ("nhdr", Format::Nrrd),
     ("nii", Format::Nifti),
@@ -44,6 +46,8 @@ const EXTENSIONS: [(&str, Format); 26] = [
     ("mhd", Format::MetaImage),
     ("vti", Format::Vti),
     ("pvti", Format::Vti),
+    ("vtr", Format::Vtr),
+    ("pvtr", Format::Vtr),
     ("vtk", Format::Vtk),
     ("pvd", Format::Pvd),
     ("series", Format::FileSeries),
@@ -75,10 +79,14 @@ const COMPRESSED: [&str; 3] = ["nii", "hdr", "img"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::source) enum Format {
     Npy,
+    /// NumPy arrays in a zip archive.
+    Npz,
     Nrrd,
     Nifti,
     MetaImage,
     Vti,
+    /// As the one before it, but for where the points are.
+    Vtr,
     Vtk,
     Hdf5,
     NetCdf,
@@ -109,10 +117,12 @@ impl Format {
     pub(in crate::source) fn holds_frames(self) -> bool {
         match self {
             Self::Npy
+            | Self::Npz
             | Self::Nrrd
             | Self::Nifti
             | Self::MetaImage
             | Self::Vti
+            | Self::Vtr
             | Self::Vtk
             | Self::Hdf5
             | Self::NetCdf
@@ -126,10 +136,12 @@ impl Format {
         match self {
             Self::Hdf5 | Self::NetCdf | Self::Zarr => true,
             Self::Npy
+            | Self::Npz
             | Self::Nrrd
             | Self::Nifti
             | Self::MetaImage
             | Self::Vti
+            | Self::Vtr
             | Self::Vtk
             | Self::Pvd
             | Self::FileSeries
@@ -141,10 +153,12 @@ impl Format {
     fn name(self) -> &'static str {
         match self {
             Self::Npy => "NumPy array",
+            Self::Npz => "NumPy arrays (.npz)",
             Self::Nrrd => "NRRD",
             Self::Nifti => "NIfTI",
             Self::MetaImage => "MetaImage",
             Self::Vti => "VTK image data (.vti)",
+            Self::Vtr => "VTK rectilinear grid (.vtr)",
             Self::Vtk => "legacy VTK",
             Self::Hdf5 => "HDF5",
             Self::NetCdf => "NetCDF",
@@ -214,7 +228,8 @@ pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result
         Format::NetCdf => arrays::open_netcdf(path, options)?.undecided(),
         #[cfg(feature = "zarr")]
         Format::Zarr => arrays::open_zarr(path, options)?.undecided(),
-        Format::Vti => vti::undecided(path),
+        Format::Npz => npz::undecided(path),
+        Format::Vti | Format::Vtr => vti::undecided(path),
         Format::Vtk => vtk::undecided(path),
         Format::Nrrd | Format::Nifti | Format::MetaImage => Ok(components(path, options)),
         #[cfg(not(feature = "hdf5"))]
@@ -248,10 +263,11 @@ const MOST_COMPONENTS: usize = 16;
 fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     match format {
         Some(Format::Npy) => npy::describe(path),
+        Some(Format::Npz) => npz::describe(path, options),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
         Some(Format::Nifti) => nifti::describe(path, options.variable.as_deref()),
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
-        Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
+        Some(Format::Vti | Format::Vtr) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
         #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options),
@@ -313,7 +329,7 @@ mod tests {
         }
         let known: Vec<&str> = extensions().collect();
         assert!(
-            known.starts_with(&["npy", "nrrd"]) && known.contains(&"hdf5") && !known.contains(&"wspl"),
+            known.starts_with(&["npy", "npz", "nrrd"]) && known.contains(&"hdf5") && !known.contains(&"wspl"),
             "{known:?}"
         );
     }
