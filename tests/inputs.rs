@@ -219,7 +219,7 @@ fn damaged(good: &[u8], random: &mut Random) -> Vec<u8> {
 
 #[test]
 fn damaged_files_are_read_or_refused() {
-    for format in ["npy", "metaimage", "vtk", "vti", "nifti", "nrrd"] {
+    for format in ["npy", "npz", "metaimage", "vtk", "vti", "vtr", "nifti", "nrrd"] {
         check_damaged(format);
     }
 }
@@ -233,8 +233,19 @@ fn damaged_files_of_arrays_are_read_or_refused() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "tiff"), ignore = "needs the feature tiff")]
+fn damaged_tiff_files_are_read_or_refused() {
+    check_damaged("tiff");
+}
+
+#[test]
 fn npy_is_read() {
     check_all("npy");
+}
+
+#[test]
+fn npz_is_read() {
+    check_all("npz");
 }
 
 #[test]
@@ -253,6 +264,11 @@ fn vti_is_read() {
 }
 
 #[test]
+fn vtr_is_read() {
+    check_all("vtr");
+}
+
+#[test]
 #[cfg_attr(not(feature = "hdf5"), ignore = "needs the feature hdf5")]
 fn vtkhdf_is_read() {
     check_all("vtkhdf");
@@ -266,6 +282,12 @@ fn nifti_is_read() {
 #[test]
 fn nrrd_is_read() {
     check_all("nrrd");
+}
+
+#[test]
+#[cfg_attr(not(feature = "tiff"), ignore = "needs the feature tiff")]
+fn tiff_is_read() {
+    check_all("tiff");
 }
 
 #[test]

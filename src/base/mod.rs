@@ -15,6 +15,7 @@ pub(crate) mod decimal;
 #[doc(hidden)]
 pub mod time_labels;
 pub mod sample;
+pub(crate) mod stored;
 pub mod grid;
 pub mod description;
 pub mod mapped;

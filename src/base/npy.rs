@@ -4,6 +4,7 @@
 mod literal;
 
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use literal::{Literal, Value};
 use std::io::{self, Write};
 
@@ -34,7 +35,7 @@ pub fn write_header(ty: SampleType, shape: &[usize], out: &mut impl Write) -> io
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Header {
     /// Sample type and whether its most significant byte is first; or the text of a type that is not supported.
-    pub(crate) samples: Result<(SampleType, bool), String>,
+    pub(crate) samples: Result<(StoredType, bool), String>,
     /// Whether the first axis is the fastest.
     pub(crate) is_fortran: bool,
     /// Lengths of the axes.
@@ -63,7 +64,7 @@ impl Header {
 }
 
 /// A sample type and whether its most significant byte is first, by NumPy's name: `'<f4'`.
-fn samples(descr: &Literal<'_>) -> Result<Result<(SampleType, bool), String>, String> {
+fn samples(descr: &Literal<'_>) -> Result<Result<(StoredType, bool), String>, String> {
     match &descr.value {
         Value::Text(name) => Ok(sample_type(name).ok_or_else(|| descr.source.into())),
         Value::Sequence(_) => Ok(Err(descr.source.into())),
@@ -71,9 +72,13 @@ fn samples(descr: &Literal<'_>) -> Result<Result<(SampleType, bool), String>, St
     }
 }
 
-fn sample_type(name: &str) -> Option<(SampleType, bool)> {
+fn sample_type(name: &str) -> Option<(StoredType, bool)> {
     let (order, name) = name.split_at_checked(1)?;
-    let ty = SampleType::ALL.into_iter().find(|ty| numpy_name(*ty) == name)?;
+    let ty = match name {
+        "i8" => StoredType::I64, // in bytes
+        "u8" => StoredType::U64,
+        name => SampleType::ALL.into_iter().find(|ty| numpy_name(*ty) == name)?.into(),
+    };
     let is_known = matches!(order, "<" | ">") || order == "|" && ty.size() == 1;
     is_known.then_some((ty, order == ">"))
 }
@@ -131,7 +136,7 @@ mod tests {
                 let mut bytes = Vec::new();
                 write_header(ty, shape, &mut bytes).expect("written");
                 let shape = shape.iter().map(|n| *n as u64).collect();
-                let expected = Header { samples: Ok((ty, false)), is_fortran: false, shape };
+                let expected = Header { samples: Ok((ty.into(), false)), is_fortran: false, shape };
                 assert_eq!(Header::parse(&bytes[BEFORE_TEXT..]), Ok(expected), "{ty}");
             }
         }
@@ -140,13 +145,13 @@ mod tests {
     #[test]
     fn entries_may_be_in_any_order_with_either_quotes() {
         let text = "{\"shape\":(7,5,),'more':[],\"descr\":\">i2\",'fortran_order':True}";
-        let expected = Header { samples: Ok((SampleType::I16, true)), is_fortran: true, shape: vec![7, 5] };
+        let expected = Header { samples: Ok((SampleType::I16.into(), true)), is_fortran: true, shape: vec![7, 5] };
         assert_eq!(Header::parse(text.as_bytes()), Ok(expected));
     }
 
     #[test]
     fn types_that_are_not_supported_are_kept_as_text() {
-        for descr in ["'<i8'", "'|b1'", "'<c8'", "'|O'", "'<U3'", "'|f4'", "'=f4'", "''", "'é'", "[('a', '<f4')]"] {
+        for descr in ["'<i16'", "'|b1'", "'<c8'", "'|O'", "'<U3'", "'|f4'", "'=f4'", "''", "'é'", "[('a', '<f4')]"] {
             assert_eq!(parse(descr, "False", "(1,)").expect("a header").samples, Err(descr.to_string()));
         }
     }

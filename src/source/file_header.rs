@@ -7,6 +7,7 @@ use crate::base::description::{Description, Values, with_frames};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::FileBytes;
+use crate::base::stored::StoredType;
 
 const FIRST_READ: usize = 4 << 10; // bytes of a header
 const MAX_HEADER: usize = 16 << 20; // bytes; a list of data files may be long
@@ -141,25 +142,29 @@ pub(super) struct Mismatch {
     pub(super) times: bool,
 }
 
-/// Checks that a file of `len` bytes holds `frames` frames from byte `start` and nothing after them.
-pub(super) fn check_size(len: u64, start: u64, shape: &Shape, frames: usize) -> Parsed<()> {
-    let frame = shape.frame_bytes() as u64;
+/// Checks that a file of `len` bytes holds `frames` frames of numbers of this type from byte `start` and nothing after
+/// them.
+pub(super) fn check_size(len: u64, start: u64, shape: &Shape, ty: StoredType, frames: usize) -> Parsed<()> {
+    let [x, y, z] = shape.dims();
+    let frame = (x * y * z) as u64 * ty.size() as u64; // fits: a sample has at least half the bytes
     let payload = frame.checked_mul(frames as u64);
     let expected = payload.and_then(|n| n.checked_add(start)).ok_or("its sizes are too large for any file")?;
     if len == expected {
         return Ok(());
     }
     let found = len.saturating_sub(start);
-    let mut hint = other_sample(found, shape, frames).unwrap_or_default();
+    let mut hint = other_sample(found, (x * y * z) as u64, frames).unwrap_or_default();
     if found > 0 && found.is_multiple_of(frame) {
         hint += &format!("; it holds exactly {} whole frame(s) of that size", found / frame);
     }
-    Err(format!("expected {expected} bytes ({start} before {frames} frame(s) of {shape}), found {len}{hint}"))
+    Err(format!(
+        "expected {expected} bytes ({start} before {frames} frame(s) of {x}x{y}x{z} {ty} samples), found {len}{hint}"
+    ))
 }
 
 /// The sample size with which the bytes would be the expected frames.
-fn other_sample(found: u64, shape: &Shape, frames: usize) -> Option<String> {
-    let samples = (shape.frame_bytes() / shape.sample().size()) as u64 * frames as u64;
+fn other_sample(found: u64, voxels: u64, frames: usize) -> Option<String> {
+    let samples = voxels * frames as u64;
     let size = [1, 2, 4, 8].into_iter().find(|size| samples.checked_mul(*size) == Some(found))?;
     Some(format!("; this size fits samples of {size} byte(s)"))
 }

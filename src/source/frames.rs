@@ -4,11 +4,11 @@ use super::FrameWindow;
 use super::layout::Shape;
 use super::parts::Stored;
 use super::spill_buffer::SpillBuffer;
+use super::wide;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::mapped::{FileBytes, State};
 use crate::base::output::STANDARD;
-use crate::base::sample::swap_endian;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -92,14 +92,20 @@ impl FrameWindow for Frames {
         let (dims, sample) = (self.shape.dims(), self.shape.sample());
         assert!(Region { start: [0; 3], end: dims }.contains(region), "{region:?} is not inside {dims:?}");
         assert_eq!(out.len(), region.voxels() * sample.size(), "bytes of {region:?}");
-        let Some(packing) = &self.bytes[self.frames[frame].bytes].1.packing else {
+        let Stored { ty, packing, .. } = &self.bytes[self.frames[frame].bytes].1;
+        if packing.is_none() && !ty.is_wide() {
             return self.read_stored(frame, region, out);
-        };
-        let stored = self.bytes[self.frames[frame].bytes].1.sample;
-        let mut numbers = vec![0; region.voxels() * stored.size()];
+        }
+        let mut numbers = vec![0; region.voxels() * ty.size()];
         self.read_stored(frame, region, &mut numbers)?;
-        packing.unpack(stored, &numbers, out);
-        Ok(())
+        let converted = match packing {
+            Some(packing) => packing.unpack(*ty, &numbers, out),
+            None => wide::narrow(*ty, &numbers, out),
+        };
+        converted.map_err(|unfit| {
+            let voxel = region.iter().nth(unfit.index).unwrap_or_default();
+            Error::input(&self.frames[frame].name, unfit.message(voxel, sample))
+        })
     }
 
     fn name(&self, frame: usize) -> String {
@@ -125,7 +131,7 @@ impl Frames {
     fn read_stored(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
         let frame = &self.frames[frame];
         let (bytes, stored) = &self.bytes[frame.bytes];
-        let (dims, size) = (self.shape.dims(), stored.sample.size());
+        let (dims, size) = (self.shape.dims(), stored.ty.size());
         let read = if stored.strides.is_plain(dims, size) {
             Rows::new(dims, region, size).copy(bytes, frame.offset, out)
         } else {
@@ -133,7 +139,7 @@ impl Frames {
         };
         read.map_err(|e| Error::io(bytes.path(), format!("reading {}", frame.name), e))?;
         if stored.big_endian {
-            swap_endian(stored.sample, out);
+            stored.ty.swap_endian(out);
         }
         Ok(())
     }
@@ -311,7 +317,7 @@ mod tests {
     fn joined_reads_copy_the_same_as_single_ones() {
         let shape = Shape::new(LARGE, SampleType::U32).expect("shape");
         let voxels: Vec<u8> = (0..240_000_u32).flat_map(u32::to_le_bytes).collect();
-        let plain = Stored::plain(&shape, 1, false).expect("small");
+        let plain = Stored::plain(shape.dims(), 1, shape.sample(), false).expect("small");
         let frames = window(shape, both(&[b"abc", voxels.as_slice()].concat()), &plain, &[3]);
         for (start, end) in
             [([0; 3], LARGE), ([5, 3, 2], [7, 40, 20]), ([0, 7, 0], [300, 9, 20]), ([1, 0, 0], [299, 40, 20])]
@@ -332,7 +338,7 @@ mod tests {
         let ty = SampleType::F16;
         let shape = Shape::new(DIMS, ty).expect("shape");
         let stored = payload(ty, 0..2, true);
-        let plain = Stored::plain(&shape, 1, true).expect("small");
+        let plain = Stored::plain(shape.dims(), 1, shape.sample(), true).expect("small");
         for bytes in both(&stored) {
             check_window(&window(shape, [bytes], &plain, &[0, shape.frame_bytes() as u64]), ty, 0);
         }
@@ -398,7 +404,7 @@ mod tests {
     #[test]
     fn packed_numbers_are_samples_when_they_are_read() {
         let shape = Shape::new(DIMS, SampleType::F32).expect("shape");
-        let plain = Stored::plain(&Shape::new(DIMS, SampleType::I16).expect("shape"), 1, true).expect("small");
+        let plain = Stored::plain(DIMS, 1, SampleType::I16, true).expect("small");
         let stored = Stored { packing: Some(Packing::scaled(0.25, -3.0)), ..plain };
         for bytes in both(&payload(SampleType::I16, 0..1, true)) {
             check_window(&window(shape, [bytes], &stored, &[0]), SampleType::F32, 0);
@@ -408,7 +414,7 @@ mod tests {
     #[test]
     fn bytes_that_are_not_there_are_an_error() {
         let shape = Shape::new([2, 2, 2], SampleType::U8).expect("shape");
-        let plain = Stored::plain(&shape, 1, false).expect("small");
+        let plain = Stored::plain(shape.dims(), 1, shape.sample(), false).expect("small");
         for bytes in both(&[0; 7]) {
             let frames = window(shape, [bytes], &plain, &[0]);
             let whole = Region { start: [0; 3], end: [2; 3] };

@@ -24,6 +24,7 @@ mod stream;
 mod testing;
 mod times;
 mod variables;
+mod wide;
 
 pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
@@ -181,7 +182,8 @@ pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variab
     formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)
 }
 
-/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`.
+/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each
+/// frame.
 ///
 /// # Errors
 /// As [`open`]; messages call the stream `-`.

@@ -1,6 +1,8 @@
 //! Stored numbers that are scaled and have missing values.
 
+use super::wide::{self, Unfit};
 use crate::base::sample::{self, SampleType};
+use crate::base::stored::StoredType;
 
 /// How stored numbers become samples: `stored * scale + offset`, NaN for what is missing.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,14 +35,19 @@ impl Packing {
         }
     }
 
-    fn value(&self, stored: f64) -> f64 {
+    /// The sample of a stored number.
+    pub(super) fn value(&self, stored: f64) -> f64 {
         let valid = self.valid.0 <= stored && stored <= self.valid.1 && !self.missing.contains(&stored);
         if valid { stored * self.scale + self.offset } else { f64::NAN }
     }
 
     /// Fills `out` with samples (little-endian, of the type that [`Packing::sample`] says) of stored numbers
     /// (little-endian).
-    pub(super) fn unpack(&self, stored: SampleType, bytes: &[u8], out: &mut [u8]) {
+    ///
+    /// # Errors
+    /// Integers of 64 bits that are not exactly a sample.
+    pub(super) fn unpack(&self, stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
+        let StoredType::Sample(stored) = stored else { return wide::unpack(stored, self, bytes, out) };
         let ty = self.sample(stored);
         let mut values = Vec::new();
         sample::for_each_run(stored, bytes, |first, numbers| {
@@ -48,6 +55,7 @@ impl Packing {
             values.extend(numbers.iter().map(|number| self.value(*number)));
             sample::store(ty, &values, &mut out[first * ty.size()..][..values.len() * ty.size()]);
         });
+        Ok(())
     }
 }
 
@@ -60,7 +68,7 @@ mod tests {
         let packing = Packing { missing: vec![-7.0], valid: (-50.0, 50.0), ..Packing::scaled(0.5, 3.0) };
         let stored: Vec<u8> = [0_i16, -7, 4, 51, -50].into_iter().flat_map(i16::to_le_bytes).collect();
         let mut out = vec![0; 20];
-        packing.unpack(SampleType::I16, &stored, &mut out);
+        packing.unpack(SampleType::I16.into(), &stored, &mut out).expect("16 bits");
         let mut values = [0.0; 5];
         sample::load(SampleType::F32, &out, &mut values);
         assert_eq!(Packing::scaled(1e-5, 300.0).sample(SampleType::I16), SampleType::F64);

@@ -6,7 +6,7 @@ use super::packing::Packing;
 use super::spill_buffer::SpillBuffer;
 use crate::base::error::Result;
 use crate::base::mapped::State;
-use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use std::fmt::Debug;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ impl Part {
         big_endian: bool,
         start: u64,
     ) -> Parsed<Self> {
-        let stored = Stored::plain(shape, frames, big_endian)?;
+        let stored = Stored::plain(shape.dims(), frames, shape.sample(), big_endian)?;
         Ok(Self { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
     }
 }
@@ -43,7 +43,7 @@ impl Part {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stored {
     /// The type of the stored numbers.
-    pub(super) sample: SampleType,
+    pub(super) ty: StoredType,
     /// Whether these have their most significant byte first.
     pub(super) big_endian: bool,
     /// Byte steps between voxels and frames.
@@ -56,14 +56,15 @@ pub(super) struct Stored {
 
 impl Stored {
     /// Samples in the order of an array, as they are.
-    pub(super) fn new(layout: &Layout, sample: SampleType, big_endian: bool) -> Parsed<Self> {
-        let (strides, bytes) = (layout.strides(sample.size())?, layout.bytes(sample.size())?);
-        Ok(Self { sample, big_endian, strides, bytes, packing: None })
+    pub(super) fn new(layout: &Layout, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
+        let ty = ty.into();
+        let (strides, bytes) = (layout.strides(ty.size())?, layout.bytes(ty.size())?);
+        Ok(Self { ty, big_endian, strides, bytes, packing: None })
     }
 
     /// Frames one after another, x fastest.
-    pub(super) fn plain(shape: &Shape, frames: usize, big_endian: bool) -> Parsed<Self> {
-        Self::new(&Layout::plain(shape.dims(), frames), shape.sample(), big_endian)
+    pub(super) fn plain(dims: [usize; 3], frames: usize, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
+        Self::new(&Layout::plain(dims, frames), ty, big_endian)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Frames from a pipe: forward only, one window held at a time, in memory or in a temporary file.
+//! Frames from a pipe, raw or as arrays of NumPy: forward only, one window held at a time, in memory or in a temporary file.
 
 use super::formats::{self, Format, npy, raw};
 use super::frames::{Bytes, Frame, Frames};
@@ -11,6 +11,7 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::npy::MAGIC;
 use crate::base::output::STANDARD;
+use crate::base::stored::StoredType;
 use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub(super) struct Stream<R> {
     ended: bool,
     chunk: Vec<u8>,
     reader: Chain<Cursor<Vec<u8>>, R>,
+    /// The header before each frame, if each is an array of its own.
+    repeated: Option<npy::Array>,
 }
 
 impl<R: Read> Stream<R> {
@@ -37,7 +40,7 @@ impl<R: Read> Stream<R> {
         reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;
         let is_npy = head == MAGIC;
         let mut reader = Cursor::new(head).chain(reader);
-        let (shape, frames, big_endian) = match (&options.dims, is_npy) {
+        let StreamHeader { shape, ty, frames, big_endian, repeated } = match (&options.dims, is_npy) {
             (Some(_), false) => headerless(&mut reader, options)?,
             (Some(_), true) if options.dims_are_remembered => numpy(&mut reader, &options.for_headers())?,
             (Some(_), true) => {
@@ -54,15 +57,15 @@ impl<R: Read> Stream<R> {
         let memory = options.memory;
         let mut archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
         times::settle(&mut archive, options)?;
-        let stored = Stored::plain(&shape, 1, big_endian).map_err(|e| Error::input(STANDARD, e))?;
-        Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader })
+        let stored = Stored::plain(shape.dims(), 1, ty, big_endian).map_err(|e| Error::input(STANDARD, e))?;
+        Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader, repeated })
     }
 
     /// Moves up to `frames` frames, and says how many there were; nobody holds those that are skipped.
     fn copy(&mut self, frames: usize, mut held: Option<&mut SpillBuffer>) -> Result<usize> {
         let left = self.archive.frames.map_or(frames, |all| frames.min(all - self.next));
         for done in 0..left {
-            let place = (done * self.shape.frame_bytes()) as u64;
+            let place = (done * self.stored.bytes) as u64;
             if self.ended || !self.copy_frame(held.as_deref_mut(), place)? {
                 return Ok(done);
             }
@@ -73,7 +76,10 @@ impl<R: Read> Stream<R> {
 
     /// Moves one frame to its place; false if the stream ends before it.
     fn copy_frame(&mut self, mut held: Option<&mut SpillBuffer>, place: u64) -> Result<bool> {
-        let (frame, bytes) = (self.next, self.shape.frame_bytes());
+        let (frame, bytes) = (self.next, self.stored.bytes);
+        if frame > 0 && self.repeated.is_some() && !self.next_array()? {
+            return self.end(0);
+        }
         let mut got = 0;
         while got < bytes {
             let wanted = CHUNK.min(bytes - got);
@@ -92,10 +98,27 @@ impl<R: Read> Stream<R> {
         Ok(true)
     }
 
+    /// Reads the header of an array after the first one; false if the stream ends before it.
+    fn next_array(&mut self) -> Result<bool> {
+        let mut head = [0];
+        let failed = |e| Error::io(STANDARD, "reading", e);
+        if read_some(&mut self.reader, &mut head).map_err(failed)? == 0 {
+            return Ok(false);
+        }
+        let found = npy::read_header(&mut Cursor::new(head).chain(&mut self.reader), Path::new(STANDARD))?;
+        let alike = |array: &npy::Array| npy::Array { start: 0, ..array.clone() };
+        let first = self.repeated.as_ref().map(alike);
+        if first == Some(alike(&found)) {
+            return Ok(true);
+        }
+        let what = format!("array {} is {} frame(s) of {}", self.next, found.frames, found.shape);
+        Err(Error::input(STANDARD, format!("{what}, unlike the first one, which is a frame of {}", self.shape)))
+    }
+
     /// The stream ended after `got` bytes of the next frame.
     fn end(&mut self, got: usize) -> Result<bool> {
         self.ended = true;
-        let (frame, bytes) = (self.next, self.shape.frame_bytes());
+        let (frame, bytes) = (self.next, self.stored.bytes);
         if got > 0 {
             let what = format!("ends inside frame {frame}: expected {bytes} bytes, got {got}");
             return Err(Error::input(STANDARD, Note::with(what, Remedy::Adjust(&["dims", "sample"]))));
@@ -119,14 +142,14 @@ impl<R: Read> Stream<R> {
                 let all = self.archive.frames.unwrap_or(0);
                 Err(Error::input(
                     STANDARD,
-                    format!("goes on after its {all} frame(s); several arrays in one stream are not supported"),
+                    format!("goes on after its {all} frame(s); several arrays must have a frame (z, y, x) each"),
                 ))
             }
         }
     }
 
     fn frame(&self, index: usize, first: usize) -> Frame {
-        let offset = (index * self.shape.frame_bytes()) as u64;
+        let offset = (index * self.stored.bytes) as u64;
         let name = format!("standard input, frame {}", first + index);
         Frame { bytes: 0, offset, name }
     }
@@ -144,7 +167,7 @@ impl<R: Read + Send> FrameSource for Stream<R> {
         };
         self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
-        let bytes = count.saturating_mul(self.shape.frame_bytes());
+        let bytes = count.saturating_mul(self.stored.bytes);
         let mut data = SpillBuffer::new(bytes, self.memory, Path::new(STANDARD))?;
         let held = self.copy(count, Some(&mut data))?;
         let frames = (0..held).map(|i| self.frame(i, first)).collect();
@@ -153,19 +176,40 @@ impl<R: Read + Send> FrameSource for Stream<R> {
     }
 }
 
-fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
+/// What a stream says before its first frame, or the user does.
+struct StreamHeader {
+    shape: Shape,
+    ty: StoredType,
+    frames: Option<usize>,
+    big_endian: bool,
+    repeated: Option<npy::Array>,
+}
+
+fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
     let (shape, frames) = raw::shape(options)?;
     let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
     match skipped.map_err(|e| Error::io(STANDARD, "reading", e))? {
-        n if n == options.offset => Ok((shape, frames.filter(|_| !options.dims_are_remembered), options.big_endian)),
+        n if n == options.offset => {
+            let frames = frames.filter(|_| !options.dims_are_remembered);
+            Ok(StreamHeader {
+                shape,
+                ty: shape.sample().into(),
+                frames,
+                big_endian: options.big_endian,
+                repeated: None,
+            })
+        }
         n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the offset of {}", options.offset))),
     }
 }
 
-fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<(Shape, Option<usize>, bool)> {
+fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
     formats::refuse_options(Path::new(STANDARD), Format::Npy, options)?;
     let array = npy::read_header(reader, Path::new(STANDARD))?;
-    Ok((array.shape, Some(array.frames), array.big_endian))
+    let npy::Array { shape, ty, frames, big_endian, axes, .. } = array;
+    let repeated = (axes == 3).then_some(array); // others like it may follow
+    let frames = repeated.is_none().then_some(frames);
+    Ok(StreamHeader { shape, ty, frames, big_endian, repeated })
 }
 
 #[cfg(test)]

@@ -1,12 +1,9 @@
 //! The variables of a file, from which the user must choose one.
 
 use serde::Serialize;
-#[cfg(any(test, feature = "hdf5", feature = "netcdf", feature = "zarr"))]
-use std::fmt::Write;
-use std::fmt::{self, Display};
+use std::fmt::{self, Display, Write};
 
 /// Variables that a message lists.
-#[cfg(any(test, feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 const MOST_LISTED: usize = 20;
 
 /// A variable of a file.
@@ -67,7 +64,6 @@ impl Display for VariableInfo {
 }
 
 /// Variables for a message, each on a line of its own.
-#[cfg(any(test, feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 pub(super) fn listed(all: &[VariableInfo]) -> String {
     let mut text = String::new();
     for variable in all.iter().take(MOST_LISTED) {

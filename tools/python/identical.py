@@ -279,6 +279,35 @@ def check_vtr(run, folder):
     check_samples(expected[::-1] if is_down(data) else expected, samples)
 
 
+def check_rectilinear(run, folder):
+    """A rectilinear grid with irregular axes that VTK wrote."""
+    import vtk
+    from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+    frame = volume(8)[0]
+    places = [np.cumsum(np.random.default_rng(9).uniform(0.5, 2, n)) for n in frame.shape[::-1]]
+    grid = vtk.vtkRectilinearGrid()
+    grid.SetDimensions(*frame.shape[::-1])
+    for put, at in zip([grid.SetXCoordinates, grid.SetYCoordinates, grid.SetZCoordinates], places):
+        put(numpy_to_vtk(at, deep=True))
+    samples = numpy_to_vtk(frame.ravel(), deep=True)
+    samples.SetName("density")
+    grid.GetPointData().SetScalars(samples)
+    writer = vtk.vtkXMLRectilinearGridWriter()
+    writer.SetFileName(str(folder / "grid.vtr"))
+    writer.SetInputData(grid)
+    writer.Write()
+    run("convert", folder / "grid.vtr", "-o", folder / "grid.wspl", "--tolerance", TOLERANCE, "--force")
+    run("extract", folder / "grid.wspl", "-o", folder / "grid_back.vtr", "--force")
+    reader = vtk.vtkXMLRectilinearGridReader()
+    reader.SetFileName(str(folder / "grid_back.vtr"))
+    reader.Update()
+    after = reader.GetOutput()
+    for get, at in zip([after.GetXCoordinates, after.GetYCoordinates, after.GetZCoordinates], places):
+        np.testing.assert_array_equal(vtk_to_numpy(get()), at)
+    check_samples(frame, vtk_to_numpy(after.GetPointData().GetArray("density")).reshape(frame.shape))
+
+
 def is_down(data):
     """Whether depths are counted downwards, so that wavesplat turns the axis."""
     return data.depth.attrs.get("positive") == "down"

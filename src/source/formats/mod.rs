@@ -15,10 +15,13 @@ pub(in crate::source) mod file_series;
 mod metaimage;
 mod nifti;
 pub(in crate::source) mod npy;
+mod npz;
 mod nrrd;
 pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
 mod shared;
+#[cfg(feature = "tiff")]
+mod tiff;
 mod vti;
 mod vtk;
 
@@ -32,8 +35,9 @@ use crate::source::file_header::{FileHeader, head};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
-const EXTENSIONS: [(&str, Format); 26] = [
+const EXTENSIONS: [(&str, Format); 31] = [
     ("npy", Format::Npy),
+    ("npz", Format::Npz),
     ("nrrd", Format::Nrrd),
     ("nhdr", Format::Nrrd),
     ("nii", Format::Nifti),
@@ -44,7 +48,11 @@ const EXTENSIONS: [(&str, Format); 26] = [
     ("mhd", Format::MetaImage),
     ("vti", Format::Vti),
     ("pvti", Format::Vti),
+    ("vtr", Format::Vtr),
+    ("pvtr", Format::Vtr),
     ("vtk", Format::Vtk),
+    ("tif", Format::Tiff),
+    ("tiff", Format::Tiff),
     ("pvd", Format::Pvd),
     ("series", Format::FileSeries),
     ("nc", Format::NetCdf),
@@ -66,6 +74,9 @@ pub fn extensions() -> impl Iterator<Item = &'static str> {
     EXTENSIONS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
 }
 
+/// How TIFF and BigTIFF start, in either byte order.
+const TIFF_STARTS: [&[u8]; 4] = [b"II\x2a\0", b"MM\0\x2a", b"II\x2b\0", b"MM\0\x2b"];
+
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
 
 /// Extensions of files that may be in gzip as a whole.
@@ -75,11 +86,16 @@ const COMPRESSED: [&str; 3] = ["nii", "hdr", "img"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::source) enum Format {
     Npy,
+    /// NumPy arrays in a zip archive.
+    Npz,
     Nrrd,
     Nifti,
     MetaImage,
     Vti,
+    /// As the one before it, but for where the points are.
+    Vtr,
     Vtk,
+    Tiff,
     Hdf5,
     NetCdf,
     /// A folder.
@@ -109,11 +125,14 @@ impl Format {
     pub(in crate::source) fn holds_frames(self) -> bool {
         match self {
             Self::Npy
+            | Self::Npz
             | Self::Nrrd
             | Self::Nifti
             | Self::MetaImage
             | Self::Vti
+            | Self::Vtr
             | Self::Vtk
+            | Self::Tiff
             | Self::Hdf5
             | Self::NetCdf
             | Self::Zarr => true,
@@ -126,11 +145,14 @@ impl Format {
         match self {
             Self::Hdf5 | Self::NetCdf | Self::Zarr => true,
             Self::Npy
+            | Self::Npz
             | Self::Nrrd
             | Self::Nifti
             | Self::MetaImage
             | Self::Vti
+            | Self::Vtr
             | Self::Vtk
+            | Self::Tiff
             | Self::Pvd
             | Self::FileSeries
             | Self::Coefficients => false,
@@ -141,11 +163,14 @@ impl Format {
     fn name(self) -> &'static str {
         match self {
             Self::Npy => "NumPy array",
+            Self::Npz => "NumPy arrays (.npz)",
             Self::Nrrd => "NRRD",
             Self::Nifti => "NIfTI",
             Self::MetaImage => "MetaImage",
             Self::Vti => "VTK image data (.vti)",
+            Self::Vtr => "VTK rectilinear grid (.vtr)",
             Self::Vtk => "legacy VTK",
+            Self::Tiff => "TIFF",
             Self::Hdf5 => "HDF5",
             Self::NetCdf => "NetCDF",
             Self::Zarr => "Zarr",
@@ -163,6 +188,7 @@ impl Format {
             (head.starts_with(vtk::MAGIC), Self::Vtk),
             (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
             (head.starts_with(b"CDF"), Self::NetCdf),
+            (TIFF_STARTS.iter().any(|start| head.starts_with(start)), Self::Tiff),
             (is_nifti, Self::Nifti),
         ];
         Ok(formats.into_iter().find(|(is, _)| *is).map(|(_, format)| format))
@@ -214,9 +240,10 @@ pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result
         Format::NetCdf => arrays::open_netcdf(path, options)?.undecided(),
         #[cfg(feature = "zarr")]
         Format::Zarr => arrays::open_zarr(path, options)?.undecided(),
-        Format::Vti => vti::undecided(path),
+        Format::Npz => npz::undecided(path),
+        Format::Vti | Format::Vtr => vti::undecided(path),
         Format::Vtk => vtk::undecided(path),
-        Format::Nrrd | Format::Nifti | Format::MetaImage => Ok(components(path, options)),
+        Format::Nrrd | Format::Nifti | Format::MetaImage | Format::Tiff => Ok(components(path, options)),
         #[cfg(not(feature = "hdf5"))]
         Format::Hdf5 => Ok(Vec::new()), // opening it says that it is not built in
         #[cfg(not(feature = "netcdf"))]
@@ -249,11 +276,16 @@ const MOST_COMPONENTS: usize = 16;
 fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
     match format {
         Some(Format::Npy) => npy::describe(path),
+        Some(Format::Npz) => npz::describe(path, options),
         Some(Format::Nrrd) => nrrd::describe(path, options.variable.as_deref()),
         Some(Format::Nifti) => nifti::describe(path, options.variable.as_deref()),
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
-        Some(Format::Vti) => vti::describe(path, options.variable.as_deref()),
+        Some(Format::Vti | Format::Vtr) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
+        #[cfg(feature = "tiff")]
+        Some(Format::Tiff) => tiff::describe(path, options),
+        #[cfg(not(feature = "tiff"))]
+        Some(Format::Tiff) => Err(not_built_in(path, Format::Tiff, "tiff")),
         #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options, extent),
         #[cfg(feature = "netcdf")]
@@ -274,7 +306,7 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions, extent:
 }
 
 /// The error of a format whose crates this build does not have.
-#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "zarr")))]
+#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "tiff", feature = "zarr")))]
 fn not_built_in(path: &Path, format: Format, feature: &'static str) -> Error {
     Error::input(path, Note::with(format!("{} is not built in", format.name()), Remedy::BuildWith(feature)))
 }
@@ -314,7 +346,7 @@ mod tests {
         }
         let known: Vec<&str> = extensions().collect();
         assert!(
-            known.starts_with(&["npy", "nrrd"]) && known.contains(&"hdf5") && !known.contains(&"wspl"),
+            known.starts_with(&["npy", "npz", "nrrd"]) && known.contains(&"hdf5") && !known.contains(&"wspl"),
             "{known:?}"
         );
     }

@@ -4,6 +4,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::npy::{Header, MAGIC};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use crate::source::file_header::{FileHeader, check_size};
 use crate::source::layout::Layout;
@@ -15,16 +16,22 @@ use std::path::Path;
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
 
-/// What the header of an array says.
-#[derive(Debug)]
+/// What the header of an array of frames says.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::source) struct Array {
     /// Voxels and sample type of a frame.
     pub(in crate::source) shape: Shape,
+    /// The type of the stored numbers.
+    pub(in crate::source) ty: StoredType,
+    /// Number of axes: 4, or 3 of a single frame.
+    pub(in crate::source) axes: usize,
     /// Number of frames.
     pub(in crate::source) frames: usize,
-    /// Whether samples have their most significant byte first.
+    /// Whether numbers have their most significant byte first.
     pub(in crate::source) big_endian: bool,
-    /// Bytes before the first sample.
+    /// Whether the first axis is the fastest.
+    pub(in crate::source) is_fortran: bool,
+    /// Bytes before the first number.
     pub(in crate::source) start: u64,
 }
 
@@ -47,7 +54,13 @@ pub struct ArrayHeader {
 /// A file that cannot be read, a damaged header, types of samples that are not supported, Fortran order.
 pub fn array_header(path: &Path) -> Result<ArrayHeader> {
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
-    c_header(&mut BufReader::with_capacity(256, file), path)
+    let found = any_header(&mut BufReader::with_capacity(256, file), path)?;
+    found.refuse_fortran(path)?;
+    let AnyHeader { lengths, ty, big_endian, start, .. } = found;
+    let StoredType::Sample(sample) = ty else {
+        return Err(Error::input(path, format!("its samples are {ty}; convert with .astype(np.int32), say")));
+    };
+    Ok(ArrayHeader { lengths, sample, big_endian, start })
 }
 
 /// Reads the header of one file and checks its size.
@@ -55,36 +68,47 @@ pub(in crate::source) fn describe(path: &Path) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let refused = |e| Error::input(path, e);
-    let (header, is_fortran) = any_header(&mut BufReader::with_capacity(256, file), path)?;
-    let Array { shape, frames, big_endian, start } = header.of_volumes().map_err(refused)?;
-    check_size(state.len, start, &shape, frames).map_err(refused)?;
-    let mut layout = Layout::plain(shape.dims(), frames);
-    if is_fortran {
-        layout.0.reverse();
-    }
-    let stored = Stored::new(&layout, shape.sample(), big_endian).map_err(refused)?;
+    let array = read_any(&mut BufReader::with_capacity(256, file), path)?;
+    check_size(state.len, array.start, &array.shape, array.ty, array.frames).map_err(refused)?;
+    let stored = Stored::new(&array.layout(), array.ty, array.big_endian).map_err(refused)?;
+    let Array { shape, frames, start, .. } = array;
     let part = Part { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) };
     Ok(FileHeader::plain(shape, vec![part]))
 }
 
-/// Reads up to the first sample, and not a byte further.
+/// Reads up to the first number, and not a byte further; an array in Fortran order is refused.
 pub(in crate::source) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
-    c_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
+    let found = any_header(reader, path)?;
+    found.refuse_fortran(path)?;
+    found.of_volumes().map_err(|e| Error::input(path, e))
 }
 
-/// The header of an array in C order.
-fn c_header(reader: &mut impl Read, path: &Path) -> Result<ArrayHeader> {
-    match any_header(reader, path)? {
-        (header, false) => Ok(header),
-        (_, true) => {
-            let what = "its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))";
-            Err(Error::input(path, what))
+/// Reads up to the first number of an array in any order.
+pub(in crate::source) fn read_any(reader: &mut impl Read, path: &Path) -> Result<Array> {
+    any_header(reader, path)?.of_volumes().map_err(|e| Error::input(path, e))
+}
+
+impl Array {
+    /// The order in which its numbers lie.
+    pub(in crate::source) fn layout(&self) -> Layout {
+        let mut layout = Layout::plain(self.shape.dims(), self.frames);
+        if self.is_fortran {
+            layout.0.reverse();
         }
+        layout
     }
 }
 
-/// The header, and whether the array is in Fortran order.
-fn any_header(reader: &mut impl Read, path: &Path) -> Result<(ArrayHeader, bool)> {
+/// What a header says.
+struct AnyHeader {
+    lengths: Vec<u64>,
+    ty: StoredType,
+    big_endian: bool,
+    is_fortran: bool,
+    start: u64,
+}
+
+fn any_header(reader: &mut impl Read, path: &Path) -> Result<AnyHeader> {
     let (text, start) = header_text(reader).map_err(|e| match e.kind() {
         io::ErrorKind::UnexpectedEof => Error::input(path, "ends inside its npy header"),
         io::ErrorKind::InvalidData => Error::input(path, e.to_string()),
@@ -118,24 +142,34 @@ fn invalid(what: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, what)
 }
 
-impl ArrayHeader {
+impl AnyHeader {
+    fn refuse_fortran(&self, path: &Path) -> Result<()> {
+        if !self.is_fortran {
+            return Ok(());
+        }
+        let what = "its array is in Fortran order; write it as np.save(name, np.ascontiguousarray(a))";
+        Err(Error::input(path, what))
+    }
+
     fn of_volumes(self) -> Parsed<Array> {
         let (dims, frames) = dims(&self.lengths)?;
         if frames == 0 {
             return Err("its array has 0 frames".into());
         }
-        let Self { sample, big_endian, start, .. } = self;
-        Ok(Array { shape: Shape::new(dims, sample)?, frames, big_endian, start })
+        let Self { ty, big_endian, is_fortran, start, lengths } = self;
+        let axes = lengths.len();
+        Layout::plain(dims, frames).bytes(ty.size())?;
+        Ok(Array { shape: Shape::new(dims, ty.sample())?, ty, axes, frames, big_endian, is_fortran, start })
     }
 }
 
-fn parse(text: &[u8], start: u64) -> Parsed<(ArrayHeader, bool)> {
+fn parse(text: &[u8], start: u64) -> Parsed<AnyHeader> {
     let Header { samples, is_fortran, shape } = Header::parse(text).map_err(|e| format!("its npy header {e}"))?;
-    let (sample, big_endian) = samples.map_err(|descr| {
-        let hint = "supported are u1 i1 u2 i2 u4 i4 f2 f4 f8 (bytes, not bits); convert with .astype(np.int32), say";
-        format!("its samples are {descr}; {hint}")
+    let (ty, big_endian) = samples.map_err(|descr| {
+        let hint = "supported are u1 i1 u2 i2 u4 i4 u8 i8 f2 f4 f8 (bytes, not bits)";
+        format!("its samples are {descr}; {hint}; convert with .astype(np.float32), say")
     })?;
-    Ok((ArrayHeader { lengths: shape, sample, big_endian, start }, is_fortran))
+    Ok(AnyHeader { lengths: shape, ty, big_endian, is_fortran, start })
 }
 
 fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
@@ -195,7 +229,7 @@ mod tests {
             let file = folder.write("a.npy", npy(1, &dict(descr, shape), &[0; 64]));
             refused(&[file], &OpenOptions::default(), words);
         };
-        for descr in ["'<i8'", "'<u8'", "'|b1'", "'<c8'", "'<U3'", "[('a', '<f4'), ('b', '<i2')]"] {
+        for descr in ["'<i16'", "'|b1'", "'<c8'", "'<U3'", "[('a', '<f4'), ('b', '<i2')]"] {
             header(descr, "(2, 2, 2)", "its samples are");
         }
         header("'<f4'", "(4, 4)", "2 dimension(s)");
@@ -222,6 +256,35 @@ mod tests {
         let file = folder.write("a.npy", npy(1, &dict, &stored));
         check_inputs(std::slice::from_ref(&file), &OpenOptions::default(), SampleType::U16, 4);
         assert!(array_header(&file).is_err_and(|e| e.to_string().contains("ascontiguousarray")));
+    }
+
+    #[test]
+    fn integers_of_64_bits_are_read_where_32_hold_them() {
+        let folder = Folder::new();
+        for (name, ty) in [("i8", SampleType::I32), ("u8", SampleType::U32)] {
+            for (order, big_endian) in [('<', false), ('>', true)] {
+                let wide = |b: &[u8]| if big_endian { [[0; 4].as_slice(), b].concat() } else { [b, &[0; 4]].concat() };
+                let stored: Vec<u8> = payload(ty, 0..4, big_endian).chunks(4).flat_map(wide).collect();
+                let dict = dict(&format!("'{order}{name}'"), "(4, 3, 5, 7)");
+                let file = folder.write("a.npy", npy(1, &dict, &stored));
+                check_inputs(std::slice::from_ref(&file), &OpenOptions::default(), ty, 4);
+                assert!(array_header(&file).is_err_and(|e| e.to_string().contains("np.int32")));
+            }
+        }
+    }
+
+    #[test]
+    fn an_integer_that_no_sample_is_has_its_place_named() {
+        let folder = Folder::new();
+        let values = (0..24).map(|i| if i == 21 { -5_000_000_000 } else { i });
+        let stored: Vec<u8> = values.flat_map(i64::to_le_bytes).collect();
+        let file = folder.write("a.npy", npy(1, &dict("'<i8'", "(2, 3, 2, 2)"), &stored));
+        let mut source = crate::source::open(&[file], &OpenOptions::default()).expect("a header");
+        let (whole, mut out) = (source.archive().grid.whole(), vec![0; 48]);
+        let window = source.window(0, 2).expect("frames");
+        window.read_box(0, &whole, &mut out).expect("a frame whose integers fit");
+        let error = window.read_box(1, &whole, &mut out).expect_err("too small").to_string();
+        assert!(error.contains("a.npy, frame 1: voxel (1, 0, 2) is -5000000000, which no i32"), "{error}");
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub(in crate::source) fn describe(path: &Path, options: &OpenOptions) -> Result<
         Some(_) if options.dims_are_remembered => usize::try_from(room).unwrap_or(usize::MAX).max(1),
         frames => frames.unwrap_or(1),
     };
-    check_size(state.len, options.offset, &shape, count)
+    check_size(state.len, options.offset, &shape, shape.sample().into(), count)
         .map_err(|what| Error::input(path, Note::with(what, remedy(state.len, &shape, options))))?;
     let part = Part::plain((path, state), (&shape, count), options.big_endian, options.offset)
         .map_err(|e| Error::setting("dims", e))?;

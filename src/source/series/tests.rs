@@ -58,7 +58,7 @@ fn frames_that_are_stepped_over_are_not_decoded_and_spooled_ones_share_a_file() 
     let decoded = Arc::new(Mutex::new(Vec::new()));
     let part = &mut series.parts[0];
     part.at = DataLocation::Decoded(Box::new(Counted(decoded.clone())));
-    part.stored = Stored::plain(&series.shape, 1, false).expect("small");
+    part.stored = Stored::plain(series.shape.dims(), 1, series.shape.sample(), false).expect("small");
     let window = series.window_of(2, 5, 7).expect("window");
     assert_eq!(*decoded.lock().expect("no panic"), [2, 9, 16, 23, 30]);
     assert_eq!(window.frames(), 5);

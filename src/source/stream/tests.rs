@@ -88,3 +88,30 @@ fn npy_is_known_by_its_magic() {
     assert!(message(stream(b"data".to_vec(), &OpenOptions::default())).contains("is no npy stream; DescribeSamples"));
     assert!(message(stream(npy(4, &[])[..20].to_vec(), &OpenOptions::default())).contains("npy header"));
 }
+
+/// An array of one frame.
+fn one(shape: &str, t: usize) -> Vec<u8> {
+    let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape})}}\n");
+    let len = (dict.len() as u16).to_le_bytes();
+    [MAGIC, &[1, 0], &len, dict.as_bytes(), &payload(TY, t..t + 1, false)].concat()
+}
+
+#[test]
+fn arrays_one_after_another_are_frames() {
+    let bytes: Vec<u8> = (0..5).flat_map(|t| one("3, 5, 7", t)).collect();
+    for frames in [1, 5] {
+        let bytes = bytes[..bytes.len() / 5 * frames].to_vec();
+        let mut source = stream(bytes, &OpenOptions::default()).expect("opening");
+        assert_eq!(source.archive().frames, None);
+        check_source(&mut *source, TY, frames);
+        assert_eq!(source.window(frames, 1).expect("nothing").frames(), 0);
+        assert_eq!(source.archive().frames, Some(frames));
+    }
+    let all = |bytes: Vec<u8>| message(stream(bytes, &OpenOptions::default()).and_then(|mut s| s.window(0, 9)));
+    assert!(all(bytes[..bytes.len() - 1].to_vec()).contains("inside frame 4"));
+    assert!(all(bytes[..one("3, 5, 7", 0).len() + 5].to_vec()).contains("npy header"));
+    assert!(all([one("3, 5, 7", 0), one("3, 7, 5", 1)].concat()).contains("array 1 is 1 frame(s) of 5x7x3 f32"));
+    assert!(all([one("3, 5, 7", 0), one("1, 3, 5, 7", 1)].concat()).contains("unlike the first one"));
+    assert!(all([one("3, 5, 7", 0), b"more and more".to_vec()].concat()).contains("does not start as an npy"));
+    assert!(all([npy(1, &payload(TY, 0..1, false)), one("3, 5, 7", 1)].concat()).contains("must have a frame"));
+}

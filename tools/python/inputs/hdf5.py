@@ -36,7 +36,6 @@ NEWER = [
 ]
 REFUSED = [
     ("lzf", "f4", {"chunks": CHUNKS[1:], "compression": "lzf"}, "the lzf filter"),
-    ("i64", "i8", {}, "integers of 64 bits"),
     ("complex", "c8", {}, "a compound type: complex numbers"),
 ]
 
@@ -222,4 +221,9 @@ def refused(folder: Path) -> list:
     for name, kind, settings, _ in REFUSED:
         with h5py.File(folder / f"refused_{name}.h5", "w", libver=SMALL) as file:
             file.create_dataset(NAME, data=frame("i32").astype(kind), **settings)
-    return [Refused(f"refused_{name}.h5", H5PY, note) for name, *_, note in REFUSED]
+    with h5py.File(folder / "i64.h5", "w", libver=SMALL) as file:
+        file.create_dataset(NAME, data=frame("i32").astype("i8"))
+    return [
+        Case("i64.h5", H5PY, "integers of 64 bits", "i32", frames=1, **BARE),
+        *(Refused(f"refused_{name}.h5", H5PY, note) for name, *_, note in REFUSED),
+    ]

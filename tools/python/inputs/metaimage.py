@@ -129,14 +129,14 @@ def lists(folder: Path) -> list:
 
 
 def refused(folder: Path) -> list:
-    sitk.WriteImage(itk(frame("i32").astype("i8")), folder / "refused_i64.mha")
+    sitk.WriteImage(itk(frame("i32").astype("i8")), folder / "i64.mha")
     colours = sitk.Compose([itk(frame("u8"))] * 3)
     sitk.WriteImage(colours, folder / "refused_channels.mha")
     ascii_ = "BinaryData = False\n"
     text = " ".join(str(v) for v in frame("i16").ravel()).encode()
     (folder / "refused_ascii.mha").write_bytes(header("i16", "LOCAL", extra=ascii_) + text + b"\n")
     return [
-        Refused("refused_i64.mha", ITK, "MET_LONG_LONG"),
+        Case("i64.mha", ITK, "MET_LONG_LONG", "i32", frames=1),
         Refused("refused_channels.mha", ITK, "ElementNumberOfChannels = 3"),
         Refused("refused_ascii.mha", TEXT, "BinaryData = False: samples as text"),
     ]

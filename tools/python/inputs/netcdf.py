@@ -262,13 +262,13 @@ def series(folder: Path) -> Case:
 
 
 def refused(folder: Path) -> list:
-    with netCDF4.Dataset(folder / "refused_i64.nc", "w", format="NETCDF3_64BIT_DATA") as file:
+    with netCDF4.Dataset(folder / "i64.nc", "w", format="NETCDF3_64BIT_DATA") as file:
         lengths(file)
         variable(file, frames("i32").astype("i8")[0], ("z", "y", "x"))
     with netCDF4.Dataset(folder / "refused_text.nc", "w", format=CLASSIC) as file:
         file.createDimension("letters", 7)
         file.createVariable("name", "S1", ("letters",))[:] = netCDF4.stringtochar(np.array([NAME[:7]], "S7"))[0]
     return [
-        Refused("refused_i64.nc", NETCDF, "CDF-5 with integers of 64 bits"),
+        Case("i64.nc", NETCDF, "CDF-5 with integers of 64 bits", "i32", frames=1, units=UNITS, spacing=None, origin=None),
         Refused("refused_text.nc", NETCDF, "no field at all: letters"),
     ]

@@ -29,11 +29,13 @@ def types(folder: Path) -> list:
 
 def orders(folder: Path) -> list:
     save(folder / "one_frame.npy", frame())
+    save(folder / "i64.npy", frame("i32").astype("i8"))
     save(folder / "big_endian.npy", frames("i16", order=">"))
     save(folder / "fortran.npy", np.asfortranarray(frames("u16")))
     save(folder / "fortran_big_endian.npy", np.asfortranarray(frames("f64", order=">")))
     return [
         Case("one_frame.npy", NUMPY, "z, y, x", frames=1, **BARE),
+        Case("i64.npy", NUMPY, "int64", "i32", frames=1, **BARE),
         Case("big_endian.npy", NUMPY, "big-endian", "i16", **BARE),
         Case("fortran.npy", NUMPY, "Fortran order", "u16", **BARE),
         Case("fortran_big_endian.npy", NUMPY, "Fortran order, big-endian", "f64", **BARE),
@@ -56,7 +58,6 @@ def series(folder: Path) -> Case:
 def refused(folder: Path) -> list:
     fields = np.zeros((2, 2, 2), dtype=[("Dichte, é", "<f4"), ("[v']", "<i2", (3,))])
     kinds = [
-        ("refused_i64.npy", frame("i32").astype("i8"), "int64"),
         ("refused_bool.npy", frame("u8") > 3, "bool"),
         ("refused_complex.npy", frame().astype("c8"), "complex64"),
         ("refused_text.npy", np.full((2, 2, 2), "abc"), "text"),

@@ -154,8 +154,8 @@ def refused(folder: Path) -> list:
     vector = np.stack([frame(), frame() + 1000, frame() + 2000], axis=-1)
     kinds = {"kinds": ["vector"] + ["domain"] * 3, "encoding": "raw"}
     save(folder / "refused_vector.nrrd", vector, kinds)
-    save(folder / "refused_i64.nrrd", frame("i32").astype("i8"), {"encoding": "raw"})
+    save(folder / "i64.nrrd", frame("i32").astype("i8"), {"encoding": "raw"})
     return [
         Refused("refused_vector.nrrd", PYNRRD, "kinds: vector domain domain domain; three components"),
-        Refused("refused_i64.nrrd", PYNRRD, "type: int64"),
+        Case("i64.nrrd", PYNRRD, "type: int64", "i32", frames=1, spacing=None, origin=None),
     ]

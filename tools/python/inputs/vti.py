@@ -38,7 +38,7 @@ def write(folder: Path) -> list:
         *arrays(folder),
         pieces(folder),
         *lists(folder),
-        refused(folder),
+        integers(folder),
     ]
 
 
@@ -124,6 +124,6 @@ def parallel(folder: Path) -> Case:
     return Case("parallel.pvti", VTK, "two pieces in two files, which share a plane of points", frames=1, more=MAY)
 
 
-def refused(folder: Path) -> Refused:
-    save(folder / "refused_i64.vti", image({NAME: frame("i32").astype("i8")}))
-    return Refused("refused_i64.vti", VTK, "Int64")
+def integers(folder: Path) -> Case:
+    save(folder / "i64.vti", image({NAME: frame("i32").astype("i8")}))
+    return Case("i64.vti", VTK, "Int64", "i32", frames=1)

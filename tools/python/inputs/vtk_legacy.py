@@ -77,8 +77,8 @@ def refused(folder: Path) -> list:
     grid = vtk.vtkRectilinearGrid()
     grid.SetDimensions(2, 2, 2)
     save(folder / "refused_rectilinear.vtk", grid)
-    save(folder / "refused_i64.vtk", image({NAME: frame("i32").astype("i8")}))
+    save(folder / "i64.vtk", image({NAME: frame("i32").astype("i8")}))
     return [
         Refused("refused_rectilinear.vtk", VTK, "DATASET RECTILINEAR_GRID"),
-        Refused("refused_i64.vtk", VTK, "SCALARS density long: 64 bits"),
+        Case("i64.vtk", VTK, "SCALARS density long: 64 bits", "i32", frames=1),
     ]

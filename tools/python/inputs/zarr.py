@@ -40,7 +40,6 @@ THIRD = [
     ("v3_transposed", "i32", {"filters": TransposeCodec(order=(3, 2, 1, 0))}, "transpose codec"),
 ]
 REFUSED = [
-    ("v2_i64", 2, "i8", {}, "version 2, integers of 64 bits"),
     ("v2_delta", 2, "i4", {"filters": Delta("<i4")}, "version 2, the delta filter"),
     ("v2_lz4", 2, "i4", {"compressors": LZ4()}, "version 2, lz4 without blosc"),
     ("v3_complex", 3, "c8", {}, "version 3, complex numbers"),
@@ -117,4 +116,8 @@ def missing_chunk(folder: Path) -> list:
 def refused(folder: Path) -> list:
     for name, version, kind, settings, _ in REFUSED:
         save(folder / f"refused_{name}.zarr", frames("i32").astype(kind), version, **settings)
-    return [Refused(f"refused_{name}.zarr", ZARR, note) for name, *_, note in REFUSED]
+    save(folder / "v2_i64.zarr", frames("i32").astype("i8"), 2)
+    return [
+        Case("v2_i64.zarr", ZARR, "version 2, integers of 64 bits", "i32", **BARE),
+        *(Refused(f"refused_{name}.zarr", ZARR, note) for name, *_, note in REFUSED),
+    ]

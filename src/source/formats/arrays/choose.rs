@@ -89,7 +89,14 @@ pub(super) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::V
 fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
     let bounds = bounds(all);
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
-    let mut volumes = choices(all.iter().filter(|v| is_volume(v, least) && !bounds.contains(v.name())));
+    let of = |is_wide: bool| {
+        let is_wide = move |v: &Variable| v.sample.as_ref().is_ok_and(|ty| ty.is_wide() == is_wide);
+        choices(all.iter().filter(|v| is_wide(v) && is_volume(v, least) && !bounds.contains(v.name())))
+    };
+    let mut volumes = of(false);
+    if volumes.is_empty() {
+        volumes = of(true); // numbers of cells, say, where there is nothing else
+    }
     match volumes.iter().position(|c| active == Some(c.name())) {
         Some(at) => vec![volumes.swap_remove(at)],
         None => volumes,

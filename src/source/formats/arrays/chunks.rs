@@ -3,6 +3,7 @@
 use super::{ArrayFile, Opener, Variable};
 use crate::base::error::{Error, Result};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use crate::source::layout::{Counts, Layout};
 use crate::source::parts::{Decode, Stored};
@@ -17,7 +18,7 @@ const MANY: usize = 32;
 /// Takes frames from a variable of a file.
 pub(super) struct Chunks {
     path: String,
-    sample: SampleType,
+    sample: StoredType,
     lengths: Vec<usize>,
     counts: Vec<Counts>,
     /// Which of the array's frames is which; empty if they are in order.
@@ -43,7 +44,7 @@ fn too_large(path: &Path, bytes: usize) -> Error {
 
 impl Chunks {
     pub(super) fn new(variable: &Variable, counts: &[Counts], order: Vec<usize>, opener: &Opener) -> Result<Self> {
-        let sample = variable.sample.clone().unwrap_or(SampleType::F64);
+        let sample = variable.sample.clone().unwrap_or(SampleType::F64.into());
         let chunk = |axis: usize| variable.chunk.as_ref().map_or(1, |c| c[axis].clamp(1, variable.lengths[axis]));
         let of_frames = counts.iter().position(|c| *c == Counts::Frames);
         let is_slowest = of_frames.is_none_or(|at| counts[..at].iter().all(|c| matches!(c, Counts::Only(_))));
@@ -186,7 +187,7 @@ mod tests {
             Ok(Vec::new())
         }
 
-        fn read(&self, _: &str, _: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+        fn read(&self, _: &str, _: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
             let mut reads = READS.lock().expect("no panic");
             reads.resize(LENGTHS.iter().product(), 0);
             let mut found = vec![0_usize];
@@ -206,7 +207,8 @@ mod tests {
     fn every_sample_is_read_once_and_put_in_its_place() {
         let (dims, attributes) = (vec![String::new(); 5], Attributes::new());
         let (lengths, chunk) = (LENGTHS.to_vec(), Some(CHUNK.to_vec()));
-        let variable = Variable { path: "a".into(), sample: Ok(SampleType::U16), lengths, dims, chunk, attributes };
+        let variable =
+            Variable { path: "a".into(), sample: Ok(SampleType::U16.into()), lengths, dims, chunk, attributes };
         let voxels = [2, 1, 0].map(Counts::Voxels);
         let counts = [vec![Counts::Frames, Counts::Only(1)], voxels.to_vec()].concat();
         for memory in [240, 500, 1 << 20] {

@@ -7,6 +7,7 @@ use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use hdf5_reader::error::Error as Hdf5Error;
 use hdf5_reader::group::Group;
@@ -67,9 +68,9 @@ impl ArrayFile for Hdf5ArrayFile {
         Ok(listing.variables)
     }
 
-    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+    fn read(&self, path: &str, ty: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         let dataset = self.0.dataset(path).map_err(|e| e.to_string())?;
-        slice(&dataset, sample, ranges).map_err(|e| reason(&e))
+        slice(&dataset, ty, ranges).map_err(|e| reason(&e))
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
@@ -158,7 +159,7 @@ impl Listing {
 
 fn variable(dataset: &Dataset, path: String) -> Variable {
     let lengths: Vec<usize> = dataset.shape().iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect();
-    let sample = sample_type(dataset.dtype());
+    let sample = stored_type(dataset.dtype());
     let chunk = dataset.chunks().filter(|c| c.len() == lengths.len());
     let chunk = chunk.map(|c| c.into_iter().map(|n| n as usize).collect());
     let mut dims = vec![String::new(); lengths.len()];
@@ -236,14 +237,16 @@ fn number_type(ty: &Datatype) -> Parsed<NumberType> {
     })
 }
 
-fn sample_type(ty: &Datatype) -> Parsed<SampleType> {
-    Ok(match *ty {
+fn stored_type(ty: &Datatype) -> Parsed<StoredType> {
+    Ok(StoredType::Sample(match *ty {
         Datatype::FixedPoint { size: 1, signed: false, .. } => SampleType::U8,
         Datatype::FixedPoint { size: 1, signed: true, .. } => SampleType::I8,
         Datatype::FixedPoint { size: 2, signed: false, .. } => SampleType::U16,
         Datatype::FixedPoint { size: 2, signed: true, .. } => SampleType::I16,
         Datatype::FixedPoint { size: 4, signed: false, .. } => SampleType::U32,
         Datatype::FixedPoint { size: 4, signed: true, .. } => SampleType::I32,
+        Datatype::FixedPoint { size: 8, signed: false, .. } => return Ok(StoredType::U64),
+        Datatype::FixedPoint { size: 8, signed: true, .. } => return Ok(StoredType::I64),
         Datatype::FloatingPoint { size: 2, .. } => SampleType::F16,
         Datatype::FloatingPoint { size: 4, .. } => SampleType::F32,
         Datatype::FloatingPoint { size: 8, .. } => SampleType::F64,
@@ -252,7 +255,7 @@ fn sample_type(ty: &Datatype) -> Parsed<SampleType> {
         Datatype::String { .. } => return Err("text".into()),
         Datatype::Compound { .. } => return Err("compound".into()),
         ref other => return Err(kind(other)),
-    })
+    }))
 }
 
 /// The first word of a type's description.
@@ -290,7 +293,7 @@ fn byte_order(ty: &Datatype) -> ByteOrder {
     }
 }
 
-fn slice(dataset: &Dataset, sample: SampleType, ranges: &[Range<usize>]) -> std::result::Result<Vec<u8>, Hdf5Error> {
+fn slice(dataset: &Dataset, ty: StoredType, ranges: &[Range<usize>]) -> std::result::Result<Vec<u8>, Hdf5Error> {
     let of = |r: &Range<usize>| SliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
     let slice = SliceInfo { selections: ranges.iter().map(of).collect() };
     macro_rules! read {
@@ -298,7 +301,7 @@ fn slice(dataset: &Dataset, sample: SampleType, ranges: &[Range<usize>]) -> std:
             dataset.read_slice_parallel::<StoredBytes<$n>>(&slice)?.into_iter().flat_map(|stored| stored.0).collect()
         };
     }
-    Ok(match sample.size() {
+    Ok(match ty.size() {
         1 => read!(1),
         2 => read!(2),
         4 => read!(4),

@@ -1,7 +1,8 @@
 //! Files of named arrays, such as HDF5 and NetCDF. One variable is an archive, read chunk by chunk.
 //!
 //! An [`ArrayFile`] lists the arrays. [`choose`] finds the variable, [`axes`] the meaning of its axes, [`places`] the
-//! positions of voxels and frames, [`values`] the meaning of its numbers, and [`chunks`] reads it.
+//! positions of voxels and frames, and [`values`] the meaning of its numbers. [`chunks`] reads it, unless it is stored as
+//! it is ([`in_place`]).
 
 mod axes;
 mod beside;
@@ -10,6 +11,8 @@ mod chunks;
 mod describe;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg_attr(not(feature = "netcdf"), allow(dead_code, reason = "classic NetCDF alone says where numbers are"))]
+mod in_place;
 #[cfg(feature = "netcdf")]
 mod netcdf;
 mod openpmd;
@@ -25,13 +28,14 @@ use super::shared::component;
 use crate::base::description::{self, Description};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::file_header::{FileHeader, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::parts::{DataLocation, Part, Stored};
 use crate::source::{self, Advised, Extent, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
+use in_place::InPlace;
 use places::Places;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -45,7 +49,7 @@ struct Variable {
     /// Its name, with those of the groups that it is in.
     path: String,
     /// The type of its numbers, or the name of one that is not supported.
-    sample: Parsed<SampleType>,
+    sample: Parsed<StoredType>,
     /// The slowest axis first.
     lengths: Vec<usize>,
     /// Name of each axis; empty where it has none.
@@ -115,7 +119,7 @@ trait ArrayFile: Send {
     fn variables(&self) -> Parsed<Vec<Variable>>;
 
     /// The numbers of a box of an array, little-endian, the last axis fastest.
-    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>>;
+    fn read(&self, path: &str, ty: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>>;
 
     /// All numbers of an array with one axis or none, which may be of any type.
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>>;
@@ -141,6 +145,12 @@ trait ArrayFile: Send {
     fn is_unlimited(&self, dimension: &str) -> bool {
         let _ = dimension;
         false
+    }
+
+    /// Where the numbers of an array are, if they are in the file as they are.
+    fn in_place(&self, path: &str) -> Option<InPlace> {
+        let _ = path;
+        None
     }
 
     /// The attributes of a group; empty if there is no such group.
@@ -271,8 +281,7 @@ impl ArrayArchive {
         let found = found.map_err(|e| Error::input(path, e))?;
         let mut parts = Vec::new();
         for found in &found {
-            let chunks = Chunks::new(&found.variable, &found.counts, found.order.clone(), &self.opener)?;
-            parts.push(found.part((&self.watched, state), chunks).map_err(refused)?);
+            parts.push(self.part(found, state)?);
         }
         let mut described = joined(found, parts).map_err(refused)?;
         if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice) {
@@ -299,6 +308,19 @@ fn take_times(described: &mut FileHeader, (file, all): (&dyn ArrayFile, &[Variab
         described.units.calendar = places.calendar;
     }
     described.notes.extend(places.notes);
+}
+
+impl ArrayArchive {
+    /// The frames of an array: where they are, or how to decode them.
+    fn part(&self, found: &ResolvedArray, state: State) -> Result<Part> {
+        let refused = |e| Error::input(&self.opener.path, e);
+        let (file, variable) = ((self.watched.as_path(), state), &found.variable);
+        if let Some(place) = self.file.in_place(&variable.path).filter(|_| found.order.is_empty()) {
+            return found.in_place(file, place).map_err(refused);
+        }
+        let chunks = Chunks::new(variable, &found.counts, found.order.clone(), &self.opener)?;
+        found.part(file, chunks).map_err(refused)
+    }
 }
 
 /// The name of the active array of an image.
@@ -369,7 +391,7 @@ impl Context<'_> {
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
             let path = variable.shown();
-            format!("{path} is of type {ty}, which is not supported; integers up to 32 bits and floats are")
+            format!("{path} is of type {ty}, which is not supported; integers and floats are")
         })?;
         if variable.lengths.contains(&0) {
             return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths).into());
@@ -434,6 +456,20 @@ impl ResolvedArray {
         let stored = Stored { packing: self.values.packing.clone(), ..chunks.stored(&self.layout)? };
         let frames = if self.order.is_empty() { self.layout.len(Counts::Frames) } else { self.order.len() };
         Ok(Part { path: path.into(), state, frames, stored, at: DataLocation::Decoded(Box::new(chunks)) })
+    }
+
+    /// The frames of this array, which are in the file as they are.
+    fn in_place(&self, (path, state): (&Path, State), place: InPlace) -> Parsed<Part> {
+        let ty = self.variable.sample.clone()?;
+        let axis = |(counts, len): (&Counts, &usize)| Axis {
+            counts: *counts,
+            len: *len,
+            backwards: self.places.is_backwards(*counts),
+        };
+        let axes = self.counts.iter().zip(&self.variable.lengths).map(axis).collect();
+        let stored = Stored { packing: self.values.packing.clone(), ..place.stored(axes, ty, state.len)? };
+        let (path, frames) = (path.into(), self.layout.len(Counts::Frames));
+        Ok(Part { path, state, frames, stored, at: DataLocation::Byte(place.start) })
     }
 
     fn described(self, parts: Vec<Part>) -> Parsed<FileHeader> {

@@ -1,13 +1,16 @@
 //! NetCDF files, classic and version 4, as [`super::ArrayFile`].
 
 use super::describe::numbers;
+use super::in_place::InPlace;
 use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable, hdf5};
 use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use hdf5_reader::Hdf5File;
+use netcdf_reader::classic::data::compute_record_stride;
 use netcdf_reader::error::Error as NcError;
 use netcdf_reader::{
     NcAttrValue, NcAttribute, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
@@ -49,9 +52,9 @@ impl ArrayFile for NetCdfArrayFile {
         Ok(all)
     }
 
-    fn read(&self, path: &str, _: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+    fn read(&self, path: &str, _: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         // The stored type, whose bytes are those of the samples even where these are said to be unsigned.
-        let stored = sample_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype(), false)?;
+        let stored = stored_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype(), false)?;
         let of = |r: &Range<usize>| NcSliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
         let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };
         macro_rules! read {
@@ -60,6 +63,11 @@ impl ArrayFile for NetCdfArrayFile {
                 numbers.into_iter().flat_map(<$ty>::to_le_bytes).collect()
             }};
         }
+        let stored = match stored {
+            StoredType::Sample(stored) => stored,
+            StoredType::I64 => return Ok(read!(i64)),
+            StoredType::U64 => return Ok(read!(u64)),
+        };
         Ok(match stored {
             SampleType::U8 => read!(u8),
             SampleType::I8 => read!(i8),
@@ -71,6 +79,17 @@ impl ArrayFile for NetCdfArrayFile {
             SampleType::F64 => read!(f64),
             SampleType::F16 => return Err("NetCDF has no half floats".into()),
         })
+    }
+
+    fn in_place(&self, path: &str) -> Option<InPlace> {
+        let all = &self.file.as_classic()?.root_group().variables;
+        let variable = all.iter().find(|variable| variable.name == path)?;
+        let record = variable.is_record_var.then(|| compute_record_stride(all).ok());
+        let record = match record {
+            Some(bytes) => Some(bytes?),
+            None => None,
+        };
+        Some(InPlace { start: variable.data_offset, record, big_endian: true })
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
@@ -144,7 +163,7 @@ impl NetCdfArrayFile {
         let chunk = chunk.filter(|chunk| chunk.len() == dims.len());
         let mut attributes = attributes(found);
         let unsigned = attributes.get("_Unsigned") == Some(&Attribute::Text("true".into()));
-        let sample = sample_type(found.dtype(), unsigned);
+        let sample = stored_type(found.dtype(), unsigned);
         if let (true, Ok(sample)) = (unsigned, &sample) {
             let turn = 2_f64.powi(8 * sample.size() as i32);
             for name in ["_FillValue", "missing_value", "valid_range", "valid_min", "valid_max"] {
@@ -153,7 +172,9 @@ impl NetCdfArrayFile {
                 }
             }
         }
-        if matches!(sample, Ok(SampleType::F32 | SampleType::F64)) && !attributes.contains_key("_FillValue") {
+        if matches!(sample, Ok(StoredType::Sample(SampleType::F32 | SampleType::F64)))
+            && !attributes.contains_key("_FillValue")
+        {
             attributes.insert("_FillValue".into(), Attribute::Numbers(vec![UNWRITTEN]));
         }
         Variable {
@@ -217,8 +238,11 @@ fn number_type(ty: &NcType) -> Parsed<NumberType> {
     })
 }
 
-fn sample_type(ty: &NcType, unsigned: bool) -> Parsed<SampleType> {
-    Ok(match ty {
+fn stored_type(ty: &NcType, unsigned: bool) -> Parsed<StoredType> {
+    Ok(StoredType::Sample(match ty {
+        NcType::Int64 if unsigned => return Ok(StoredType::U64),
+        NcType::Int64 => return Ok(StoredType::I64),
+        NcType::UInt64 => return Ok(StoredType::U64),
         NcType::Byte if unsigned => SampleType::U8,
         NcType::Short if unsigned => SampleType::U16,
         NcType::Int if unsigned => SampleType::U32,
@@ -230,9 +254,7 @@ fn sample_type(ty: &NcType, unsigned: bool) -> Parsed<SampleType> {
         NcType::UInt => SampleType::U32,
         NcType::Float => SampleType::F32,
         NcType::Double => SampleType::F64,
-        NcType::Int64 => return Err("int64".into()),
-        NcType::UInt64 => return Err("uint64".into()),
         NcType::Char | NcType::String => return Err("text".into()),
         _ => return Err("a type of its own".into()),
-    })
+    }))
 }

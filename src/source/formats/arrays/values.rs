@@ -1,7 +1,8 @@
 //! What the numbers of a variable mean, by the attributes of the NetCDF conventions.
 
 use super::Variable;
-use crate::base::sample::SampleType;
+use crate::base::sample::{self, SampleType};
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use crate::source::packing::Packing;
 
@@ -16,7 +17,8 @@ pub(super) struct Values {
 }
 
 impl Values {
-    pub(super) fn of(variable: &Variable, stored: SampleType) -> Parsed<Self> {
+    pub(super) fn of(variable: &Variable, ty: StoredType) -> Parsed<Self> {
+        let stored = ty.sample();
         let unit = variable.text("units").filter(|unit| !unit.is_empty()).map(String::from);
         let declared = [variable.numbers("_FillValue"), variable.numbers("missing_value")].concat();
         let mut missing: Vec<f64> = Vec::new();
@@ -31,8 +33,11 @@ impl Values {
             valid: valid(variable, stored),
             missing,
         };
-        let is_plain =
-            packing.missing.len() < 2 && packing == Packing { missing: packing.missing.clone(), ..Packing::NONE };
+        // What stands for missing ones among integers of 64 bits may be none of 32.
+        let fits = packing.missing.iter().all(|value| !ty.is_wide() || sample::round_to(stored, *value) == *value);
+        let is_plain = fits
+            && packing.missing.len() < 2
+            && packing == Packing { missing: packing.missing.clone(), ..Packing::NONE };
         if is_plain {
             let missing = packing.missing.first().copied().or((!declared.is_empty()).then_some(f64::NAN));
             return Ok(Self { sample: stored, packing: None, missing, unit });
@@ -49,7 +54,7 @@ impl Values {
 
 /// A number as it is among the stored ones: attributes may be of another type.
 fn as_stored(stored: SampleType, value: f64) -> f64 {
-    if stored.is_float() { crate::base::sample::round_to(stored, value) } else { value }
+    if stored.is_float() { sample::round_to(stored, value) } else { value }
 }
 
 /// The least and the largest stored number that is valid; what is no number is no limit.

@@ -5,6 +5,7 @@ use super::{ArrayFile, Attribute, Attributes, ReadConfig, Variable};
 use crate::base::description::{self, NumberType};
 use crate::base::error::{Error, Result};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use serde_json::Value;
 use std::ops::Range;
@@ -35,14 +36,14 @@ impl ArrayFile for ZarrArrayFile {
         Ok(all)
     }
 
-    fn read(&self, path: &str, sample: SampleType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
+    fn read(&self, path: &str, ty: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
         let ranges: Vec<_> = ranges.iter().map(|r| r.start as u64..r.end as u64).collect();
         let bytes = array.retrieve_array_subset::<ArrayBytes<'_>>(&ArraySubset::new_with_ranges(&ranges));
         let bytes = bytes.map_err(|e| e.to_string())?.into_fixed().map_err(|e| e.to_string())?;
         let mut bytes = bytes.into_owned();
         if cfg!(target_endian = "big") {
-            crate::base::sample::swap_endian(sample, &mut bytes);
+            ty.swap_endian(&mut bytes);
         }
         Ok(bytes)
     }
@@ -160,7 +161,7 @@ fn variable(array: &Array<FilesystemStore>) -> Variable {
     let chunk = chunk.map(|chunk| chunk.iter().map(|n| length(&n.get())).collect());
     let mut variable = Variable {
         path: array.path().as_str().into(),
-        sample: sample_type(array.data_type()),
+        sample: stored_type(array.data_type()),
         dims: vec![String::new(); lengths.len()],
         lengths,
         chunk,
@@ -209,7 +210,7 @@ fn attribute(value: &Value) -> Option<Attribute> {
     })
 }
 
-fn sample_type(ty: &DataType) -> Parsed<SampleType> {
+fn stored_type(ty: &DataType) -> Parsed<StoredType> {
     let types = [
         (data_type::uint8(), SampleType::U8),
         (data_type::int8(), SampleType::I8),
@@ -221,5 +222,7 @@ fn sample_type(ty: &DataType) -> Parsed<SampleType> {
         (data_type::float32(), SampleType::F32),
         (data_type::float64(), SampleType::F64),
     ];
-    types.into_iter().find(|(of, _)| of == ty).map(|(_, sample)| sample).ok_or_else(|| ty.to_string())
+    let types = types.into_iter().map(|(of, sample)| (of, StoredType::Sample(sample)));
+    let wide = [(data_type::int64(), StoredType::I64), (data_type::uint64(), StoredType::U64)];
+    types.chain(wide).find(|(of, _)| of == ty).map(|(_, stored)| stored).ok_or_else(|| ty.to_string())
 }

@@ -9,6 +9,7 @@ use crate::source::file_header::check_size;
 use crate::source::formats::shared::deflated::{Compression, Deflated, Place, check_room};
 use crate::source::formats::shared::pattern;
 use crate::source::formats::shared::pieces::{Piece, Pieces, Stream};
+use crate::source::layout::Layout;
 use crate::source::parts::{DataLocation, Part};
 use std::path::{Path, PathBuf};
 
@@ -73,7 +74,8 @@ impl Data<'_> {
     /// Where the samples start; if they are as they are, they must fill the rest of the file.
     fn start(&self, file: &FileBytes, header: u64, planes: usize, times: usize) -> Result<u64> {
         let refused = |e| Error::input(file.path(), e);
-        let shape = self.samples.flat(planes).map_err(refused)?;
+        let (shape, ty) = (self.samples.flat(planes).map_err(refused)?, self.samples.ty);
+        let bytes = Layout::plain(shape.dims(), times).bytes(ty.size()).map_err(refused)? as u64;
         let start = match self.skip {
             Some(0) => header,
             Some(n) if n >= header => n,
@@ -81,13 +83,12 @@ impl Data<'_> {
             None if self.samples.compressed => {
                 return Err(refused("HeaderSize -1 says nothing of where compressed samples start".into()));
             }
-            None => file.len().saturating_sub((shape.frame_bytes() as u64).saturating_mul(times as u64)).max(header),
+            None => file.len().saturating_sub(bytes).max(header),
         };
         let checked = if self.samples.compressed {
-            let bytes = (shape.frame_bytes() as u64).saturating_mul(times as u64);
             check_room(file.len().saturating_sub(start), bytes)
         } else {
-            check_size(file.len(), start, &shape, times)
+            check_size(file.len(), start, &shape, ty, times)
         };
         checked.map(|()| start).map_err(refused)
     }

@@ -10,6 +10,7 @@ use crate::base::description::{Attribute, Description, LPS, Values};
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::file_header::{FileHeader, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
@@ -87,6 +88,8 @@ struct MetaImageSamples {
     placed: Placed,
     /// As they are when turned.
     shape: Shape,
+    /// The type of the stored numbers.
+    ty: StoredType,
     frames: usize,
     components: usize,
     /// Which of them is meant.
@@ -102,7 +105,7 @@ impl MetaImageSamples {
         let components = Axis::new(Counts::Only(self.component), self.components);
         let voxels = self.placed.voxels(self.lengths);
         let axes = [Axis::new(Counts::Frames, frames)].into_iter().chain(voxels).chain([components]);
-        Stored::new(&Layout(axes.collect()), self.shape.sample(), self.big_endian)
+        Stored::new(&Layout(axes.collect()), self.ty, self.big_endian)
     }
 
     /// Some planes as if components were voxels beside one another.
@@ -128,7 +131,8 @@ fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImag
     }
     let placed = directions(header, axes)?.placed(lengths, "directions of the MetaImage");
     let dims = Layout(placed.voxels(lengths).to_vec()).dims();
-    let shape = Shape::new(dims, sample_type(header.required("ElementType")?)?)?;
+    let ty = stored_type(header.required("ElementType")?)?;
+    let shape = Shape::new(dims, ty.sample())?;
     let components = header.get("elementnumberofchannels").unwrap_or("1");
     let components = components.parse().map_err(|_| format!("ElementNumberOfChannels {components:?} is no number"))?;
     let (component, variable) = component::of_only(None, components, variable)?;
@@ -139,6 +143,7 @@ fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImag
         lengths,
         placed,
         shape,
+        ty,
         frames,
         components,
         component,
@@ -150,8 +155,8 @@ fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImag
     Ok(samples)
 }
 
-fn sample_type(name: &str) -> Parsed<SampleType> {
-    Ok(match name.strip_suffix("_ARRAY").unwrap_or(name) {
+fn stored_type(name: &str) -> Parsed<StoredType> {
+    Ok(StoredType::Sample(match name.strip_suffix("_ARRAY").unwrap_or(name) {
         "MET_CHAR" => SampleType::I8,
         "MET_UCHAR" => SampleType::U8,
         "MET_SHORT" => SampleType::I16,
@@ -160,11 +165,13 @@ fn sample_type(name: &str) -> Parsed<SampleType> {
         "MET_UINT" | "MET_ULONG" => SampleType::U32,
         "MET_FLOAT" => SampleType::F32,
         "MET_DOUBLE" => SampleType::F64,
+        "MET_LONG_LONG" => return Ok(StoredType::I64),
+        "MET_ULONG_LONG" => return Ok(StoredType::U64),
         _ => {
-            let types = "MET_CHAR to MET_UINT, MET_FLOAT and MET_DOUBLE are";
+            let types = "MET_CHAR to MET_ULONG_LONG, MET_FLOAT and MET_DOUBLE are";
             return Err(format!("ElementType {name} is not supported; {types}"));
         }
-    })
+    }))
 }
 
 /// Where voxels are in the world.

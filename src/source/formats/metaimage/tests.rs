@@ -189,7 +189,7 @@ fn what_is_not_supported_is_named() {
         assert!(good.contains(from));
         refused(&[folder.write("a.mha", good.replacen(from, to, 1))], &options(), words);
     };
-    with("MET_SHORT", "MET_LONG_LONG", "ElementType MET_LONG_LONG is not supported");
+    with("MET_SHORT", "MET_OTHER", "ElementType MET_OTHER is not supported");
     with("ElementType = MET_SHORT", "", "does not say ElementType");
     with("ObjectType", "BinaryData = False\nObjectType", "as text");
     with("ObjectType", "CompressedData = Perhaps\nObjectType", "neither True nor False");

@@ -11,6 +11,7 @@ use crate::base::description::{Attribute, Description, NIFTI_HEADER, NumberType,
 use crate::base::error::{Error, Note, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::file_header::{FileHeader, Units, check_size, head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
@@ -78,7 +79,7 @@ fn header_bytes(path: &Path) -> Result<(Vec<u8>, bool)> {
 struct NiftiSamples {
     layout: Layout,
     shape: Shape,
-    stored: SampleType,
+    ty: StoredType,
     packing: Option<Packing>,
     components: usize,
     /// What is known but not where the samples are.
@@ -101,9 +102,9 @@ impl NiftiSamples {
         let placed = header.directions().placed([x, y, z], "directions of the NIfTI");
         let slow = [Axis::new(Counts::Only(index), components), Axis::new(Counts::Frames, frames)];
         let layout = Layout(slow.into_iter().chain(placed.voxels([x, y, z])).collect());
-        let stored = sample_type(header.datatype)?;
+        let ty = stored_type(header.datatype)?;
         let packing = packing(header)?;
-        let sample = packing.as_ref().map_or(stored, |packing| packing.sample(stored));
+        let sample = packing.as_ref().map_or(ty.sample(), |packing| packing.sample(ty.sample()));
         let shape = Shape::new(layout.dims(), sample)?;
         let known = Placement {
             spacing: placed.spacing,
@@ -111,7 +112,7 @@ impl NiftiSamples {
             variable,
             notes: placed.note.into_iter().collect(),
         };
-        Ok(Self { layout, shape, stored, packing, components, known })
+        Ok(Self { layout, shape, ty, packing, components, known })
     }
 
     fn part(&self, header: &NiftiHeader, data: &Path, compressed: bool) -> Result<Part> {
@@ -122,11 +123,10 @@ impl NiftiSamples {
         let big_endian = header.big_endian;
         let mut part = if compressed {
             let stream = Stream { compression: Compression::Gzip, start: 0, skip: start };
-            stream.part((data, file.state()), &self.layout, self.stored, big_endian).map_err(refused)?
+            stream.part((data, file.state()), &self.layout, self.ty, big_endian).map_err(refused)?
         } else {
-            let stored = Stored::new(&self.layout, self.stored, big_endian).map_err(refused)?;
-            let whole = Shape::new(self.shape.dims(), self.stored).map_err(refused)?;
-            check_size(file.len(), start, &whole, frames * self.components).map_err(refused)?;
+            let stored = Stored::new(&self.layout, self.ty, big_endian).map_err(refused)?;
+            check_size(file.len(), start, &self.shape, self.ty, frames * self.components).map_err(refused)?;
             Part { path: data.into(), state: file.state(), frames, stored, at: DataLocation::Byte(start) }
         };
         part.stored.packing.clone_from(&self.packing);
@@ -172,30 +172,28 @@ fn lengths(dim: &[i64; 8]) -> Parsed<[usize; 5]> {
     Ok([x, y, z, t, v])
 }
 
-fn sample_type(datatype: i64) -> Parsed<SampleType> {
+fn stored_type(datatype: i64) -> Parsed<StoredType> {
     let name = match datatype {
-        2 => return Ok(SampleType::U8),
-        4 => return Ok(SampleType::I16),
-        8 => return Ok(SampleType::I32),
-        16 => return Ok(SampleType::F32),
-        64 => return Ok(SampleType::F64),
-        256 => return Ok(SampleType::I8),
-        512 => return Ok(SampleType::U16),
-        768 => return Ok(SampleType::U32),
+        2 => return Ok(SampleType::U8.into()),
+        4 => return Ok(SampleType::I16.into()),
+        8 => return Ok(SampleType::I32.into()),
+        16 => return Ok(SampleType::F32.into()),
+        64 => return Ok(SampleType::F64.into()),
+        256 => return Ok(SampleType::I8.into()),
+        512 => return Ok(SampleType::U16.into()),
+        768 => return Ok(SampleType::U32.into()),
         1 => "single bits",
         32 => "complex numbers of 2 x 32 bits",
         128 => "colours of 3 x 8 bits",
-        1024 => "integers of 64 bits",
-        1280 => "unsigned integers of 64 bits",
+        1024 => return Ok(StoredType::I64),
+        1280 => return Ok(StoredType::U64),
         1536 => "floats of 128 bits",
         1792 => "complex numbers of 2 x 64 bits",
         2048 => "complex numbers of 2 x 128 bits",
         2304 => "colours of 4 x 8 bits",
         _ => return Err(format!("datatype {datatype} is not known")),
     };
-    Err(format!(
-        "its samples are {name} (datatype {datatype}); supported are integers up to 32 bits, float32 and float64"
-    ))
+    Err(format!("its samples are {name} (datatype {datatype}); supported are integers, float32 and float64"))
 }
 
 /// None if the stored numbers are the samples.

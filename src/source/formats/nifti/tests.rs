@@ -275,7 +275,7 @@ fn what_is_not_supported_is_named() {
         change(&mut header);
         refused(&[folder.write("a.nii", header.with(&samples))], &options(), words);
     };
-    for (datatype, words) in [(32, "complex"), (128, "colours of 3"), (1024, "integers of 64 bits"), (7, "not known")] {
+    for (datatype, words) in [(32, "complex"), (128, "colours of 3"), (1536, "floats of 128 bits"), (7, "not known")] {
         with(&|h| h.put(DATATYPE, &i16::to_le_bytes(datatype)), words);
     }
     with(&|h| h.dim(0, 2), "2 dimension(s)");

@@ -44,7 +44,7 @@ pub(super) fn parts(file: &FileBytes, header: &NrrdHeader, array: &NrrdSamples) 
         let layout = array.layout.clone().with_frames(frames);
         return names.map(|name| array.part(&open(&name)?, 0, &skip, &layout)).collect();
     }
-    let bytes = array.layout.bytes(array.shape.sample().size()).map_err(refused)? / count;
+    let bytes = array.layout.bytes(array.ty.size()).map_err(refused)? / count;
     let pieces = names.map(|name| array.piece(&open(&name)?, &skip, bytes)).collect::<Result<_>>()?;
     Ok(vec![array.of_pieces(file, pieces, bytes).map_err(refused)?])
 }
@@ -74,16 +74,17 @@ impl NrrdSamples {
     /// Frames that are in one file.
     fn part(&self, data: &FileBytes, header: u64, skip: &Skip, layout: &Layout) -> Result<Part> {
         let refused = |e| Error::input(data.path(), e);
-        let (sample, file) = (self.shape.sample(), (data.path(), data.state()));
-        let bytes = layout.bytes(sample.size()).map_err(refused)?;
+        let (ty, file) = (self.ty, (data.path(), data.state()));
+        let bytes = layout.bytes(ty.size()).map_err(refused)?;
         if self.gzip {
             let (start, skip) = skip.compressed(data, header)?;
             let stream = Stream { compression: Compression::Gzip, start, skip };
-            return stream.part(file, layout, sample, self.big_endian).map_err(refused);
+            return stream.part(file, layout, ty, self.big_endian).map_err(refused);
         }
         let start = skip.start(data, header, bytes)?;
-        check_size(data.len(), start, &self.shape, bytes / self.shape.frame_bytes()).map_err(refused)?;
-        let stored = Stored::new(layout, sample, self.big_endian).map_err(refused)?;
+        let frame = self.shape.frame_bytes() / self.shape.sample().size() * ty.size();
+        check_size(data.len(), start, &self.shape, ty, bytes / frame).map_err(refused)?;
+        let stored = Stored::new(layout, ty, self.big_endian).map_err(refused)?;
         let frames = layout.len(Counts::Frames);
         Ok(Part { path: data.path().into(), state: data.state(), frames, stored, at: DataLocation::Byte(start) })
     }
@@ -114,7 +115,7 @@ impl NrrdSamples {
         let in_turn = frames == 1 || self.axes.frames == Some(self.axes.sizes.len() - 1);
         let together = if in_turn { 1 } else { frames };
         let layout = self.layout.clone().with_frames(together);
-        let stored = Stored::new(&layout, self.shape.sample(), self.big_endian)?;
+        let stored = Stored::new(&layout, self.ty, self.big_endian)?;
         let (each, mut pieces) = (pieces.len() / (frames / together), pieces.into_iter());
         let placed = |(i, piece)| Piece { start: [i * bytes, 0, 0], ..piece };
         let groups = (0..frames / together).map(|_| pieces.by_ref().take(each).enumerate().map(placed).collect());

@@ -14,6 +14,7 @@ use crate::base::description::{Attribute, Description, Values};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::file_header::{FileHeader, growing_head};
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
@@ -52,6 +53,8 @@ struct NrrdSamples {
     axes: Axes,
     layout: Layout,
     shape: Shape,
+    /// The type of the stored numbers.
+    ty: StoredType,
     big_endian: bool,
     gzip: bool,
     placed: Placed,
@@ -72,10 +75,10 @@ impl NrrdSamples {
         let placed =
             axes.placed(header)?.placed(axes.voxels.map(|axis| axes.sizes[axis]), "space directions of the NRRD");
         let layout = layout(&axes, &placed, index);
-        let sample = sample_type(header.required("type")?)?;
-        let shape = Shape::new(layout.dims(), sample)?;
-        layout.bytes(sample.size())?;
-        Ok(Self { layout, shape, big_endian: big_endian(header, sample)?, gzip, axes, placed, variable })
+        let ty = stored_type(header.required("type")?)?;
+        let shape = Shape::new(layout.dims(), ty.sample())?;
+        layout.bytes(ty.size())?;
+        Ok(Self { layout, shape, ty, big_endian: big_endian(header, ty)?, gzip, axes, placed, variable })
     }
 }
 
@@ -96,19 +99,19 @@ fn layout(axes: &Axes, placed: &Placed, component: usize) -> Layout {
     Layout(axes.sizes.iter().enumerate().map(axis).rev().collect())
 }
 
-fn big_endian(header: &NrrdHeader, sample: SampleType) -> Parsed<bool> {
+fn big_endian(header: &NrrdHeader, ty: StoredType) -> Parsed<bool> {
     match header.get("endian").map(str::to_lowercase).as_deref() {
         Some("big") => Ok(true),
         Some("little") => Ok(false),
-        None if sample.size() == 1 => Ok(false),
+        None if ty.size() == 1 => Ok(false),
         None => Err("does not say its endian".into()),
         Some(other) => Err(format!("endian {other:?} is not known")),
     }
 }
 
-fn sample_type(name: &str) -> Parsed<SampleType> {
+fn stored_type(name: &str) -> Parsed<StoredType> {
     let plain = name.to_lowercase().split_whitespace().collect::<Vec<_>>().join(" ");
-    Ok(match plain.as_str() {
+    Ok(StoredType::Sample(match plain.as_str() {
         "signed char" | "int8" | "int8_t" => SampleType::I8,
         "uchar" | "unsigned char" | "uint8" | "uint8_t" => SampleType::U8,
         "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => SampleType::I16,
@@ -117,8 +120,18 @@ fn sample_type(name: &str) -> Parsed<SampleType> {
         "uint" | "unsigned int" | "uint32" | "uint32_t" => SampleType::U32,
         "float" => SampleType::F32,
         "double" => SampleType::F64,
-        _ => return Err(format!("type {name} is not supported; integers up to 32 bits, float and double are")),
-    })
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => return Ok(StoredType::I64),
+        "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
+            return Ok(StoredType::U64);
+        }
+        _ => return Err(format!("type {name} is not supported; integers, float and double are")),
+    }))
 }
 
 #[cfg(test)]

@@ -197,7 +197,7 @@ fn what_is_not_supported_is_named() {
         with("encoding: raw", &format!("encoding: {encoding}"), "only raw and gzip are");
     }
     with("encoding: raw", "encoding: raw\nencoding: raw", "twice");
-    with("short", "long long", "type long long is not supported");
+    with("short", "block", "type block is not supported");
     with("short", "block", "type block is not supported");
     with("little", "middle", "endian \"middle\"");
     with("endian: little\n", "", "does not say its endian");

@@ -1,13 +1,15 @@
-//! Frames in one compressed stream of gzip or zlib. Going back to an earlier frame starts again from the beginning.
+//! Frames in one compressed stream of deflate, gzip or zlib. Going back to an earlier frame starts again from the beginning.
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
+use crate::source::formats::shared::words::wrong;
 use crate::source::layout::{Counts, Layout};
 use crate::source::parts::{DataLocation, Decode, Part, Stored};
 use crate::source::spill_buffer::{SpillBuffer, read_some};
-use flate2::read::{MultiGzDecoder, ZlibDecoder};
+use flate2::Crc;
+use flate2::read::{DeflateDecoder, MultiGzDecoder, ZlibDecoder};
 use std::fmt;
 use std::io::{self, BufReader, Read};
 use std::ops::Range;
@@ -21,6 +23,10 @@ const MOST: u64 = 1032; // bytes that one compressed byte can stand for
 pub(in crate::source) enum Compression {
     Gzip,
     Zlib,
+    /// Without a header; what it holds has this CRC-32.
+    Deflate {
+        checksum: u32,
+    },
 }
 
 /// Where the frames are in a compressed stream.
@@ -55,18 +61,18 @@ impl Stream {
         self,
         (path, state): (&Path, State),
         array: &Layout,
-        sample: SampleType,
+        ty: StoredType,
         big_endian: bool,
     ) -> Parsed<Part> {
         let Self { compression, start, skip } = self;
-        let all = array.bytes(sample.size())?;
+        let all = array.bytes(ty.size())?;
         check_room(state.len, skip.saturating_add(all as u64))?;
         let (before, array) = array.chosen_part();
         let frames = array.len(Counts::Frames);
         let in_turn = array.0.first().is_none_or(|axis| axis.counts == Counts::Frames);
         let together = if in_turn { 1 } else { frames };
-        let (bytes, before) = (array.bytes(sample.size())?, before * sample.size());
-        let stored = Stored::new(&array.with_frames(together), sample, big_endian)?;
+        let (bytes, before) = (array.bytes(ty.size())?, before * ty.size());
+        let stored = Stored::new(&array.with_frames(together), ty, big_endian)?;
         let skip = skip + before as u64;
         let place = Place { compression, start, skip, together, frames, frame_bytes: bytes / frames };
         let decoder = Deflated { after: (all - before - bytes) as u64, ..Deflated::new(place) };
@@ -115,6 +121,9 @@ impl Compression {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(reader)),
             Self::Zlib => Box::new(ZlibDecoder::new(reader)),
+            Self::Deflate { checksum } => {
+                Box::new(Checked { reader: DeflateDecoder::new(reader), crc: Crc::new(), checksum })
+            }
         }
     }
 
@@ -125,6 +134,24 @@ impl Compression {
             file.read_at(start, &mut magic).map_err(|e| Error::io(file.path(), "reading", e))?;
         }
         Ok(if magic == [0x1f, 0x8b] { Self::Gzip } else { Self::Zlib })
+    }
+}
+
+/// What a reader gives, with an error at its end if its checksum is wrong.
+struct Checked<R> {
+    reader: R,
+    crc: Crc,
+    checksum: u32,
+}
+
+impl<R: Read> Read for Checked<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let got = self.reader.read(out)?;
+        self.crc.update(&out[..got]);
+        if got == 0 && !out.is_empty() && self.crc.sum() != self.checksum {
+            return Err(wrong("its checksum is wrong".into()));
+        }
+        Ok(got)
     }
 }
 

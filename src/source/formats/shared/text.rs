@@ -3,7 +3,8 @@
 use super::pieces::Packed;
 use super::words::wrong;
 use crate::base::mapped::FileBytes;
-use crate::base::sample::{self, SampleType, swap_endian};
+use crate::base::sample::{self, SampleType};
+use crate::base::stored::StoredType;
 use std::io::{self, Read};
 
 const PIECE: usize = 64 << 10; // bytes read at a time
@@ -40,19 +41,19 @@ impl Characters {
 pub(in crate::source) struct Words {
     pub(in crate::source) start: u64,
     pub(in crate::source) count: usize,
-    pub(in crate::source) sample: SampleType,
+    pub(in crate::source) ty: StoredType,
 }
 
 impl Packed for Words {
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>> {
-        Ok(Box::new(Numbers::new(file, self.start, self.count, self.sample, true)))
+        Ok(Box::new(Numbers::new(file, self.start, self.count, self.ty, true)))
     }
 }
 
 /// The bytes of samples that are written as numbers.
 pub(in crate::source) struct Numbers {
     characters: Characters,
-    sample: SampleType,
+    ty: StoredType,
     big_endian: bool, // the bytes that are read
     count: usize,     // numbers that may come
     left: Vec<u8>,    // characters of a number that is not whole yet
@@ -62,15 +63,9 @@ pub(in crate::source) struct Numbers {
 
 impl Numbers {
     /// The first `count` numbers from a place in a file.
-    pub(in crate::source) fn new(
-        file: FileBytes,
-        start: u64,
-        count: usize,
-        sample: SampleType,
-        big_endian: bool,
-    ) -> Self {
+    pub(in crate::source) fn new(file: FileBytes, start: u64, count: usize, ty: StoredType, big_endian: bool) -> Self {
         let characters = Characters::new(file, start);
-        Self { characters, sample, big_endian, count, left: Vec::new(), samples: Vec::new(), used: 0 }
+        Self { characters, ty, big_endian, count, left: Vec::new(), samples: Vec::new(), used: 0 }
     }
 
     fn refill(&mut self) -> io::Result<()> {
@@ -81,33 +76,45 @@ impl Numbers {
             let whole = if self.characters.ended { self.left.len() } else { space.unwrap_or(0) };
             let text: Vec<u8> = self.left.drain(..whole).collect();
             let words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take(self.count);
-            let values: Vec<f64> = words.map(|word| self.value(word)).collect::<io::Result<_>>()?;
-            self.count -= values.len();
+            let mut samples = Vec::new();
+            for word in words {
+                self.count -= 1;
+                append(word, self.ty, &mut samples).ok_or_else(|| no_number(word))?;
+            }
             if self.left.len() > PIECE {
                 return Err(no_number(&self.left));
             }
-            self.samples.resize(values.len() * self.sample.size(), 0);
-            sample::store(self.sample, &values, &mut self.samples);
             if self.big_endian {
-                swap_endian(self.sample, &mut self.samples);
+                self.ty.swap_endian(&mut samples);
             }
+            self.samples = samples;
         }
         Ok(())
     }
+}
 
-    /// A number that samples of this type can be.
-    fn value(&self, word: &[u8]) -> io::Result<f64> {
-        let text = std::str::from_utf8(word).map_err(|_| no_number(word))?;
-        if self.sample == SampleType::F32 {
-            return text.parse::<f32>().map(f64::from).map_err(|_| no_number(word));
+/// Appends the bytes of a number, the least significant one first; none if it is none that its type can hold.
+fn append(word: &[u8], ty: StoredType, bytes: &mut Vec<u8>) -> Option<()> {
+    let text = std::str::from_utf8(word).ok()?;
+    match ty {
+        StoredType::I64 => bytes.extend(text.parse::<i64>().ok()?.to_le_bytes()),
+        StoredType::U64 => bytes.extend(text.parse::<u64>().ok()?.to_le_bytes()),
+        StoredType::Sample(ty) => {
+            let (value, start) = (value(text, ty)?, bytes.len());
+            bytes.resize(start + ty.size(), 0);
+            sample::store(ty, &[value], &mut bytes[start..]);
         }
-        let value: f64 = text.parse().map_err(|_| no_number(word))?;
-        let (mut bytes, mut stored) = (vec![0; self.sample.size()], [value]);
-        sample::store(self.sample, &stored, &mut bytes);
-        sample::load(self.sample, &bytes, &mut stored);
-        let held = self.sample.is_float() || stored[0] == value;
-        if held { Ok(value) } else { Err(no_number(word)) }
     }
+    Some(())
+}
+
+/// A number that samples of this type can be.
+fn value(text: &str, ty: SampleType) -> Option<f64> {
+    if ty == SampleType::F32 {
+        return text.parse::<f32>().map(f64::from).ok();
+    }
+    let value: f64 = text.parse().ok()?;
+    (ty.is_float() || sample::round_to(ty, value) == value).then_some(value)
 }
 
 fn no_number(word: &[u8]) -> io::Error {

@@ -4,7 +4,7 @@ use super::blocks::Blocks;
 use super::count::Count;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::base::sample::SampleType;
+use crate::base::stored::StoredType;
 use crate::source::formats::shared::base64::Text;
 use crate::source::formats::shared::deflated::FileReader;
 use crate::source::formats::shared::pieces::Packed;
@@ -32,7 +32,7 @@ pub(super) struct EncodedArray {
     pub(super) form: Form,
     pub(super) compressed: bool,
     pub(super) count: Count,
-    pub(super) sample: SampleType,
+    pub(super) ty: StoredType,
     /// Bytes of its samples.
     pub(super) bytes: usize,
 }
@@ -95,8 +95,8 @@ impl EncodedArray {
             Form::Raw => Box::new(FileReader::new(file, self.start)),
             Form::Base64 | Form::AppendedBase64 => Box::new(Text::new(file, self.start)),
             Form::Ascii => {
-                let count = self.bytes / self.sample.size() + 1; // one too many is noticed
-                Box::new(Numbers::new(file, self.start, count, self.sample, self.count.big_endian))
+                let count = self.bytes / self.ty.size() + 1; // one too many is noticed
+                Box::new(Numbers::new(file, self.start, count, self.ty, self.count.big_endian))
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What the XML of a `.vti` or a `.pvti` says.
+//! What the XML of a `.vti` or a `.vtr` says, or of a list of such pieces.
 
 use super::extent::Extent;
 use crate::source::Parsed;
@@ -29,11 +29,15 @@ pub(super) struct VtiPiece {
     /// The file that it is in, if this file is a list of pieces.
     pub(super) source: Option<String>,
     pub(super) arrays: Vec<VtiArray>,
+    /// Where its points are along x, y, z, if it is rectilinear.
+    pub(super) coordinates: Vec<VtiArray>,
 }
 
 /// The file, as it is written; what it leaves out has the value that VTK gives it.
 #[derive(Debug)]
 pub(super) struct VtiHeader {
+    /// Whether its points are at coordinates of their own, not on a lattice.
+    pub(super) rectilinear: bool,
     /// Whether it lists pieces that are files of their own.
     pub(super) parallel: bool,
     pub(super) big_endian: bool,
@@ -63,12 +67,14 @@ pub(super) struct VtiHeader {
 enum Inside {
     Nothing,
     FieldData,
+    Coordinates,
     Samples(Association),
 }
 
 impl VtiHeader {
     fn new() -> Self {
         Self {
+            rectilinear: false,
             parallel: false,
             big_endian: false,
             wide: false,
@@ -111,12 +117,16 @@ impl VtiHeader {
     fn element(&mut self, e: &BytesStart<'_>, text: u64) -> Parsed<()> {
         match e.name().as_ref() {
             "VTKFile" => self.file(e),
-            "ImageData" | "PImageData" => self.image(e),
+            "ImageData" | "PImageData" | "RectilinearGrid" | "PRectilinearGrid" => self.image(e),
             "Piece" => self.piece(e),
             "PointData" | "PPointData" => self.section(e, Association::Points),
             "CellData" | "PCellData" => self.section(e, Association::Cells),
             "FieldData" => {
                 self.inside = Inside::FieldData;
+                Ok(())
+            }
+            "Coordinates" | "PCoordinates" => {
+                self.inside = Inside::Coordinates;
                 Ok(())
             }
             "DataArray" | "PDataArray" => self.array(e, text),
@@ -129,10 +139,12 @@ impl VtiHeader {
     }
 
     fn file(&mut self, e: &BytesStart<'_>) -> Parsed<()> {
-        self.parallel = match required(e, "type")?.as_str() {
-            "ImageData" => false,
-            "PImageData" => true,
-            ty => return Err(format!("is a VTK file of type {ty}; ImageData and PImageData are supported")),
+        (self.parallel, self.rectilinear) = match required(e, "type")?.as_str() {
+            "ImageData" => (false, false),
+            "PImageData" => (true, false),
+            "RectilinearGrid" => (false, true),
+            "PRectilinearGrid" => (true, true),
+            ty => return Err(format!("is a VTK file of type {ty}; ImageData and RectilinearGrid are supported")),
         };
         self.compressed = match attribute(e, "compressor")?.as_deref() {
             None | Some("") => false,
@@ -175,7 +187,7 @@ impl VtiHeader {
         if self.parallel && source.is_none() {
             return Err("has a <Piece> without a Source".into());
         }
-        self.pieces.push(VtiPiece { extent, source, arrays: Vec::new() });
+        self.pieces.push(VtiPiece { extent, source, arrays: Vec::new(), coordinates: Vec::new() });
         Ok(())
     }
 
@@ -192,6 +204,7 @@ impl VtiHeader {
         let of = match self.inside {
             Inside::Samples(of) if name != "vtkGhostType" => of, // VTK's own marks
             Inside::FieldData if name == "TimeValue" => Association::Points,
+            Inside::Coordinates => Association::Points,
             _ => return Ok(()),
         };
         let number = |attribute: &str, text: String| format!("array {name}: {attribute} {text:?} is no number");
@@ -208,6 +221,8 @@ impl VtiHeader {
         };
         match (self.inside, self.pieces.last_mut()) {
             (Inside::FieldData, _) => self.time = Some(array),
+            (Inside::Coordinates, Some(piece)) if !self.parallel => piece.coordinates.push(array),
+            (Inside::Coordinates, _) => {} // the files of its pieces say where
             (_, Some(piece)) if !self.parallel => piece.arrays.push(array),
             _ => self.declared.push(array),
         }
@@ -215,7 +230,10 @@ impl VtiHeader {
     }
 
     fn end(&mut self, name: &str) {
-        if matches!(name, "PointData" | "CellData" | "PPointData" | "PCellData" | "FieldData") {
+        if matches!(
+            name,
+            "PointData" | "CellData" | "PPointData" | "PCellData" | "FieldData" | "Coordinates" | "PCoordinates"
+        ) {
             self.inside = Inside::Nothing;
         }
     }

@@ -6,7 +6,8 @@ use super::header::{self, VtiArray, VtiHeader};
 use super::skeleton::Skeleton;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
-use crate::base::sample::{self, SampleType, swap_endian};
+use crate::base::sample::{self, SampleType};
+use crate::base::stored::StoredType;
 use crate::source::formats::shared::pieces::Packed;
 use std::io::Read;
 use std::path::Path;
@@ -29,7 +30,7 @@ impl VtiFile {
     }
 
     /// Where an array is, checked to be all there.
-    pub(super) fn encoded(&self, array: &VtiArray, sample: SampleType, bytes: usize) -> Result<EncodedArray> {
+    pub(super) fn encoded(&self, array: &VtiArray, ty: StoredType, bytes: usize) -> Result<EncodedArray> {
         let refused = |e| Error::input(self.file.path(), e);
         let VtiHeader { wide, big_endian, compressed, .. } = self.header;
         let count = Count { wide, big_endian };
@@ -46,7 +47,7 @@ impl VtiFile {
                 return Err(refused(format!("data in format {other:?} is not supported; write it appended or binary")));
             }
         };
-        let encoded = EncodedArray { start, form, compressed, count, sample, bytes };
+        let encoded = EncodedArray { start, form, compressed, count, ty, bytes };
         encoded.check(&self.file)?;
         Ok(encoded)
     }
@@ -68,14 +69,17 @@ impl VtiFile {
     /// The time that the file is of, if it says so as a floating-point number.
     pub(super) fn time(&self) -> Result<Option<f64>> {
         let Some(array) = &self.header.time else { return Ok(None) };
-        let Some(ty) = sample_type(&array.ty).filter(|ty| ty.is_float()) else { return Ok(None) };
+        let Some(StoredType::Sample(ty)) = stored_type(&array.ty) else { return Ok(None) };
+        if !ty.is_float() {
+            return Ok(None);
+        }
         let failed = |e| Error::io(self.file.path(), "reading its TimeValue", e);
-        let encoded = self.encoded(array, ty, ty.size())?;
+        let encoded = self.encoded(array, ty.into(), ty.size())?;
         let mut bytes = vec![0; ty.size()];
         let file = FileBytes::open(self.file.path(), Access::Read)?;
         encoded.open(file).and_then(|mut reader| reader.read_exact(&mut bytes)).map_err(failed)?;
         if self.header.big_endian {
-            swap_endian(ty, &mut bytes);
+            sample::swap_endian(ty, &mut bytes);
         }
         let mut value = [0.0];
         sample::load(ty, &bytes, &mut value);
@@ -83,9 +87,9 @@ impl VtiFile {
     }
 }
 
-/// The type of samples that a name stands for.
-pub(super) fn sample_type(name: &str) -> Option<SampleType> {
-    Some(match name {
+/// The type of numbers that a name stands for.
+pub(super) fn stored_type(name: &str) -> Option<StoredType> {
+    Some(StoredType::Sample(match name {
         "UInt8" => SampleType::U8,
         "Int8" => SampleType::I8,
         "UInt16" => SampleType::U16,
@@ -94,6 +98,8 @@ pub(super) fn sample_type(name: &str) -> Option<SampleType> {
         "Int32" => SampleType::I32,
         "Float32" => SampleType::F32,
         "Float64" => SampleType::F64,
+        "Int64" => return Some(StoredType::I64),
+        "UInt64" => return Some(StoredType::U64),
         _ => return None,
-    })
+    }))
 }

@@ -1,4 +1,5 @@
-//! VTK's image data: one array of a `.vti`, or of the files of a `.pvti`, put together from its pieces.
+//! VTK's image data and rectilinear grids: one array of a `.vti` or `.vtr`, or of the files of a `.pvti` or `.pvtr`,
+//! put together from its pieces.
 
 mod blocks;
 mod count;
@@ -7,12 +8,14 @@ mod extent;
 mod header;
 mod image;
 mod pieced;
+mod rectilinear;
 mod skeleton;
 
 use super::shared::component::{self, Chosen};
 use super::shared::directions::{Directions, Placed};
 use crate::base::description::Description;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
+use crate::base::stored::StoredType;
 use crate::source::file_header::FileHeader;
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
@@ -20,21 +23,24 @@ use crate::source::parts::Stored;
 use crate::source::{Advised, Parsed, VariableInfo};
 use extent::Extent;
 use header::{VtiArray, VtiHeader};
-use image::{VtiFile, sample_type};
+use image::{VtiFile, stored_type};
 use std::path::Path;
 
 /// Reads the XML of one file, and of those that it lists, and checks that the array is all there.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let image = VtiFile::open(path)?;
     let header = &image.header;
-    let wanted = ChosenArray::of(header, variable).map_err(|e| Error::input(path, e))?;
+    let points = header.rectilinear.then(|| rectilinear::coordinates(&image)).transpose()?;
+    let wanted = ChosenArray::of(header, variable, points.as_ref()).map_err(|e| Error::input(path, e))?;
     let (part, time) = pieced::part(&image, &wanted)?;
     let array = wanted.array;
-    let description = wanted.description(header).map_err(|e| Error::input(path, e))?;
+    let description = wanted.description(header, points.as_ref()).map_err(|e| Error::input(path, e))?;
     let variable = Some(component::label(&array.name, array.components, wanted.chosen.component));
     let Placed { spacing, origin, note, .. } = wanted.placed;
-    let (times, notes): (_, Vec<_>) = (time.into_iter().collect(), note.into_iter().collect());
-    let description = (!notes.is_empty()).then_some(description);
+    let is_described = note.is_some() || points.is_some();
+    let note = note.into_iter().chain(wanted.uneven);
+    let (times, notes) = (time.into_iter().collect(), note.collect());
+    let description = is_described.then_some(description);
     Ok(FileHeader {
         spacing,
         origin,
@@ -54,7 +60,7 @@ pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
         return Ok(Vec::new());
     }
     let variable = |array: &VtiArray| {
-        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        let sample = stored_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
         VariableInfo::volume(&array.name, sample, array.of.dims(points), array.components)
     };
     Ok(header.arrays().iter().map(variable).collect())
@@ -68,38 +74,56 @@ struct ChosenArray<'a> {
     /// Voxels along its axes, the fastest first, as they are stored.
     lengths: [usize; 3],
     placed: Placed,
+    /// A note on axes along which samples are not evenly spaced.
+    uneven: Option<Note>,
     /// As they are when turned.
     shape: Shape,
+    /// The type of the stored numbers.
+    ty: StoredType,
     /// Bytes of all components of a sample.
     voxel: usize,
 }
 
 impl<'a> ChosenArray<'a> {
-    fn of(header: &'a VtiHeader, variable: Option<&str>) -> Advised<Self> {
+    fn of(header: &'a VtiHeader, variable: Option<&str>, coordinates: Option<&[Vec<f64>; 3]>) -> Advised<Self> {
         let chosen = component::choose(&header.names(), header.active(), variable)?;
         let array = &header.arrays()[chosen.array];
         let points = header.whole.points()?;
-        let Some(sample) = sample_type(&array.ty) else {
-            let types = "UInt8 to Int32, Float32 and Float64 are";
+        let Some(ty) = stored_type(&array.ty) else {
+            let types = "UInt8 to Int64, Float32 and Float64 are";
             return Err(format!("array {}: type {} is not supported; {types}", array.name, array.ty).into());
         };
         let lengths = array.of.dims(points);
-        let placed = directions(header, array, points)?.placed(lengths, "directions of the .vti");
-        let shape = Shape::new(Layout(placed.voxels(lengths).to_vec()).dims(), sample)?;
-        let voxel = array.components.checked_mul(sample.size()).ok_or("its samples have too many components")?;
-        Ok(Self { array, chosen, whole: header.whole, lengths, placed, shape, voxel })
+        let (directions, uneven) = match coordinates {
+            Some(coordinates) => rectilinear::directions(coordinates, array.of)?,
+            None => (directions(header, array, points)?, Vec::new()),
+        };
+        let placed = directions.placed(lengths, "directions of the .vti");
+        let uneven = (!uneven.is_empty()).then(|| {
+            let axes = uneven.join(", ");
+            format!("the coordinates along {axes} are not regular: their mean step is taken").into()
+        });
+        let shape = Shape::new(Layout(placed.voxels(lengths).to_vec()).dims(), ty.sample())?;
+        let voxel = array.components.checked_mul(ty.size()).ok_or("its samples have too many components")?;
+        Ok(Self { array, chosen, whole: header.whole, lengths, placed, uneven, shape, ty, voxel })
     }
 
-    /// The directions of the axes.
-    fn description(&self, header: &VtiHeader) -> Parsed<Description> {
-        let directions = directions(header, self.array, header.whole.points()?)?;
-        Ok(directions.description("VTK image data", "", &Layout(self.placed.voxels(self.lengths).to_vec())))
+    /// The directions of the axes, or the coordinates of a rectilinear grid.
+    fn description(&self, header: &VtiHeader, points: Option<&[Vec<f64>; 3]>) -> Parsed<Description> {
+        let layout = Layout(self.placed.voxels(self.lengths).to_vec());
+        match points {
+            Some(points) => Ok(rectilinear::description(points, self.array.of, &layout)),
+            None => {
+                let directions = directions(header, self.array, header.whole.points()?)?;
+                Ok(directions.description("VTK image data", "", &layout))
+            }
+        }
     }
 
     fn stored(&self, big_endian: bool) -> Parsed<Stored> {
         let components = Axis::new(Counts::Only(self.chosen.component), self.array.components);
         let layout = Layout(self.placed.voxels(self.lengths).into_iter().chain([components]).collect());
-        Stored::new(&layout, self.shape.sample(), big_endian)
+        Stored::new(&layout, self.ty, big_endian)
     }
 }
 

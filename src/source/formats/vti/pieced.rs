@@ -7,7 +7,7 @@ use super::header::{VtiArray, VtiPiece};
 use super::image::VtiFile;
 use crate::base::error::{Error, Result};
 use crate::source::formats::shared::pieces::{self, Pieces};
-use crate::source::layout::Shape;
+use crate::source::layout::Layout;
 use crate::source::parts::{DataLocation, Part};
 use std::path::Path;
 
@@ -96,7 +96,7 @@ fn listed(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<LocatedPieces> {
 /// The array in a piece; none if it has no cell of the whole.
 fn locate(image: &VtiFile, piece: &VtiPiece, wanted: &ChosenArray<'_>) -> Result<Option<LocatedPiece>> {
     let refused = |e| Error::input(image.file.path(), e);
-    let (extent, whole, sample) = (piece.extent, &wanted.whole, wanted.shape.sample());
+    let (extent, whole) = (piece.extent, &wanted.whole);
     let Some(start) = extent.start_in(whole) else {
         return Err(refused(format!("has the piece {:?} outside of the whole {:?}", extent.0, whole.0)));
     };
@@ -109,10 +109,8 @@ fn locate(image: &VtiFile, piece: &VtiPiece, wanted: &ChosenArray<'_>) -> Result
         return Err(refused(format!("has a piece without the array {name} of {components} {ty}")));
     };
     let dims = of.dims(extent.points().map_err(refused)?);
-    let shape = Shape::new(dims, sample).map_err(refused)?;
-    let bytes = (shape.frame_bytes() / sample.size()).checked_mul(wanted.voxel);
-    let bytes = bytes.ok_or_else(|| refused("its array is too large".into()))?;
-    let encoded = image.encoded(array, sample, bytes)?;
+    let bytes = Layout::plain(dims, 1).bytes(wanted.voxel).map_err(refused)?;
+    let encoded = image.encoded(array, wanted.ty, bytes)?;
     let (path, state) = (image.file.path().into(), image.file.state());
     let piece = pieces::Piece { path, state, start, dims, samples: Box::new(encoded) };
     Ok(Some(LocatedPiece { extent, encoded, piece }))

@@ -155,8 +155,8 @@ fn what_is_not_supported_is_named() {
     with("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order", "but its extent and type need 105");
     with("LittleEndian", "MixedEndian", "byte_order \"MixedEndian\"");
     with("byte_order", "header_type=\"UInt16\" byte_order", "header_type \"UInt16\"");
-    with("type=\"ImageData\"", "type=\"RectilinearGrid\"", "of type RectilinearGrid");
-    with("type=\"UInt8\"", "type=\"Int64\"", "type Int64 is not supported");
+    with("type=\"ImageData\"", "type=\"StructuredGrid\"", "of type StructuredGrid");
+    with("type=\"UInt8\"", "type=\"Bit\"", "type Bit is not supported");
     with("type=\"UInt8\"", "type=\"UInt16\"", "its array has 105 bytes, but its extent and type need 210");
     with("Name=\"J\"", "Name=\"J\" NumberOfComponents=\"3\"", "3 components");
     with("</Piece>", "</Piece><Piece Extent=\"2 8 0 4 0 2\"></Piece>", "has a piece without the array J");

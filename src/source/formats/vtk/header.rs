@@ -4,6 +4,7 @@ use super::lines::Lines;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::{self, SampleType};
+use crate::base::stored::StoredType;
 use crate::source::Parsed;
 use crate::source::formats::shared::association::Association;
 use crate::source::formats::shared::pieces::Packed;
@@ -196,11 +197,11 @@ impl VtkHeader {
 
     /// A stored number, if its type is that of samples.
     fn time(&self, file: &FileBytes, start: u64, ty: &str) -> Result<Option<f64>> {
-        let Some(ty) = sample_type(ty) else { return Ok(None) };
+        let Some(StoredType::Sample(ty)) = stored_type(ty) else { return Ok(None) };
         let failed = |e| Error::io(file.path(), "reading its time", e);
         let mut bytes = vec![0; ty.size()];
         if self.ascii {
-            let words = Words { start, count: 1, sample: ty };
+            let words = Words { start, count: 1, ty: ty.into() };
             let file = FileBytes::open(file.path(), Access::Read)?;
             words.open(file).and_then(|mut reader| reader.read_exact(&mut bytes)).map_err(failed)?;
         } else {
@@ -246,15 +247,14 @@ fn skip_metadata(lines: &mut Lines<'_>) -> Result<()> {
 fn bits_of(ty: &str) -> Option<usize> {
     Some(match ty.to_lowercase().as_str() {
         "bit" => 1,
-        "long" | "unsigned_long" | "vtktypeint64" | "vtktypeuint64" => 64,
         "vtkidtype" => 32,
-        ty => 8 * sample_type(ty)?.size(),
+        ty => 8 * stored_type(ty)?.size(),
     })
 }
 
-/// The type of samples that a name stands for.
-pub(super) fn sample_type(name: &str) -> Option<SampleType> {
-    Some(match name.to_lowercase().as_str() {
+/// The type of numbers that a name stands for; `long` has 64 bits but on Windows.
+pub(super) fn stored_type(name: &str) -> Option<StoredType> {
+    Some(StoredType::Sample(match name.to_lowercase().as_str() {
         "unsigned_char" => SampleType::U8,
         "char" | "signed_char" => SampleType::I8,
         "unsigned_short" => SampleType::U16,
@@ -263,8 +263,10 @@ pub(super) fn sample_type(name: &str) -> Option<SampleType> {
         "int" => SampleType::I32,
         "float" => SampleType::F32,
         "double" => SampleType::F64,
+        "vtktypeint64" | "long" => return Some(StoredType::I64),
+        "vtktypeuint64" | "unsigned_long" => return Some(StoredType::U64),
         _ => return None,
-    })
+    }))
 }
 
 fn is_time(name: &str) -> bool {

@@ -10,12 +10,13 @@ use super::shared::pieces::{Piece, Pieces};
 use super::shared::text::Words;
 use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
+use crate::base::stored::StoredType;
 use crate::source::file_header::FileHeader;
 use crate::source::layout::Shape;
 use crate::source::layout::{Axis, Counts, Layout};
 use crate::source::parts::{DataLocation, Part, Stored};
 use crate::source::{Parsed, VariableInfo};
-use header::{VtkArray, VtkHeader, sample_type};
+use header::{VtkArray, VtkHeader, stored_type};
 use std::path::Path;
 
 /// Goes through the text of one file and finds the array.
@@ -26,7 +27,7 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     let chosen = chosen.map_err(|e| Error::input(path, e))?;
     let array = &header.arrays[chosen.array];
     let (shape, stored) = stored(&header, array, chosen).map_err(|e| Error::input(path, e))?;
-    let at = if header.ascii { text(&file, array, shape) } else { DataLocation::Byte(array.start) };
+    let at = if header.ascii { text(&file, array, stored.ty, shape.dims()) } else { DataLocation::Byte(array.start) };
     let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at };
     let mut described = FileHeader::plain(shape, vec![part]);
     described.spacing = header.spacing;
@@ -43,21 +44,20 @@ pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
         return Ok(Vec::new());
     }
     let variable = |array: &VtkArray| {
-        let sample = sample_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        let sample = stored_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
         VariableInfo::volume(&array.name, sample, array.of.dims(header.points), array.components)
     };
     Ok(header.arrays.iter().map(variable).collect())
 }
 
 /// An array as text: all of it is one piece.
-fn text(file: &FileBytes, array: &VtkArray, shape: Shape) -> DataLocation {
-    let (dims, sample) = (shape.dims(), shape.sample());
-    let samples = Words { start: array.start, count: array.components * array.tuples, sample };
+fn text(file: &FileBytes, array: &VtkArray, ty: StoredType, dims: [usize; 3]) -> DataLocation {
+    let samples = Words { start: array.start, count: array.components * array.tuples, ty };
     let (path, state) = (file.path().into(), file.state());
     let piece = Piece { path, state, start: [0; 3], dims, samples: Box::new(samples) };
     DataLocation::Decoded(Box::new(Pieces {
         dims,
-        voxel: array.components * sample.size(),
+        voxel: array.components * ty.size(),
         together: 1,
         frames: vec![vec![piece]],
     }))
@@ -65,18 +65,18 @@ fn text(file: &FileBytes, array: &VtkArray, shape: Shape) -> DataLocation {
 
 fn stored(header: &VtkHeader, array: &VtkArray, chosen: Chosen) -> Parsed<(Shape, Stored)> {
     let refused = |what: String| format!("array {}: {what}", array.name);
-    let Some(sample) = sample_type(&array.ty) else {
-        let types = "unsigned_char to int, float and double are";
+    let Some(ty) = stored_type(&array.ty) else {
+        let types = "unsigned_char to int, vtktypeint64, float and double are";
         return Err(refused(format!("type {} is not supported; {types}", array.ty)));
     };
-    let shape = Shape::new(array.of.dims(header.points), sample)?;
-    let samples = shape.frame_bytes() / sample.size();
+    let shape = Shape::new(array.of.dims(header.points), ty.sample())?;
+    let samples = shape.frame_bytes() / ty.sample().size();
     if array.tuples != samples {
         return Err(refused(format!("has {} samples, but DIMENSIONS need {samples}", array.tuples)));
     }
     let mut layout = Layout::plain(shape.dims(), 1);
     layout.0.push(Axis::new(Counts::Only(chosen.component), array.components));
-    Ok((shape, Stored::new(&layout, sample, true)?))
+    Ok((shape, Stored::new(&layout, ty, true)?))
 }
 
 #[cfg(test)]

@@ -1,0 +1,87 @@
+//! Arrays whose numbers are in the file as they are: they are not decoded, but read where they lie.
+
+use super::{Axis, Counts, Layout, Parsed, Stored, StoredType};
+
+/// Where the numbers of an array are. The last axis is the fastest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct InPlace {
+    /// The first byte.
+    pub(super) start: u64,
+    /// Bytes from an index of the first axis to the next, if others lie between them.
+    pub(super) record: Option<u64>,
+    /// Whether numbers have their most significant byte first.
+    pub(super) big_endian: bool,
+}
+
+impl InPlace {
+    /// How numbers of these axes are stored, all of which must be within so many bytes of the file.
+    pub(super) fn stored(self, axes: Vec<Axis>, ty: StoredType, file: u64) -> Parsed<Stored> {
+        let Some(first) = axes.first().copied() else { return Err("an array without axes is no volume".into()) };
+        let mut stored = Stored::new(&Layout(axes), ty, self.big_endian)?;
+        let inner = (stored.bytes / first.len) as u64;
+        let record = self.record.unwrap_or(inner);
+        let last = (first.len as u64 - 1).checked_mul(record).filter(|last| i64::try_from(*last).is_ok());
+        let end = last.and_then(|last| self.start.checked_add(last)?.checked_add(inner));
+        match end {
+            Some(end) if end <= file && record >= inner => {}
+            _ => return Err(format!("is cut short: its array does not end within the {file} bytes")),
+        }
+        let wider = record - inner; // between records
+        let strides = &mut stored.strides;
+        let skipped = match first.counts {
+            Counts::Frames => {
+                strides.frame = record;
+                0
+            }
+            Counts::Voxels(of) => {
+                strides.voxel[of] = if first.backwards { -(record as i64) } else { record as i64 };
+                if first.backwards { first.len as u64 - 1 } else { 0 }
+            }
+            Counts::Only(index) => index as u64,
+        };
+        strides.first += skipped * wider;
+        Ok(stored)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::sample::SampleType;
+
+    fn place(record: Option<u64>) -> InPlace {
+        InPlace { start: 100, record, big_endian: true }
+    }
+
+    #[test]
+    fn records_of_other_arrays_are_stepped_over() {
+        let axis = |counts| Axis::new(counts, 3);
+        for (first, backwards) in
+            [(Counts::Frames, false), (Counts::Voxels(2), false), (Counts::Voxels(2), true), (Counts::Only(2), false)]
+        {
+            let axes = vec![Axis { backwards, ..axis(first) }, axis(Counts::Voxels(1)), axis(Counts::Voxels(0))];
+            let plain = place(None).stored(axes.clone(), SampleType::I16.into(), 154).expect("54 bytes");
+            assert_eq!(place(Some(18)).stored(axes.clone(), SampleType::I16.into(), 154), Ok(plain));
+            let strides = place(Some(30)).stored(axes, SampleType::I16.into(), 178).expect("three records").strides;
+            assert_eq!(strides.voxel[..2], [2, 6]);
+            let expected = match (first, backwards) {
+                (Counts::Frames, _) => (0, 30, 0),
+                (Counts::Only(_), _) => (60, 0, 0),
+                (_, true) => (60, 0, -30),
+                (_, false) => (0, 0, 30),
+            };
+            assert_eq!((strides.first, strides.frame, strides.voxel[2]), expected);
+        }
+    }
+
+    #[test]
+    fn arrays_that_are_not_all_there_are_refused() {
+        let stored =
+            |record, file| place(record).stored(vec![Axis::new(Counts::Frames, 3)], SampleType::U8.into(), file);
+        assert!(stored(None, 103).is_ok() && stored(Some(5), 111).is_ok());
+        for (record, file) in [(None, 102), (Some(5), 110), (Some(0), 200), (Some(u64::MAX / 2), u64::MAX)] {
+            assert!(stored(record, file).is_err(), "{record:?} of {file}");
+        }
+        assert!(place(None).stored(Vec::new(), SampleType::U8.into(), 200).is_err());
+    }
+}
