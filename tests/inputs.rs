@@ -228,6 +228,12 @@ fn damaged_files_of_arrays_are_read_or_refused() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "tiff"), ignore = "needs the feature tiff")]
+fn damaged_tiff_files_are_read_or_refused() {
+    check_damaged("tiff");
+}
+
+#[test]
 fn npy_is_read() {
     check_all("npy");
 }
@@ -271,6 +277,12 @@ fn nifti_is_read() {
 #[test]
 fn nrrd_is_read() {
     check_all("nrrd");
+}
+
+#[test]
+#[cfg_attr(not(feature = "tiff"), ignore = "needs the feature tiff")]
+fn tiff_is_read() {
+    check_all("tiff");
 }
 
 #[test]

@@ -182,6 +182,7 @@ fn formats_that_are_not_built_in_explain_how_to_get_them() {
     let formats = [
         (cfg!(feature = "hdf5"), "hdf5/gzip.h5", "hdf5"),
         (cfg!(feature = "netcdf"), "netcdf/cdf1.nc", "netcdf"),
+        (cfg!(feature = "tiff"), "tiff/u8.tif", "tiff"),
         (cfg!(feature = "zarr"), "zarr/v3_zstd.zarr", "zarr"),
     ];
     for (_, source, feature) in formats.into_iter().filter(|(is_built_in, ..)| !is_built_in) {

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from inputs.case import fresh
 
-FORMATS = ["npy", "npz", "metaimage", "vtk_legacy", "vti", "vtr", "vtkhdf", "nifti", "nrrd", "hdf5", "netcdf", "zarr"]
+FORMATS = ["npy", "npz", "metaimage", "vtk_legacy", "vti", "vtr", "vtkhdf", "nifti", "nrrd", "tiff", "hdf5", "netcdf", "zarr"]
 
 
 def write_format(out: Path, name: str) -> list[dict]:

@@ -20,6 +20,8 @@ mod nrrd;
 pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
 mod shared;
+#[cfg(feature = "tiff")]
+mod tif;
 mod vti;
 mod vtk;
 
@@ -33,7 +35,7 @@ use crate::source::file_header::{FileHeader, head};
 use std::path::{Path, PathBuf};
 
 /// The extensions by which formats are known.
-const EXTENSIONS: [(&str, Format); 29] = [
+const EXTENSIONS: [(&str, Format); 31] = [
     ("npy", Format::Npy),
     ("npz", Format::Npz),
     ("nrrd", Format::Nrrd),
@@ -49,6 +51,8 @@ const EXTENSIONS: [(&str, Format); 29] = [
     ("vtr", Format::Vtr),
     ("pvtr", Format::Vtr),
     ("vtk", Format::Vtk),
+    ("tif", Format::Tiff),
+    ("tiff", Format::Tiff),
     ("pvd", Format::Pvd),
     ("series", Format::FileSeries),
     ("nc", Format::NetCdf),
@@ -70,6 +74,9 @@ pub fn extensions() -> impl Iterator<Item = &'static str> {
     EXTENSIONS.into_iter().filter(|(_, format)| *format != Format::Coefficients).map(|(ending, _)| ending)
 }
 
+/// How TIFF and BigTIFF start, in either byte order.
+const TIFF_STARTS: [&[u8]; 4] = [b"II\x2a\0", b"MM\0\x2a", b"II\x2b\0", b"MM\0\x2b"];
+
 const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
 
 /// Extensions of files that may be in gzip as a whole.
@@ -88,6 +95,7 @@ pub(in crate::source) enum Format {
     /// As the one before it, but for where the points are.
     Vtr,
     Vtk,
+    Tiff,
     Hdf5,
     NetCdf,
     /// A folder.
@@ -124,6 +132,7 @@ impl Format {
             | Self::Vti
             | Self::Vtr
             | Self::Vtk
+            | Self::Tiff
             | Self::Hdf5
             | Self::NetCdf
             | Self::Zarr => true,
@@ -143,6 +152,7 @@ impl Format {
             | Self::Vti
             | Self::Vtr
             | Self::Vtk
+            | Self::Tiff
             | Self::Pvd
             | Self::FileSeries
             | Self::Coefficients => false,
@@ -160,6 +170,7 @@ impl Format {
             Self::Vti => "VTK image data (.vti)",
             Self::Vtr => "VTK rectilinear grid (.vtr)",
             Self::Vtk => "legacy VTK",
+            Self::Tiff => "TIFF",
             Self::Hdf5 => "HDF5",
             Self::NetCdf => "NetCDF",
             Self::Zarr => "Zarr",
@@ -177,6 +188,7 @@ impl Format {
             (head.starts_with(vtk::MAGIC), Self::Vtk),
             (head.starts_with(b"\x89HDF\r\n\x1a\n"), Self::Hdf5),
             (head.starts_with(b"CDF"), Self::NetCdf),
+            (TIFF_STARTS.iter().any(|start| head.starts_with(start)), Self::Tiff),
             (is_nifti, Self::Nifti),
         ];
         Ok(formats.into_iter().find(|(is, _)| *is).map(|(_, format)| format))
@@ -231,7 +243,7 @@ pub(in crate::source) fn undecided(path: &Path, options: &OpenOptions) -> Result
         Format::Npz => npz::undecided(path),
         Format::Vti | Format::Vtr => vti::undecided(path),
         Format::Vtk => vtk::undecided(path),
-        Format::Nrrd | Format::Nifti | Format::MetaImage => Ok(components(path, options)),
+        Format::Nrrd | Format::Nifti | Format::MetaImage | Format::Tiff => Ok(components(path, options)),
         #[cfg(not(feature = "hdf5"))]
         Format::Hdf5 => Ok(Vec::new()), // opening it says that it is not built in
         #[cfg(not(feature = "netcdf"))]
@@ -269,6 +281,10 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
         Some(Format::MetaImage) => metaimage::describe(path, options.variable.as_deref()),
         Some(Format::Vti | Format::Vtr) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
+        #[cfg(feature = "tiff")]
+        Some(Format::Tiff) => tif::describe(path, options),
+        #[cfg(not(feature = "tiff"))]
+        Some(Format::Tiff) => Err(not_built_in(path, Format::Tiff, "tiff")),
         #[cfg(feature = "hdf5")]
         Some(Format::Hdf5) => arrays::open_hdf5(path, options)?.describe(options),
         #[cfg(feature = "netcdf")]
@@ -289,7 +305,7 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions) -> Resu
 }
 
 /// The error of a format whose crates this build does not have.
-#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "zarr")))]
+#[cfg(not(all(feature = "hdf5", feature = "netcdf", feature = "tiff", feature = "zarr")))]
 fn not_built_in(path: &Path, format: Format, feature: &'static str) -> Error {
     Error::input(path, Note::with(format!("{} is not built in", format.name()), Remedy::BuildWith(feature)))
 }

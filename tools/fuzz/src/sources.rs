@@ -10,7 +10,7 @@ use wavesplat::source::{FrameSource, OpenOptions, open, open_stream};
 /// Largest frame in bytes that is read; larger ones are only opened.
 const MOST: usize = 1 << 20;
 
-/// A stream: an `.npy`, or headerless samples. The samples read must be those in the stream.
+/// A stream: one `.npy` or several, or headerless samples. The samples read must be those in the stream.
 pub fn stream(data: &[u8]) {
     let mut input = Input::new(data);
     let flags = input.byte();
@@ -24,7 +24,7 @@ pub fn stream(data: &[u8]) {
     if options.sample.is_some() {
         let skipped = &bytes[options.offset as usize..];
         same(&found, &skipped[..found.len()], options.big_endian, source.archive().sample);
-    } else {
+    } else if is_one_plain_npy(bytes) {
         let big_endian = npy_is_big_endian(bytes);
         same(&found, &bytes[bytes.len() - found.len()..], big_endian, source.archive().sample);
     }
@@ -37,6 +37,12 @@ fn headerless(input: &mut Input<'_>, options: &mut OpenOptions) {
     options.sample = Some(input.pick(&SampleType::ALL));
     options.big_endian = input.below(2) == 1;
     options.offset = input.byte().into();
+}
+
+/// Whether the numbers of a stream are the samples: no integers of 64 bits, no headers between frames.
+fn is_one_plain_npy(bytes: &[u8]) -> bool {
+    let has = |word: &[u8]| bytes.windows(word.len()).filter(|found| *found == word).count();
+    has(b"i8") + has(b"u8") == 0 && has(b"NUMPY") == 1
 }
 
 /// Finds the byte order by its first mark before the type.
@@ -73,7 +79,7 @@ fn read(source: &mut dyn FrameSource) -> Option<Vec<u8>> {
 }
 
 /// Names of input files. The corpus refers to them by number, so new names are only appended.
-const NAMES: [&str; 15] = [
+const NAMES: [&str; 19] = [
     "a.nrrd",
     "a.nhdr",
     "a.vti",
@@ -89,6 +95,10 @@ const NAMES: [&str; 15] = [
     "a.hdr",
     "a.nc",
     "a.h5",
+    "a.npz",
+    "a.vtr",
+    "a.pvtr",
+    "a.tif",
 ];
 
 /// Writes an input file under its name, beside another with some data.
