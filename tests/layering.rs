@@ -59,7 +59,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 23] = [
     ("spleen_font::", &["render/annotate/"]),
     ("quick_xml::", &["source/formats/", "extract/vti.rs", "extract/vtr.rs"]),
     ("flate2::", &["source/formats/", "extract/sink.rs"]),
-    ("tiff::", &["source/formats/tiff/"]),
+    ("tiff::", &["source/formats/tif/"]),
     ("hdf5_reader::", &["source/formats/arrays/"]),
     ("netcdf_reader::", &["source/formats/arrays/"]),
     ("zarrs::", &["source/formats/arrays/"]),

@@ -21,7 +21,7 @@ pub(in crate::source) mod pvd;
 pub(in crate::source) mod raw;
 mod shared;
 #[cfg(feature = "tiff")]
-mod tiff;
+mod tif;
 mod vti;
 mod vtk;
 
@@ -283,7 +283,7 @@ fn of_format(format: Option<Format>, path: &Path, options: &OpenOptions, extent:
         Some(Format::Vti | Format::Vtr) => vti::describe(path, options.variable.as_deref()),
         Some(Format::Vtk) => vtk::describe(path, options.variable.as_deref()),
         #[cfg(feature = "tiff")]
-        Some(Format::Tiff) => tiff::describe(path, options),
+        Some(Format::Tiff) => tif::describe(path, options),
         #[cfg(not(feature = "tiff"))]
         Some(Format::Tiff) => Err(not_built_in(path, Format::Tiff, "tiff")),
         #[cfg(feature = "hdf5")]
