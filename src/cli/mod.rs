@@ -39,7 +39,9 @@ pub use messages::{of_error as error_text, of_note as note_text};
 pub use program::{command, main};
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
-pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
+pub use values::{
+    Dims, FrameList, FrameRange, MaxError, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share,
+};
 
 use crate::base::error::{Error, Result};
 use std::io::{self, Write};

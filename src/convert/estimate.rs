@@ -60,9 +60,10 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
     progress.start(Some(windows.len() as u64));
     let read =
         FramesRead { archive: &source_archive, missing_value: config.missing_value, plan: &plan, blocks: &blocks };
-    let range = config.range.map_or_else(|| read.range(source, &windows), Ok)?;
+    let found = read.range(source, &windows)?;
+    let range = config.range.unwrap_or(found);
     let config = ConvertConfig { range: Some(range), ..config };
-    let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks };
+    let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks, range: found };
     let bytes = coded.bytes(source, &windows, progress)?;
     progress.finish();
     let voxels = blocks.iter().map(|block| plan.blocks.region(*block).voxels()).sum::<usize>();
@@ -150,6 +151,8 @@ struct BlocksCoded<'a> {
     archive: &'a Archive,
     plan: &'a Plan<'a>,
     blocks: &'a [usize],
+    /// The value range that was found.
+    range: (f64, f64),
 }
 
 impl BlocksCoded<'_> {
@@ -157,13 +160,12 @@ impl BlocksCoded<'_> {
     fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
         let started = Instant::now();
         let plan = self.plan.of_blocks(self.blocks.len());
-        let mut file = Recorder::new(self.config, &plan, Path::new("estimate"), io::sink(), None);
+        let mut file = Recorder::new(&plan, Path::new("estimate"), io::sink(), None);
         let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
         let mut reader = WindowReader::new((self.config, self.archive), self.plan, &done, &idle);
         for (index, frames) in windows.iter().enumerate() {
             let window = source.window(frames.start, frames.len())?;
-            let range = self.config.range.unwrap_or_default();
-            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range, ..Scan::NOTHING })?);
+            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
             for batch in self.batches(&reader, window.as_ref(), &job) {
                 let encoded = encode_batch(self.config.level, self.plan, (&encoders, &idle), batch?)?;
                 file.append(&self.renumbered(encoded))?;

@@ -81,6 +81,9 @@ pub struct ConvertConfig {
     pub window: usize,
     /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
     pub tolerance: f64,
+    /// The error allowed in the samples' unit, for a pointwise or rms bound; 0 keeps every bit. It takes the place of
+    /// `tolerance` and `range`; see [`ConvertConfig::with_max_error`]. Default: none.
+    pub max_error: Option<f64>,
     /// What is promised. Default: no sample is off by more than the tolerance times the value range.
     pub bound: Bound,
     /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
@@ -110,6 +113,7 @@ impl ConvertConfig {
             coding: SchemeConstraint::AUTO,
             window: 32,
             tolerance,
+            max_error: None,
             bound: Bound::Pointwise,
             range: None,
             missing: MissingPolicy::Error,
@@ -120,6 +124,26 @@ impl ConvertConfig {
             memory: memory::DEFAULT,
             settings: Vec::new(),
         }
+    }
+
+    /// The defaults, with an error in the samples' unit: 0.1 allows every sample to be off by 0.1.
+    ///
+    /// ```
+    /// use wavesplat::convert::{ConvertConfig, convert_to_file};
+    /// use wavesplat::file::{CoefficientFile, promise::max_error};
+    /// use wavesplat::source::ArraySource;
+    ///
+    /// let kelvin: Vec<f32> = (0..4 * 512).map(|i| 280.0 + (i as f32 / 50.0).sin()).collect();
+    /// let mut source = ArraySource::from_f32([8, 8, 8], &kelvin)?;
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("run.wspl");
+    /// let report = convert_to_file(&mut source, &ConvertConfig::with_max_error(0.1), &path)?;
+    /// assert!(report.reached <= 0.1 && report.delta == 0.1);
+    /// assert_eq!(max_error(CoefficientFile::open(&path)?.metadata()), Some(0.1));
+    /// # Ok::<(), wavesplat::Error>(())
+    /// ```
+    pub fn with_max_error(max_error: f64) -> Self {
+        Self { max_error: Some(max_error), ..Self::new(0.0) }
     }
 }
 
@@ -147,7 +171,8 @@ pub struct ConvertReport {
     /// The error bound.
     #[serde(flatten)]
     pub promise: BoundReport,
-    /// The value range that a pointwise or rms tolerance refers to.
+    /// The value range that a pointwise or rms tolerance refers to; of an error in the samples' unit, that of the decoded
+    /// samples.
     pub range: (f64, f64),
     /// The largest bound in any window.
     pub delta: f64,
@@ -209,7 +234,7 @@ pub fn resume<W: Write>(
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
-    let mut recorder = Recorder::new(config, &plan, name, out, begun);
+    let mut recorder = Recorder::new(&plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let idle = Pool::default();

@@ -1,8 +1,9 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
-use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
+use super::{ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
+use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crossbeam_channel::Receiver;
 use std::io::Write;
@@ -12,7 +13,6 @@ use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
 
 pub(super) struct Recorder<'a, W: Write> {
     name: &'a Path,
-    config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
@@ -24,19 +24,13 @@ pub(super) struct Recorder<'a, W: Write> {
 }
 
 impl<'a, W: Write> Recorder<'a, W> {
-    pub(super) fn new(
-        config: &'a ConvertConfig,
-        plan: &'a Plan<'a>,
-        name: &'a Path,
-        out: W,
-        begun: Option<PartialFile>,
-    ) -> Self {
+    pub(super) fn new(plan: &'a Plan<'a>, name: &'a Path, out: W, begun: Option<PartialFile>) -> Self {
         let frames_before = begun.as_ref().map_or(0, |b| b.complete.metadata().frames);
         let (writer, out) = match begun {
             Some(begun) => (Some(Writer::resume(out, begun.complete)), None),
             None => (None, Some(out)),
         };
-        Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
+        Self { name, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
     }
 
     /// Appends batches until the workers end.
@@ -90,7 +84,7 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 
     fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
-        let (Metadata { dims, frames, windows, .. }, range) = (metadata, metadata.range());
+        let (Metadata { dims, frames, windows, .. }, range) = (metadata, range_of_shares(metadata));
         let voxels = dims.iter().product::<u64>();
         let (samples, voxels) = (voxels * frames, voxels * u64::from(metadata.channels));
         let of_source = self.plan.colour_transform.map_or(metadata.sample, |colour_transform| colour_transform.sample);
@@ -107,7 +101,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,
             outliers: sum(|w| w.outliers),
             missing: sum(|w| w.missing),
-            promise: BoundReport::new(self.config.bound, self.config.tolerance, range),
+            promise: BoundReport::of(metadata),
             range,
             delta: largest(|w| w.delta),
             reached: largest(|w| w.reached),

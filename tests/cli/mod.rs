@@ -21,6 +21,7 @@ mod interrupted;
 mod job;
 mod killed;
 mod manners;
+mod max_error;
 mod memory;
 mod modes;
 mod mutated;

@@ -7,7 +7,8 @@ use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
 use wavesplat::convert::{Bound, Packing, options};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::{BoundReport, WindowReport};
+use wavesplat::file::promise::range_of_shares;
+use wavesplat::file::report::{BoundReport, WindowReport, largest_bound};
 use wavesplat::source::CHANNELS;
 
 /// The keys of `--json`.
@@ -28,7 +29,10 @@ struct Info {
     variable: Option<String>,
     #[serde(flatten)]
     promise: BoundReport,
+    /// The range of values that shares refer to.
     range: (f64, f64),
+    /// The largest error, or root mean square, that any window allows.
+    delta: f64,
     value_range: (f64, f64),
     missing_value: Option<f64>,
     block_edge: u32,
@@ -73,8 +77,9 @@ impl Info {
             frames: m.frames,
             times: m.times.clone(),
             variable: m.variable.clone(),
-            promise: BoundReport::new(m.bound, m.tolerance, m.range()),
-            range: m.range(),
+            promise: BoundReport::of(m),
+            range: range_of_shares(m),
+            delta: largest_bound(m),
             value_range: file.value_range(),
             missing_value: m.missing_value,
             block_edge: m.block_edge,
