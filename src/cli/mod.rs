@@ -34,7 +34,7 @@ pub use common::{CommonArgs, report_text};
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
-pub use messages::{of_error as error_text, of_note as note_text};
+pub use messages::{advice, of_error as error_text, of_note as note_text};
 #[cfg(feature = "cli")]
 pub use program::{command, main};
 #[cfg(feature = "cli")]

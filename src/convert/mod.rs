@@ -28,8 +28,10 @@ mod settings;
 mod smoothness;
 mod task;
 mod to_file;
+mod variation;
+mod warnings;
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
@@ -92,6 +94,9 @@ pub struct ConvertConfig {
     pub missing: MissingPolicy,
     /// A value that means "missing", besides NaN and infinities. Default: none.
     pub missing_value: Option<f64>,
+    /// Refuse a window in which an extreme repeats that probably means "missing", and makes a bound that refers to the value
+    /// range larger than what the other samples hold. Default: true.
+    pub refuse_fill: bool,
     /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
     /// value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
@@ -118,6 +123,7 @@ impl ConvertConfig {
             range: None,
             missing: MissingPolicy::Error,
             missing_value: None,
+            refuse_fill: true,
             colours: None,
             block: None,
             level: 3,
@@ -156,6 +162,8 @@ pub struct ConvertReport {
     pub frames_before: u64,
     /// Windows of the file.
     pub windows: usize,
+    /// Samples of all frames.
+    pub samples: u64,
     /// Bytes of the samples of all frames.
     pub input_bytes: u64,
     /// Bytes of the coefficient file.
@@ -180,6 +188,12 @@ pub struct ConvertReport {
     pub reached: f64,
     /// The largest share of its bound that any series uses.
     pub share: f64,
+    /// How much voxels vary over time: the median standard deviation in a window of the voxels that change, estimated from
+    /// some voxels of every window converted now. None if no voxel changes.
+    pub typical_variation: Option<f64>,
+    /// What is worth knowing, and what to change.
+    #[serde(skip)]
+    pub warnings: Vec<Note>,
     /// The bound and the errors of each window.
     pub per_window: Vec<WindowReport>,
     /// Seconds spent scanning and gathering samples, on the reader's thread.
@@ -234,7 +248,7 @@ pub fn resume<W: Write>(
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
-    let mut recorder = Recorder::new(&plan, name, out, begun);
+    let mut recorder = Recorder::new(config, &plan, name, out, begun);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let idle = Pool::default();

@@ -1,6 +1,7 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
-use super::{ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
+use super::warnings::{self, Findings};
+use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::file::promise::range_of_shares;
@@ -13,6 +14,7 @@ use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
 
 pub(super) struct Recorder<'a, W: Write> {
     name: &'a Path,
+    config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
@@ -24,13 +26,19 @@ pub(super) struct Recorder<'a, W: Write> {
 }
 
 impl<'a, W: Write> Recorder<'a, W> {
-    pub(super) fn new(plan: &'a Plan<'a>, name: &'a Path, out: W, begun: Option<PartialFile>) -> Self {
+    pub(super) fn new(
+        config: &'a ConvertConfig,
+        plan: &'a Plan<'a>,
+        name: &'a Path,
+        out: W,
+        begun: Option<PartialFile>,
+    ) -> Self {
         let frames_before = begun.as_ref().map_or(0, |b| b.complete.metadata().frames);
         let (writer, out) = match begun {
             Some(begun) => (Some(Writer::resume(out, begun.complete)), None),
             None => (None, Some(out)),
         };
-        Self { name, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
+        Self { name, config, plan, writer, out, window: None, frames_before, busy: Duration::ZERO }
     }
 
     /// Appends batches until the workers end.
@@ -70,7 +78,12 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 
     /// Completes the file and returns the report.
-    pub(super) fn finish(mut self, started: Instant, read: Duration, encode: Duration) -> Result<ConvertReport> {
+    pub(super) fn finish(
+        mut self,
+        started: Instant,
+        (read, findings): (Duration, Findings),
+        encode: Duration,
+    ) -> Result<ConvertReport> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         let Some(writer) = self.writer.take() else {
             return Err(Error::input(self.name, "nothing to convert: the input has no frames"));
@@ -80,7 +93,9 @@ impl<'a, W: Write> Recorder<'a, W> {
         let (mut out, summary) = writer.finish().map_err(failed)?;
         out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
         self.busy += last.elapsed();
-        Ok(self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]))
+        let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
+        let warnings = warnings::warnings(self.config, &report, &findings);
+        Ok(ConvertReport { typical_variation: findings.variation.median(), warnings, ..report })
     }
 
     fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
@@ -95,6 +110,7 @@ impl<'a, W: Write> Recorder<'a, W> {
             frames: *frames,
             frames_before: self.frames_before,
             windows: windows.len(),
+            samples,
             input_bytes: samples * of_source.size() as u64,
             output_bytes,
             coefficients: sum(|w| w.coded),
@@ -106,6 +122,8 @@ impl<'a, W: Write> Recorder<'a, W> {
             delta: largest(|w| w.delta),
             reached: largest(|w| w.reached),
             share: largest(|w| w.share),
+            typical_variation: None,
+            warnings: Vec::new(),
             per_window: windows.iter().map(|w| WindowReport::new(w, voxels)).collect(),
             read_seconds,
             encode_seconds,

@@ -65,6 +65,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         range,
         missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
         missing_value,
+        refuse_fill: true,
         colours,
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,

@@ -15,6 +15,7 @@ mod layout;
 mod numbering;
 mod packing;
 mod parts;
+pub(crate) mod ends;
 pub(crate) mod scan;
 mod select;
 mod series;

@@ -33,6 +33,7 @@ mod render;
 mod resume;
 mod streams;
 mod usage;
+mod warned;
 
 use std::ffi::OsStr;
 use std::fs;

@@ -1,10 +1,13 @@
 //! `wavesplat convert`
 
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
+use wavesplat::base::error::{Error, Note, Result};
 use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::cli::{CommonArgs, InputArgs, MaxError, Pair, SelectArgs, share, spare_inputs, transfer_function};
+use wavesplat::cli::{
+    CommonArgs, InputArgs, MaxError, Pair, SelectArgs, advice, note_text, share, spare_inputs, transfer_function,
+};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{
     Basis, Bound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor,
@@ -220,7 +223,31 @@ pub(crate) fn finish(
     })?;
     out.commit_if(|part| resume::check(part).and_then(|()| still()))?;
     common.note(summary(&report, config.bound));
-    common.report(&report, name == Path::new(STANDARD))
+    report.warnings.iter().for_each(|warning| common.note(format_args!("warning: {}", note_text(warning))));
+    common.report(&Reported::of(&report), name == Path::new(STANDARD))
+}
+
+/// The keys of `--json`.
+#[derive(Serialize)]
+struct Reported<'a> {
+    #[serde(flatten)]
+    report: &'a ConvertReport,
+    warnings: Vec<Warning<'a>>,
+}
+
+/// What is worth knowing, and what to type.
+#[derive(Serialize)]
+struct Warning<'a> {
+    text: &'a str,
+    remedy: Option<String>,
+}
+
+impl<'a> Reported<'a> {
+    fn of(report: &'a ConvertReport) -> Self {
+        let warning =
+            |note: &'a Note| Warning { text: &note.text, remedy: note.remedy.as_ref().map(|r| advice(r).into()) };
+        Self { report, warnings: report.warnings.iter().map(warning).collect() }
+    }
 }
 
 impl ConvertArgs {
@@ -294,6 +321,7 @@ impl ConvertArgs {
                 (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
             },
             missing_value: self.missing_value,
+            refuse_fill: true,
             colours: None, // may depend on the frames
             block: self.block,
             level: self.level,
