@@ -25,6 +25,7 @@ mod layering;
 mod library;
 mod left_out;
 mod literature;
+mod max_error;
 mod overview;
 mod own_scene;
 mod partial;

@@ -40,6 +40,12 @@ pub enum Remedy {
     AllowGaps,
     /// Set `missing` to [`crate::convert::MissingPolicy::Mask`], which keeps missing samples.
     MaskMissing,
+    /// Set `missing_value` to this: it means "missing".
+    DeclareMissing(String),
+    /// Set this field to a value.
+    Try(&'static str, String),
+    /// Allow larger errors by this field.
+    Allow(&'static str),
     /// Build with this Cargo feature.
     BuildWith(&'static str),
     /// Allow the existing file to be replaced.

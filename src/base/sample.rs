@@ -143,22 +143,34 @@ pub fn range_of_present(
     ty: SampleType,
     samples: &[u8],
     declared: Option<f64>,
-    mut missing: impl FnMut(usize),
+    missing: impl FnMut(usize),
 ) -> (f64, f64) {
     let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    for_each_present(ty, samples, declared, missing, |_, run| range = join_ranges(range, run));
+    range
+}
+
+/// Calls `present(values, their range)` for runs of samples that are not missing, and `missing` with the index of each
+/// sample that is.
+pub(crate) fn for_each_present(
+    ty: SampleType,
+    samples: &[u8],
+    declared: Option<f64>,
+    mut missing: impl FnMut(usize),
+    mut present: impl FnMut(&[f64], (f64, f64)),
+) {
     for_each_run(ty, samples, |first, values| {
         if let Some(run) = range_unless_missing(values, declared) {
-            range = join_ranges(range, run);
+            present(values, run);
             return;
         }
         for (i, value) in values.iter().enumerate() {
             match is_missing(*value, declared) {
                 true => missing(first + i),
-                false => range = join_ranges(range, (*value, *value)),
+                false => present(&[*value], (*value, *value)),
             }
         }
     });
-    range
 }
 
 /// The smallest range that holds both.

@@ -109,6 +109,19 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
     ),
     (
         "wavesplat convert",
-        &["basis", "block", "bound", "floor", "level", "missing", "resume", "samples", "seed", "space", "window"],
+        &[
+            "basis",
+            "block",
+            "bound",
+            "floor",
+            "level",
+            "max-error",
+            "missing",
+            "resume",
+            "samples",
+            "seed",
+            "space",
+            "window",
+        ],
     ),
 ];

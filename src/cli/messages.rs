@@ -44,7 +44,7 @@ fn option(setting: &str, command: &Command) -> String {
 }
 
 /// Advice that names options of the programs.
-fn advice(remedy: &Remedy) -> Cow<'static, str> {
+pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
     let fixed = match remedy {
         Remedy::Set(field) => return format!("--{} changes this", name(field)).into(),
         Remedy::ChooseVariable => "--variable chooses one",
@@ -59,6 +59,9 @@ fn advice(remedy: &Remedy) -> Cow<'static, str> {
         Remedy::SetDims { dims: [x, y, z], frames } => return format!("give --dims {x}x{y}x{z}x{frames}").into(),
         Remedy::AllowGaps => "--allow-gaps accepts them",
         Remedy::MaskMissing => "--missing mask keeps them as missing samples",
+        Remedy::DeclareMissing(value) => return format!("if it means missing, add --missing-value {value}").into(),
+        Remedy::Try(field, value) => return format!("try --{} {value}", name(field)).into(),
+        Remedy::Allow(field) => return format!("allow a larger error by --{}", name(field)).into(),
         Remedy::BuildWith(feature) => {
             return format!("build with cargo build --release --features {feature}").into();
         }

@@ -35,13 +35,15 @@ pub use common::{CommonArgs, report_text};
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
-pub use messages::{of_error as error_text, of_note as note_text};
+pub use messages::{advice, of_error as error_text, of_note as note_text};
 #[cfg(feature = "cli")]
 pub use program::{command, main};
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
-pub use values::{Dims, FrameList, FrameRange, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share};
+pub use values::{
+    Dims, FrameList, FrameRange, MaxError, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share,
+};
 
 use crate::base::error::{Error, Result};
 use std::io::{self, Write};

@@ -2,6 +2,7 @@
 
 use super::gather::{Batch, WindowReader};
 use super::record::Recorder;
+use super::variation::Variation;
 use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Task, WindowJob, WindowsDone, encode_batch};
 use crate::base::error::{Error, Result};
 use crate::base::grid::BlockGrid;
@@ -9,7 +10,9 @@ use crate::base::output::STANDARD;
 use crate::base::progress::Progress;
 use crate::base::sample::{self, join_ranges};
 use crate::base::spread::evenly;
+use crate::codec::bound::range_bound;
 use crate::codec::encode::Encoded;
+use crate::codec::sampled_box::SampledBox;
 use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 use serde::Serialize;
@@ -33,6 +36,11 @@ pub struct Estimate {
     pub ratio: f64,
     /// The tolerance.
     pub tolerance: f64,
+    /// The error that it allows, in the samples' unit.
+    pub error: f64,
+    /// Of the voxels of the coded blocks that change, the share that vary by less than this error (standard deviation over a
+    /// window's frames); none if no voxel changes.
+    pub lost: Option<f64>,
     /// The value range that it refers to, from a few frames of each coded window and the last frame.
     pub range: (f64, f64),
     /// Blocks that were coded in each window.
@@ -47,6 +55,21 @@ pub struct Estimate {
 /// # Errors
 /// Those of a conversion; also an error if the source is a stream.
 pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
+    estimates(source, std::slice::from_ref(config), progress)?
+        .pop()
+        .ok_or_else(|| Error::setting("tolerance", "is needed for an estimate"))
+}
+
+/// As [`estimate`] for several configurations, which differ only in their tolerance.
+///
+/// # Errors
+/// Those of [`estimate`].
+pub fn estimates(
+    source: &mut dyn FrameSource,
+    configs: &[ConvertConfig],
+    progress: &dyn Progress,
+) -> Result<Vec<Estimate>> {
+    let Some(config) = configs.first() else { return Ok(Vec::new()) };
     let source_archive = source.archive().clone();
     let Some(frames) = source_archive.frames.filter(|frames| *frames > 0) else {
         return Err(Error::path(
@@ -54,25 +77,39 @@ pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: 
             "an estimate needs frames that can be read more than once, not standard input",
         ));
     };
-    let Task { config, archive, colour_transform } = Task::new(config, &source_archive);
-    let archive = Archive { description: None, ..archive }; // it is not of some blocks
-    let plan = Plan::new(&config, &archive, colour_transform.as_ref())?;
-    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, config.window));
-    progress.start(Some(windows.len() as u64));
+    let source_archive = Archive { description: None, ..source_archive }; // it is not of some blocks
+    let Task { config: first, archive, colour_transform } = Task::new(config, &source_archive);
+    let plan = Plan::new(&first, &archive, colour_transform.as_ref())?;
+    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, first.window));
+    progress.start(Some((windows.len() * configs.len()) as u64));
     let read =
-        FramesRead { archive: &source_archive, missing_value: config.missing_value, plan: &plan, blocks: &blocks };
-    let range = config.range.map_or_else(|| read.range(source, &windows), Ok)?;
-    let config = ConvertConfig { range: Some(range), ..config };
-    let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks };
-    let bytes = coded.bytes(source, &windows, progress)?;
+        FramesRead { archive: &source_archive, missing_value: first.missing_value, plan: &plan, blocks: &blocks };
+    let (found, variation) = read.range(source, &windows)?;
+    let mut of = |config: &ConvertConfig| {
+        let Task { config, archive, colour_transform } = Task::new(config, &source_archive);
+        let plan = Plan::new(&config, &archive, colour_transform.as_ref())?;
+        let range = config.range.unwrap_or(found);
+        let config = ConvertConfig { range: Some(range), ..config };
+        let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks, range: found };
+        let bytes = scaled(coded.bytes(source, &windows, progress)?, &coded, &windows, frames);
+        let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
+        let error = range_bound(config.tolerance, range);
+        let lost = variation.share_below(error).filter(|_| colour_transform.is_none());
+        let (ratio, tolerance) = (raw / bytes.max(1.0), config.tolerance);
+        let bytes = bytes as u64;
+        Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
+    };
+    let estimates = configs.iter().map(&mut of).collect::<Result<Vec<_>>>()?;
     progress.finish();
-    let voxels = blocks.iter().map(|block| plan.blocks.region(*block).voxels()).sum::<usize>();
+    Ok(estimates)
+}
+
+/// The bytes of all `frames`, if those of some blocks in some windows take `bytes`.
+fn scaled(bytes: u64, coded: &BlocksCoded<'_>, windows: &[Range<usize>], frames: usize) -> f64 {
+    let voxels = coded.blocks.iter().map(|block| coded.plan.blocks.region(*block).voxels()).sum::<usize>();
     let samples = voxels * windows.iter().map(ExactSizeIterator::len).sum::<usize>();
-    let all = archive.grid.whole().voxels() as f64 * frames as f64;
-    let bytes = bytes as f64 * all / samples as f64;
-    let ratio = all * source_archive.sample.size() as f64 / bytes.max(1.0);
-    let (blocks, windows) = (blocks.len(), windows.len());
-    Ok(Estimate { bytes: bytes as u64, ratio, tolerance: config.tolerance, range, blocks, windows })
+    let all = coded.archive.grid.whole().voxels() as f64 * frames as f64;
+    bytes as f64 * all / samples as f64
 }
 
 /// All blocks if they are few, else some, spread evenly over the volume.
@@ -109,26 +146,29 @@ struct FramesRead<'a> {
 impl FramesRead<'_> {
     /// The value range of the last frame and, in each window, of the first frame and of those with the least and the
     /// largest sample of the coded blocks.
-    fn range(&self, source: &mut dyn FrameSource, windows: &[Range<usize>]) -> Result<(f64, f64)> {
-        let mut range = Scan::NOTHING.range;
+    /// Also how much voxels of the coded blocks vary.
+    fn range(&self, source: &mut dyn FrameSource, windows: &[Range<usize>]) -> Result<((f64, f64), Variation)> {
+        let (mut range, mut variation) = (Scan::NOTHING.range, Variation::default());
         for frames in windows {
             let window = source.window(frames.start, frames.len())?;
-            for frame in self.extreme_frames(window.as_ref())? {
+            for frame in self.extreme_frames(window.as_ref(), &mut variation)? {
                 range = join_ranges(range, self.of_frame(window.as_ref(), frame)?);
             }
         }
         let last = source.window(self.archive.frames.unwrap_or(1) - 1, 1)?;
         range = join_ranges(range, self.of_frame(last.as_ref(), 0)?);
-        Ok(if range.0 <= range.1 { range } else { (0.0, 0.0) })
+        Ok((if range.0 <= range.1 { range } else { (0.0, 0.0) }, variation))
     }
 
     /// The first frame of a window, and the frames with the least and the largest sample of the coded blocks.
-    fn extreme_frames(&self, window: &dyn FrameWindow) -> Result<BTreeSet<usize>> {
+    fn extreme_frames(&self, window: &dyn FrameWindow, variation: &mut Variation) -> Result<BTreeSet<usize>> {
         let mut ranges = vec![Scan::NOTHING.range; window.frames()];
         let mut samples = Vec::new();
-        for block in self.blocks {
+        for (number, block) in self.blocks.iter().enumerate() {
             let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
             read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
+            let of = SampledBox { size: region.dims(), known: region.dims() };
+            variation.add_block((number, self.blocks.len()), &of, ty, self.missing_value, &samples);
             for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
                 *range = join_ranges(*range, sample::range_of_present(ty, frame, self.missing_value, |_| {}));
             }
@@ -151,6 +191,8 @@ struct BlocksCoded<'a> {
     archive: &'a Archive,
     plan: &'a Plan<'a>,
     blocks: &'a [usize],
+    /// The value range that was found.
+    range: (f64, f64),
 }
 
 impl BlocksCoded<'_> {
@@ -163,15 +205,14 @@ impl BlocksCoded<'_> {
         let mut reader = WindowReader::new((self.config, self.archive), self.plan, &done, &idle);
         for (index, frames) in windows.iter().enumerate() {
             let window = source.window(frames.start, frames.len())?;
-            let range = self.config.range.unwrap_or_default();
-            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range, ..Scan::NOTHING })?);
+            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
             for batch in self.batches(&reader, window.as_ref(), &job) {
                 let encoded = encode_batch(self.config.level, self.plan, (&encoders, &idle), batch?)?;
                 file.append(&self.renumbered(encoded))?;
             }
             progress.advance(1);
         }
-        Ok(file.finish(started, Duration::ZERO, Duration::ZERO)?.output_bytes)
+        Ok(file.finish(started, Default::default(), Duration::ZERO)?.output_bytes)
     }
 
     /// The samples of the coded blocks of all channels, in batches.

@@ -3,6 +3,7 @@
 use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
 use super::sampled::{self, Pixel};
 use super::task::BRIGHTNESS;
+use super::warnings::{self, Fill, Findings};
 use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Region;
@@ -27,7 +28,7 @@ pub(super) struct Batch {
 }
 
 /// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
-/// spent reading.
+/// spent reading, and what it saw in the samples.
 pub(super) fn read(
     source: &mut dyn FrameSource,
     (config, archive): (&ConvertConfig, &Archive),
@@ -35,7 +36,7 @@ pub(super) fn read(
     done: &WindowsDone,
     idle: &Pool<Vec<u8>>,
     out: &Sender<Batch>,
-) -> Result<Duration> {
+) -> Result<(Duration, Findings)> {
     let mut reader = WindowReader::new((config, archive), plan, done, idle);
     done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
@@ -64,7 +65,7 @@ pub(super) fn read(
             break; // the frames ended, or a later stage failed and reports why
         }
     }
-    Ok(busy)
+    Ok((busy, reader.findings))
 }
 
 pub(super) struct WindowReader<'a> {
@@ -81,6 +82,8 @@ pub(super) struct WindowReader<'a> {
     id: Option<FileId>,
     /// The features of the file.
     features: Features,
+    /// What was seen in the samples.
+    findings: Findings,
     /// The scheme of the window before.
     scheme: Option<Scheme>,
     /// The number of frames in the file so far.
@@ -105,7 +108,20 @@ impl<'a> WindowReader<'a> {
         let packing = if plain { Packing::Flat } else { Packing::default() };
         let features = done.features.unwrap_or(Features { packing, described: archive.description.is_some() });
         let (id, range, scheme) = (done.id, None, None);
-        Self { config, plan, idle, archive, pixels, range, id, features, scheme, frames: 0, before: 0 }
+        Self {
+            config,
+            plan,
+            idle,
+            archive,
+            pixels,
+            range,
+            id,
+            features,
+            findings: Findings::default(),
+            scheme,
+            frames: 0,
+            before: 0,
+        }
     }
 
     /// The next frames of the source, at most `count`; none at its end.
@@ -178,6 +194,7 @@ impl<'a> WindowReader<'a> {
     fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
         let scan = self.scan(window)?;
         self.refuse_missing(window, self.first(), &scan)?;
+        self.look_for_fill(window, &scan)?;
         self.job(window, index, &scan)
     }
 
@@ -256,9 +273,37 @@ impl<'a> WindowReader<'a> {
         Err(Error::input(window.name(frame), Note::with(what, Remedy::MaskMissing)))
     }
 
+    /// Notes a value that may mean "missing"; an error if it would leave nothing of the others.
+    fn look_for_fill(&mut self, window: &dyn FrameWindow, scan: &Scan) -> Result<()> {
+        let extreme = scan.ends.extreme().filter(|_| self.plan.colour_transform.is_none());
+        let Some(extreme) = extreme else { return Ok(()) };
+        let ConvertConfig { bound, tolerance, range, refuse_fill, .. } = *self.config;
+        let of_range = matches!(bound, Bound::Pointwise | Bound::Rms) && range.is_none() && refuse_fill;
+        let range = self.range.map_or(scan.range, |r| join_ranges(r, scan.range));
+        let allowed = of_range.then(|| bound::range_bound(tolerance, range));
+        let samples = (self.archive.grid.whole().voxels() * window.frames()) as u64 - scan.missing;
+        match warnings::fill(&extreme, samples, self.archive.sample, allowed) {
+            Some(Fill::Refuse(note)) => return Err(Error::input(window.name(0), note)),
+            Some(Fill::Warn(note)) => _ = self.findings.fill.get_or_insert(note),
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// Looks at how some voxels of a block vary.
+    fn look_at_variation(&mut self, job: &WindowJob, (id, samples): &(BlockId, Vec<u8>)) {
+        if self.plan.colour_transform.is_some() {
+            return;
+        }
+        let block = id.block as usize;
+        let (of, all) = (self.plan.sampled_box(&job.codec, block), self.plan.blocks.len());
+        let missing_value = self.config.missing_value;
+        self.findings.variation.add_block((block, all), &of, self.archive.sample, missing_value, samples);
+    }
+
     /// Reads and sends the window's blocks. False if the receiver is gone.
     fn send_blocks(
-        &self,
+        &mut self,
         window: &dyn FrameWindow,
         job: &Arc<WindowJob>,
         out: &Sender<Batch>,
@@ -267,12 +312,14 @@ impl<'a> WindowReader<'a> {
         let (all, batch) = (self.plan.blocks_of_window(), self.plan.batch);
         for first in (0..all).step_by(batch) {
             let started = Instant::now();
-            let blocks: Result<_> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
+            let blocks: Result<Vec<_>> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
+            let blocks = blocks?;
+            blocks.iter().for_each(|block| self.look_at_variation(job, block));
             let last = first + batch >= all;
             if last {
                 window.check_unchanged()?;
             }
-            let batch = Batch { window: job.clone(), blocks: blocks?, last };
+            let batch = Batch { window: job.clone(), blocks, last };
             *busy += started.elapsed();
             if out.send(batch).is_err() {
                 return Ok(false);

@@ -28,9 +28,11 @@ mod settings;
 mod smoothness;
 mod task;
 mod to_file;
+mod variation;
+mod warnings;
 
 use crate::base::description::Description;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Note, Result};
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
@@ -82,6 +84,9 @@ pub struct ConvertConfig {
     pub window: usize,
     /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
     pub tolerance: f64,
+    /// The error allowed in the samples' unit, for a pointwise or rms bound; 0 keeps every bit. It takes the place of
+    /// `tolerance` and `range`; see [`ConvertConfig::with_max_error`]. Default: none.
+    pub max_error: Option<f64>,
     /// What is promised. Default: no sample is off by more than the tolerance times the value range.
     pub bound: Bound,
     /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
@@ -90,6 +95,9 @@ pub struct ConvertConfig {
     pub missing: MissingPolicy,
     /// A value that means "missing", besides NaN and infinities. Default: none.
     pub missing_value: Option<f64>,
+    /// Refuse a window in which an extreme repeats that probably means "missing", and makes a bound that refers to the value
+    /// range larger than what the other samples hold. Default: true.
+    pub refuse_fill: bool,
     /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
     /// value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
@@ -111,16 +119,38 @@ impl ConvertConfig {
             coding: SchemeConstraint::AUTO,
             window: 32,
             tolerance,
+            max_error: None,
             bound: Bound::Pointwise,
             range: None,
             missing: MissingPolicy::Error,
             missing_value: None,
+            refuse_fill: true,
             colours: None,
             block: None,
             level: 3,
             memory: memory::DEFAULT,
             settings: Vec::new(),
         }
+    }
+
+    /// The defaults, with an error in the samples' unit: 0.1 allows every sample to be off by 0.1.
+    ///
+    /// ```
+    /// use wavesplat::convert::{ConvertConfig, convert_to_file};
+    /// use wavesplat::file::{CoefficientFile, promise::max_error};
+    /// use wavesplat::source::ArraySource;
+    ///
+    /// let kelvin: Vec<f32> = (0..4 * 512).map(|i| 280.0 + (i as f32 / 50.0).sin()).collect();
+    /// let mut source = ArraySource::from_f32([8, 8, 8], &kelvin)?;
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("run.wspl");
+    /// let report = convert_to_file(&mut source, &ConvertConfig::with_max_error(0.1), &path)?;
+    /// assert!(report.reached <= 0.1 && report.delta == 0.1);
+    /// assert_eq!(max_error(CoefficientFile::open(&path)?.metadata()), Some(0.1));
+    /// # Ok::<(), wavesplat::Error>(())
+    /// ```
+    pub fn with_max_error(max_error: f64) -> Self {
+        Self { max_error: Some(max_error), ..Self::new(0.0) }
     }
 }
 
@@ -133,6 +163,8 @@ pub struct ConvertReport {
     pub frames_before: u64,
     /// Windows of the file.
     pub windows: usize,
+    /// Samples of all frames.
+    pub samples: u64,
     /// Bytes of the samples of all frames.
     pub input_bytes: u64,
     /// Bytes of the coefficient file.
@@ -148,7 +180,8 @@ pub struct ConvertReport {
     /// The error bound.
     #[serde(flatten)]
     pub promise: BoundReport,
-    /// The value range that a pointwise or rms tolerance refers to.
+    /// The value range that a pointwise or rms tolerance refers to; of an error in the samples' unit, that of the decoded
+    /// samples.
     pub range: (f64, f64),
     /// The largest bound in any window.
     pub delta: f64,
@@ -156,6 +189,12 @@ pub struct ConvertReport {
     pub reached: f64,
     /// The largest share of its bound that any series uses.
     pub share: f64,
+    /// How much voxels vary over time: the median standard deviation in a window of the voxels that change, estimated from
+    /// some voxels of every window converted now. None if no voxel changes.
+    pub typical_variation: Option<f64>,
+    /// What is worth knowing, and what to change.
+    #[serde(skip)]
+    pub warnings: Vec<Note>,
     /// The bound and the errors of each window.
     pub per_window: Vec<WindowReport>,
     /// Seconds spent scanning and gathering samples, on the reader's thread.

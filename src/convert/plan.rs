@@ -5,7 +5,9 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::codec::WindowCodec;
+use crate::codec::bound::Bound;
 use crate::codec::sampled_box::SampledBox;
+use crate::file::promise::UNIT_RANGE;
 use crate::source::{Archive, CHANNELS, ColourTransform};
 use crate::wavelet;
 use wavesplat_format::{Basis, Metadata};
@@ -57,9 +59,7 @@ impl<'a> Plan<'a> {
         colour_transform: Option<&'a ColourTransform>,
     ) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
-        if !(0.0..=1.0).contains(&config.tolerance) {
-            return Err(Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
-        }
+        check_bound(config, colour_transform.is_some())?;
         let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
         if !Self::takes(config, edge) {
@@ -94,6 +94,22 @@ impl<'a> Plan<'a> {
     pub(super) fn blocks_of_window(&self) -> usize {
         self.blocks.len() * self.channels()
     }
+}
+
+/// An error if the bound is no number that it can be, or means nothing for these samples.
+fn check_bound(config: &ConvertConfig, coloured: bool) -> Result<()> {
+    let Some(error) = config.max_error else {
+        let is_share = (0.0..=1.0).contains(&config.tolerance);
+        return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
+    };
+    let wrong = match config.bound {
+        _ if !(0.0..=f64::MAX).contains(&error) => "takes a finite number of 0 or more, in the samples' unit",
+        _ if coloured => "is in the samples' unit, and colours are coded instead of samples",
+        _ if config.range != Some(UNIT_RANGE) => "is in the samples' unit, so it refers to no range",
+        Bound::Relative { .. } | Bound::Sampled { .. } => "is for a pointwise or rms bound",
+        Bound::Pointwise | Bound::Rms => return Ok(()),
+    };
+    Err(Error::setting("max_error", wrong))
 }
 
 /// The metadata before the first frame.

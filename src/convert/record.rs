@@ -1,9 +1,11 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
+use super::warnings::{self, Findings};
 use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
 use crate::base::description::{Description, extended, frames_of, joined, with_frames};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
+use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::Archive;
 use crossbeam_channel::Receiver;
@@ -107,7 +109,12 @@ impl<'a, W: Write> Recorder<'a, W> {
     }
 
     /// Completes the file and returns the report.
-    pub(super) fn finish(mut self, started: Instant, read: Duration, encode: Duration) -> Result<ConvertReport> {
+    pub(super) fn finish(
+        mut self,
+        started: Instant,
+        (read, findings): (Duration, Findings),
+        encode: Duration,
+    ) -> Result<ConvertReport> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         let Some(writer) = self.writer.take() else {
             return Err(Error::input(self.name, "nothing to convert: the input has no frames"));
@@ -119,11 +126,12 @@ impl<'a, W: Write> Recorder<'a, W> {
         out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
         self.busy += last.elapsed();
         let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
-        Ok(ConvertReport { not_kept, ..report })
+        let warnings = warnings::warnings(self.config, &report, &findings);
+        Ok(ConvertReport { typical_variation: findings.variation.median(), warnings, not_kept, ..report })
     }
 
     fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
-        let (Metadata { dims, frames, windows, .. }, range) = (metadata, metadata.range());
+        let (Metadata { dims, frames, windows, .. }, range) = (metadata, range_of_shares(metadata));
         let voxels = dims.iter().product::<u64>();
         let (samples, voxels) = (voxels * frames, voxels * u64::from(metadata.channels));
         let of_source = self.plan.colour_transform.map_or(metadata.sample, |colour_transform| colour_transform.sample);
@@ -134,17 +142,20 @@ impl<'a, W: Write> Recorder<'a, W> {
             frames: *frames,
             frames_before: self.frames_before,
             windows: windows.len(),
+            samples,
             input_bytes: samples * of_source.size() as u64,
             output_bytes,
             coefficients: sum(|w| w.coded),
             coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,
             outliers: sum(|w| w.outliers),
             missing: sum(|w| w.missing),
-            promise: BoundReport::new(self.config.bound, self.config.tolerance, range),
+            promise: BoundReport::of(metadata),
             range,
             delta: largest(|w| w.delta),
             reached: largest(|w| w.reached),
             share: largest(|w| w.share),
+            typical_variation: None,
+            warnings: Vec::new(),
             per_window: windows.iter().map(|w| WindowReport::new(w, voxels)).collect(),
             read_seconds,
             encode_seconds,

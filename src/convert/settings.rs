@@ -4,6 +4,7 @@ use super::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use crate::codec::bound::Bound;
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
+use crate::file::promise::{MAX_ERROR, max_error};
 use crate::file::setting;
 use crate::source::{Archive, ColourTransform, Units};
 use crate::wavelet::Basis;
@@ -20,12 +21,14 @@ pub(super) fn stored_settings(
     let (basis, space) = (basis_name(coding.basis), space_name(coding.space));
     let missing = if *missing == MissingPolicy::Mask { "mask" } else { "error" };
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
+    let max_error = config.max_error.map(|error| (MAX_ERROR, format!("{error:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
     let more = [("level", level.to_string()), ("missing", missing.into())];
     let all = given
         .into_iter()
         .chain(more)
         .chain(range)
+        .chain(max_error)
         .chain(colour_transform.into_iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
     let ours: Vec<(String, String)> = all.chain(units).map(|(name, value)| (name.to_string(), value)).collect();
@@ -39,7 +42,9 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
     let named = |name: &str| setting(file, name);
     let basis = BASES.into_iter().find(|basis| named("basis") == Some(basis_name(*basis)))?;
     let space = SPACES.into_iter().find(|space| named("space") == Some(space_name(*space)))?;
+    let max_error = max_error(file);
     let range = match named("range") {
+        _ if max_error.is_some() => None,
         Some(range) => Some(range.split_once(',').and_then(|(lo, hi)| Some((number(lo)?, number(hi)?)))?),
         None => None,
     };
@@ -55,10 +60,12 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         coding: SchemeConstraint { basis, space },
         window: number(named("window")?)?,
         tolerance: file.tolerance,
+        max_error,
         bound: file.bound,
         range,
         missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
         missing_value,
+        refuse_fill: true,
         colours,
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
@@ -70,7 +77,9 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
 /// The options of `wavesplat convert` that make the same file from the same samples, with their values, including
 /// defaults. Colours given as a file of points are left out, because no option value names them.
 pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
-    let mut options = vec![("tolerance", format!("{:?}", file.tolerance)), ("bound", file.bound.name().into())];
+    let max_error = max_error(file);
+    let bound = max_error.map_or(("tolerance", file.tolerance), |error| (MAX_ERROR, error));
+    let mut options = vec![(bound.0, format!("{:?}", bound.1)), ("bound", file.bound.name().into())];
     match file.bound {
         Bound::Relative { floor } => options.push(("floor", format!("{floor:?}"))),
         Bound::Sampled { samples, seed } => {
@@ -86,9 +95,9 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
     options.extend(file.missing_value.map(|value| ("missing-value", format!("{value:?}"))));
     options.push(("block", file.block_edge.to_string()));
     let is_option = |name: &&str| match *name {
-        "range" => colours.is_none(),                      // that of brightness is fixed
-        "dtype" => setting(file, "dims").is_some(),        // else of samples that were coloured
-        "times" => setting(file, "times") != Some("list"), // of a file that has no name here
+        "range" => colours.is_none() && max_error.is_none(), // that of brightness is fixed
+        "dtype" => setting(file, "dims").is_some(),          // else of samples that were coloured
+        "times" => setting(file, "times") != Some("list"),   // of a file that has no name here
         _ => true,
     };
     options
@@ -172,7 +181,7 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 }
 
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
-const OWN: [&str; 6] = ["basis", "space", "window", "level", "missing", "range"];
+const OWN: [&str; 7] = [MAX_ERROR, "basis", "space", "window", "level", "missing", "range"];
 
 /// The stored name of a basis, which is that of the option. No basis means that any is allowed.
 fn basis_name(basis: Option<Basis>) -> &'static str {

@@ -2,6 +2,7 @@
 
 use super::ConvertConfig;
 use crate::base::sample;
+use crate::file::promise::UNIT_RANGE;
 use crate::source::{Archive, ColourTransform};
 
 /// A conversion, described for the coded samples.
@@ -15,7 +16,8 @@ pub(super) struct Task {
 impl Task {
     pub(super) fn new(config: &ConvertConfig, archive: &Archive) -> Self {
         let missing_value = sample::missing_value(archive.sample, config.missing_value);
-        let (config, archive) = (ConvertConfig { missing_value, ..config.clone() }, archive.clone());
+        let config = in_shares(ConvertConfig { missing_value, ..config.clone() });
+        let archive = archive.clone();
         let Some(colours) = config.colours.clone() else { return Self { config, archive, colour_transform: None } };
         let colour_transform = ColourTransform { colours, sample: archive.sample, missing_value };
         let (range, missing_value) = (config.range.or(Some(BRIGHTNESS)), None);
@@ -26,6 +28,12 @@ impl Task {
             colour_transform: Some(colour_transform),
         }
     }
+}
+
+/// The same bound as a tolerance. An error in the samples' unit is a share of a range of length 1.
+fn in_shares(config: ConvertConfig) -> ConvertConfig {
+    let Some(tolerance) = config.max_error else { return config };
+    ConvertConfig { tolerance, range: config.range.or(Some(UNIT_RANGE)), ..config }
 }
 
 /// The range of a colour channel, from no brightness to full.

@@ -4,13 +4,14 @@ use crate::base::description::Description;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::mapped::{Access, FileBytes, State};
-use crate::base::sample::{SampleType, join_ranges};
+use crate::base::sample::SampleType;
 use crate::base::time_labels::TimeLabels;
 use crate::codec::WindowCodec;
 use crate::codec::coarse;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
 use crate::file::detail;
+use crate::file::promise;
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -188,15 +189,13 @@ impl CoefficientFile {
 
     /// Range of the decoded samples of all windows; (0, 0) if all are missing.
     pub fn value_range(&self) -> (f64, f64) {
-        let ranges = self.metadata().windows.iter().map(|w| (w.min, w.max));
-        let range = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), join_ranges);
-        if range.0 <= range.1 { range } else { (0.0, 0.0) }
+        promise::value_range(self.metadata())
     }
 
     /// The same as far as the source's samples are known to lie within.
     #[doc(hidden)]
     pub fn source_range(&self) -> (f64, f64) {
-        let ((lo, hi), (least, most)) = (self.value_range(), self.metadata().range());
+        let ((lo, hi), (least, most)) = (self.value_range(), promise::range_of_shares(self.metadata()));
         if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
     }
 

@@ -6,6 +6,7 @@
 mod counted;
 mod detail;
 mod batch;
+pub mod promise;
 mod coefficient_file;
 pub mod report;
 pub mod verify;

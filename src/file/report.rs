@@ -1,9 +1,10 @@
 //! What a coefficient file promises and what it reached, in numbers and words, for `convert` and `info`.
 
+use super::promise::{max_error, range_of_shares, unit};
 use crate::codec::bound::Bound;
 use crate::codec::scheme::Scheme;
 use serde::Serialize;
-use wavesplat_format::Window;
+use wavesplat_format::{Metadata, Window};
 
 /// What the tolerance promises.
 #[derive(Debug, Clone, Serialize)]
@@ -12,8 +13,12 @@ pub struct BoundReport {
     pub bound: &'static str,
     /// Whether the tolerance is guaranteed; false where the bound that is kept is itself an estimate.
     pub guaranteed: bool,
-    /// As asked for.
+    /// As asked for; the same number as `max_error` if that was asked for.
     pub tolerance: f64,
+    /// The largest error as asked for in the samples' unit, instead of a tolerance.
+    pub max_error: Option<f64>,
+    /// The samples' unit, if it is known.
+    pub units: Option<String>,
     /// Of a relative bound: below this magnitude samples may be as wrong as at it.
     pub floor: Option<f64>,
     /// Of a sampled bound: pixels on each of three faces.
@@ -25,16 +30,18 @@ pub struct BoundReport {
 }
 
 impl BoundReport {
-    /// Of a tolerance that refers, where it does to one, to the value range `range`.
-    pub fn new(bound: Bound, tolerance: f64, range: (f64, f64)) -> Self {
-        let promise = if tolerance == 0.0 { "every bit is kept".into() } else { words(bound, tolerance, range) };
+    /// Of a file.
+    pub fn of(file: &Metadata) -> Self {
+        let Metadata { bound, tolerance, .. } = *file;
+        let promise = if tolerance == 0.0 { "every bit is kept".into() } else { words(file) };
         let (floor, samples, seed) = match bound {
             Bound::Pointwise | Bound::Rms => (None, None, None),
             Bound::Relative { floor } => (Some(floor), None, None),
             Bound::Sampled { samples, seed } => (None, Some(samples), Some(seed)),
         };
         let guaranteed = tolerance == 0.0 || samples.is_none();
-        Self { bound: bound.name(), guaranteed, tolerance, floor, samples, seed, promise }
+        let (max_error, units) = (max_error(file), unit(file).map(Into::into));
+        Self { bound: bound.name(), guaranteed, tolerance, max_error, units, floor, samples, seed, promise }
     }
 }
 
@@ -45,19 +52,45 @@ impl BoundReport {
     }
 }
 
-fn words(bound: Bound, tolerance: f64, (lo, hi): (f64, f64)) -> String {
-    match bound {
-        Bound::Pointwise => format!("the error of every sample <= {tolerance:e} x range ({lo:.4e} to {hi:.4e})"),
-        Bound::Rms => {
-            format!("the rms error of every voxel in every window <= {tolerance:e} x range ({lo:.4e} to {hi:.4e})")
+/// The largest error, or root mean square, that any window allows.
+pub fn largest_bound(file: &Metadata) -> f64 {
+    file.windows.iter().map(|w| w.delta).fold(0.0, f64::max)
+}
+
+/// A promise in words, with the error in the samples' unit.
+fn words(file: &Metadata) -> String {
+    let (tolerance, (lo, hi)) = (file.tolerance, range_of_shares(file));
+    let amount = |error: f64| unit(file).map_or(format!("{error:e}"), |unit| format!("{error:e} {unit}"));
+    let (absolute, largest) = (max_error(file).map(amount), amount(rounded(largest_bound(file))));
+    let of_range = || {
+        let share = || format!("{tolerance:e} x range ({lo:.4e} to {hi:.4e}), at most {largest}");
+        absolute.clone().unwrap_or_else(share)
+    };
+    match file.bound {
+        Bound::Pointwise => format!("the error of every sample <= {}", of_range()),
+        Bound::Rms => format!("the rms error of every voxel in every window <= {}", of_range()),
+        Bound::Relative { floor: 0.0 } => {
+            format!("the error of every sample v <= {tolerance:e} x |v|, at most {largest}")
         }
-        Bound::Relative { floor: 0.0 } => format!("the error of every sample v <= {tolerance:e} x |v|"),
-        Bound::Relative { floor } => format!("the error of every sample v <= {tolerance:e} x max(|v|, {floor:e})"),
+        Bound::Relative { floor } => {
+            format!("the error of every sample v <= {tolerance:e} x max(|v|, {floor:e}), at most {largest}")
+        }
         Bound::Sampled { samples, seed } => format!(
             "AN ESTIMATE, NOT A GUARANTEE, of what keeps pixels within {tolerance:e} of themselves: {samples} pixels on \
-             each of three faces, seed {seed}; guaranteed is the rms error of every voxel in every window, <= that estimate"
+             each of three faces, seed {seed}; guaranteed is the rms error of every voxel in every window, <= that estimate, \
+             at most {largest}"
         ),
     }
+}
+
+/// A bound rounded up to four digits, so that what is printed is never smaller.
+fn rounded(bound: f64) -> f64 {
+    if bound == 0.0 || !bound.is_finite() {
+        return bound;
+    }
+    let near = |value: f64| format!("{value:.3e}").parse().unwrap_or(value);
+    let shown: f64 = near(bound);
+    if shown >= bound { shown } else { near(bound * (1.0 + 5e-4)) }
 }
 
 /// What one window promised and reached, and what it holds.

@@ -16,6 +16,7 @@ mod magnitude;
 mod numbering;
 mod packing;
 mod parts;
+pub(crate) mod ends;
 pub(crate) mod scan;
 mod select;
 mod series;

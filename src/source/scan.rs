@@ -4,6 +4,7 @@ use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, join_ranges};
+use crate::source::ends::Ends;
 use crate::source::{FrameSource, FrameWindow};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
@@ -13,6 +14,8 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 pub(crate) struct Scan {
     /// Range of the samples that are not missing; (inf, -inf) if all are.
     pub(crate) range: (f64, f64),
+    /// How often its ends occur, and what is next to them.
+    pub(crate) ends: Ends,
     /// Missing samples.
     pub(crate) missing: u64,
     /// The first of them: frame within the window, and index of the voxel within the frame.
@@ -22,8 +25,13 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    pub(crate) const NOTHING: Self =
-        Self { range: (f64::INFINITY, f64::NEG_INFINITY), missing: 0, first_missing: None, digest: 0 };
+    pub(crate) const NOTHING: Self = Self {
+        range: (f64::INFINITY, f64::NEG_INFINITY),
+        ends: Ends::NONE,
+        missing: 0,
+        first_missing: None,
+        digest: 0,
+    };
 
     /// What two consecutive stretches hold together.
     fn then(self, next: Self) -> Self {
@@ -32,6 +40,7 @@ impl Scan {
         digests[8..].copy_from_slice(&next.digest.to_le_bytes());
         Self {
             range: join_ranges(self.range, next.range),
+            ends: self.ends.join(next.ends),
             missing: self.missing + next.missing,
             first_missing: self.first_missing.or(next.first_missing),
             digest: xxh3_64_with_seed(&digests, 0),
@@ -98,9 +107,14 @@ pub(crate) fn scan_frame(
 
 fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
-    seen.range = sample::range_of_present(ty, bytes, declared, |i| {
+    let (mut range, mut ends) = (seen.range, seen.ends);
+    let missing = |i| {
         seen.missing += 1;
         seen.first_missing.get_or_insert((frame, at + i));
+    };
+    sample::for_each_present(ty, bytes, declared, missing, |values, run| {
+        range = join_ranges(range, run);
+        ends.add(values, run);
     });
-    seen
+    Scan { range, ends, ..seen }
 }

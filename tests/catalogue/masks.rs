@@ -8,8 +8,10 @@ use crate::common::series::Mask;
 use crate::common::views::{SKEWED, field, rounding, truth, view};
 use crate::common::{Stored, extracted, looking, pictures, settings, stored, windows};
 use crate::images::bits;
+use std::path::Path;
+use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{Basis, ConvertConfig};
+use wavesplat::convert::{Basis, ConvertConfig, convert};
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
 
 const FLOATS: [SampleType; 3] = [SampleType::F16, SampleType::F32, SampleType::F64];
@@ -167,8 +169,15 @@ fn only_undeclared_values_widen_the_bound() {
         let back = extracted(&file.open());
         let kept = (2..values.len()).step_by(5).all(|i| back[i * size..][..size] == memory.frames[i * size..][..size]);
         assert!(kept, "{ty} {value}");
-        // If the value is not declared, it is an ordinary number: it is part of the range, and so of the bound.
-        let file = stored(&mut memory.clone(), &settings(Basis::Haar, 16, 0.1));
-        assert!(file.report.missing == 0 && file.report.delta >= 0.09 * value.abs());
+        // If the value is not declared, it is part of the range, and so of the bound, which then leaves nothing of the rest.
+        let plain = ConvertConfig { refuse_fill: true, ..settings(Basis::Haar, 16, 0.1) };
+        let refused = convert(&mut memory.clone(), &plain, Path::new("a.wspl"), Vec::new(), &Silent).unwrap_err();
+        assert!(refused.to_string().contains("samples are exactly"), "{refused}");
+        let file = stored(&mut memory.clone(), &ConvertConfig { refuse_fill: false, ..plain });
+        assert!(
+            file.report.missing == 0 && file.report.delta >= 0.09 * value.abs() && !file.report.warnings.is_empty(),
+            "{:?}",
+            file.report.warnings
+        );
     }
 }

@@ -22,6 +22,7 @@ mod interrupted;
 mod job;
 mod killed;
 mod manners;
+mod max_error;
 mod memory;
 mod modes;
 mod mutated;
@@ -35,6 +36,7 @@ mod several;
 mod streams;
 mod times;
 mod usage;
+mod warned;
 
 use std::ffi::OsStr;
 use std::fs;

@@ -18,12 +18,13 @@ fn work() -> (Work, Archive) {
     (work, archive)
 }
 
-const SETTINGS: [&str; 5] = [
+const SETTINGS: [&str; 6] = [
     "--window 8",
     "--window 8 --basis haar --bound rms",
     "--window 8 --basis learned --range -2,3 --level 7",
     "--window 4 --basis pyramid --space linear --bound relative --floor 0.1 --missing mask",
     "--window 8 --tolerance 0 --missing-value 7",
+    "--window 8 --max-error 0.02",
 ];
 
 #[test]
@@ -171,6 +172,7 @@ fn runs_are_not_resumed_with_other_frames_or_settings() {
         ("--window 8 --basis haar", "another basis: auto, now haar"),
         ("--window 8 --bound rms", "another bound: Pointwise, now Rms"),
         ("--window 8 --range 0,1", "another range: none, now 0.0,1.0"),
+        ("--window 8 --max-error 0.1", "another max-error: none, now 0.1"),
     ] {
         let run = work.piped(&format!("convert - -o a.wspl --resume {settings}"), &archive.npy());
         run.fails(2, &["a.wspl", word]);

@@ -6,10 +6,21 @@ use super::{Work, small};
 fn bad_values_of_convert_are_named() {
     let work = Work::new();
     work.write("a.npy", small().npy());
-    let cases: [(&str, &[&str]); 34] = [
+    let cases: [(&str, &[&str]); 45] = [
         ("--tolerance -1", &["--tolerance", "0 to 1"]),
         ("--tolerance nan", &["--tolerance", "0 to 1"]),
         ("--tolerance much", &["--tolerance"]),
+        ("--max-error -1", &["--max-error", "0 or more", "unit"]),
+        ("--max-error nan", &["--max-error", "finite"]),
+        ("--max-error inf", &["--max-error", "finite"]),
+        ("--max-error much", &["--max-error", "number", "NAME=NUMBER"]),
+        ("--max-error temp=0.1,salt=", &["--max-error", "NAME=NUMBER"]),
+        ("--max-error temp=0.1,temp=0.2", &["--max-error", "temp twice"]),
+        ("--max-error 0.1 --tolerance 0.01", &["--tolerance", "--max-error", "give one"]),
+        ("--max-error 0.1 --range 0,1", &["--range", "--max-error", "give one"]),
+        ("--max-error 0.1 --bound relative", &["--max-error", "--bound pointwise or rms"]),
+        ("--max-error 0.1 --bound sampled", &["--max-error", "--bound pointwise or rms"]),
+        ("--max-error 0.1 --transfer-function turbo", &["--max-error", "--transfer-function"]),
         ("--basis haar --window 30", &["--window", "not 30", "haar", "32"]),
         ("--window 0", &["--window", "not 0"]),
         ("--basis multi --window 32", &["--window", "not 32", "multi", "33"]),

@@ -40,7 +40,8 @@ pub(crate) fn windows(n: usize) -> [(Basis, usize); 4] {
 /// A pointwise bound; missing samples are kept.
 pub(crate) fn settings(basis: Basis, window: usize, tolerance: f64) -> ConvertConfig {
     let (coding, missing) = (basis.into(), MissingPolicy::Mask);
-    ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..ConvertConfig::new(tolerance) }
+    let plain = ConvertConfig { refuse_fill: false, ..ConvertConfig::new(tolerance) };
+    ConvertConfig { coding, window, missing, level: 1, memory: MEMORY, ..plain }
 }
 
 /// A coefficient file without a folder of its own: thousands of folders take longer to create than their files to write.

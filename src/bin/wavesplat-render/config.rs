@@ -6,6 +6,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::range_bound;
 use wavesplat::file::CoefficientFile;
+use wavesplat::file::promise::{range_of_shares, share_tolerance};
 use wavesplat::render::{Mode, Quantity, RenderConfig, Scene, default_splat_error};
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
@@ -41,7 +42,7 @@ impl Cli {
         let (whole, lod) = file.map_or((*grid, 0), |file| (file.whole_grid(), file.lod()));
         let file = file.map(CoefficientFile::metadata);
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
-        let tolerance = self.tolerance.or(file.map(|m| m.tolerance));
+        let tolerance = self.tolerance.or(file.map(share_tolerance));
         let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
         let all = scene.frames().unwrap_or(0);
         Ok(RenderConfig {
@@ -81,10 +82,11 @@ impl Cli {
         if !(0.0..=1.0).contains(&tolerance) {
             return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
         }
-        let allowed = range_bound(tolerance, file.range());
+        let range = range_of_shares(file);
+        let allowed = range_bound(tolerance, range);
         let reached = file.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
         if allowed < reached && self.error == ErrorName::Certified {
-            let least = reached / (file.range().1 - file.range().0);
+            let least = reached / (range.1 - range.0);
             let what = "the samples of the file are up to";
             return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
         }

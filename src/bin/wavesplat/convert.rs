@@ -2,10 +2,13 @@
 
 use super::several;
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
+use wavesplat::base::error::{Error, Note, Result};
 use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::cli::{CommonArgs, InputArgs, Pair, SelectArgs, share, spare_inputs, transfer_function};
+use wavesplat::cli::{
+    CommonArgs, InputArgs, MaxError, Pair, SelectArgs, advice, note_text, share, spare_inputs, transfer_function,
+};
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{
     Basis, Bound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor,
@@ -48,6 +51,10 @@ pub(crate) struct ConvertArgs {
     /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit [default: 0.01]
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     tolerance: Option<f64>,
+    /// Largest allowed error in the samples' unit, instead of --tolerance, for --bound pointwise and rms; 0 keeps every
+    /// bit. NAME=X,NAME=X gives one for each variable
+    #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    max_error: Option<MaxError>,
     /// Error that the tolerance limits
     #[arg(long, value_enum, default_value = "pointwise", help_heading = ERROR_BOUND)]
     bound: BoundName,
@@ -225,7 +232,31 @@ pub(crate) fn finish(
     })?;
     out.commit_if(|part| resume::check(part).and_then(|()| still()))?;
     common.note(summary(&report, config.bound));
-    common.report(&report, name == Path::new(STANDARD))
+    report.warnings.iter().for_each(|warning| common.note(format_args!("warning: {}", note_text(warning))));
+    common.report(&Reported::of(&report), name == Path::new(STANDARD))
+}
+
+/// The keys of `--json`.
+#[derive(Serialize)]
+struct Reported<'a> {
+    #[serde(flatten)]
+    report: &'a ConvertReport,
+    warnings: Vec<Warning<'a>>,
+}
+
+/// What is worth knowing, and what to type.
+#[derive(Serialize)]
+struct Warning<'a> {
+    text: &'a str,
+    remedy: Option<String>,
+}
+
+impl<'a> Reported<'a> {
+    fn of(report: &'a ConvertReport) -> Self {
+        let warning =
+            |note: &'a Note| Warning { text: &note.text, remedy: note.remedy.as_ref().map(|r| advice(r).into()) };
+        Self { report, warnings: report.warnings.iter().map(warning).collect() }
+    }
 }
 
 impl ConvertArgs {
@@ -258,6 +289,7 @@ impl ConvertArgs {
     fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
         let given = [
             (self.tolerance.is_some(), "--tolerance"),
+            (self.max_error.is_some(), "--max-error"),
             (!matches!(self.bound, BoundName::Pointwise), "--bound"),
             (self.range.is_some(), "--range"),
             (self.missing.is_some(), "--missing"),
@@ -284,11 +316,13 @@ impl ConvertArgs {
     }
 
     fn config(&self) -> Result<ConvertConfig> {
+        self.refuse_with_max_error()?;
         let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
         Ok(ConvertConfig {
             coding: self.coding()?,
             window: self.window.unwrap_or(window),
             tolerance: self.tolerance.unwrap_or(TOLERANCE),
+            max_error: None, // may depend on the variable
             bound: self.bound()?,
             range: self.range()?,
             missing: match (self.missing, self.missing_value) {
@@ -296,6 +330,7 @@ impl ConvertArgs {
                 (Some(MissingName::Mask), _) | (None, Some(_)) => MissingPolicy::Mask,
             },
             missing_value: self.missing_value,
+            refuse_fill: true,
             colours: None, // may depend on the frames
             block: self.block,
             level: self.level,
@@ -309,7 +344,31 @@ impl ConvertArgs {
         let declared = source.archive().missing.is_some();
         let missing_value = source.archive().missing_value(config.missing_value);
         let missing = if self.missing.is_none() && declared { MissingPolicy::Mask } else { config.missing };
-        Ok(ConvertConfig { colours: self.colours(source, missing_value)?, missing, missing_value, ..config })
+        let max_error =
+            self.max_error.as_ref().map(|error| error.of(source.archive().variable.as_deref())).transpose()?;
+        Ok(ConvertConfig { colours: self.colours(source, missing_value)?, max_error, missing, missing_value, ..config })
+    }
+
+    /// Options that an error in the samples' unit leaves no meaning.
+    fn refuse_with_max_error(&self) -> Result<()> {
+        let for_samples = matches!(self.bound, BoundName::Pointwise | BoundName::Rms);
+        let given = [
+            (
+                self.tolerance.is_some(),
+                "--tolerance: is a share of a range, and --max-error is in the samples' unit; give one",
+            ),
+            (
+                self.transfer_function.is_some(),
+                "--max-error: is in the samples' unit, and --transfer-function codes colours",
+            ),
+            (self.range.is_some(), "--range: the tolerance refers to it, and --max-error to no range; give one"),
+            (
+                !for_samples,
+                "--max-error: needs --bound pointwise or rms; the others are shares of the samples themselves",
+            ),
+        ];
+        let refused = given.into_iter().find(|(given, _)| *given && self.max_error.is_some());
+        refused.map_or(Ok(()), |(_, what)| Err(Error::usage(what)))
     }
 
     /// The colours for samples, if samples are turned into colours.
@@ -393,15 +452,19 @@ fn summary(r: &ConvertReport, bound: Bound) -> String {
     let ratio = r.input_bytes as f64 / r.output_bytes as f64;
     let new = (r.frames - r.frames_before) as f64 / r.frames as f64;
     let rate = new * r.input_bytes as f64 / r.seconds / 1e6;
+    let unit = r.promise.units.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
     let errors = match bound {
-        Bound::Pointwise => format!("largest error {:.4e} of {:.4e} allowed", r.reached, r.delta),
+        Bound::Pointwise => format!("largest error {:.4e} of {:.4e}{unit} allowed", r.reached, r.delta),
         Bound::Relative { .. } => {
             let tolerance = r.promise.tolerance;
             let relative = r.share * tolerance;
-            format!("largest relative error {relative:.4e} of {tolerance:.4e} allowed, largest error {:.4e}", r.reached)
+            format!(
+                "largest relative error {relative:.4e} of {tolerance:.4e} allowed, largest error {:.4e}{unit}",
+                r.reached
+            )
         }
         Bound::Rms | Bound::Sampled { .. } => {
-            format!("rms error of every series within {:.4e}, largest single error {:.4e}", r.delta, r.reached)
+            format!("rms error of every series within {:.4e}, largest single error {:.4e}{unit}", r.delta, r.reached)
         }
     };
     let estimate = r.promise.caution();

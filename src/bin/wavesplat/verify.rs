@@ -1,11 +1,12 @@
 //! `wavesplat verify`
 
 use clap::Args;
+use serde::Serialize;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print, remembered};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::BoundReport;
+use wavesplat::file::report::{BoundReport, largest_bound};
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
 
@@ -37,6 +38,17 @@ pub(crate) struct VerifyArgs {
     common: CommonArgs,
 }
 
+/// The keys of `--json`.
+#[derive(Serialize)]
+struct Reported<'a> {
+    #[serde(flatten)]
+    report: &'a VerifyReport,
+    #[serde(flatten)]
+    promise: BoundReport,
+    /// The largest error, or root mean square, that any window allows.
+    delta: f64,
+}
+
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
     let file = CoefficientFile::open_with(&args.file, args.input.access())?;
@@ -46,11 +58,11 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         None => None,
     };
     let report = verify(&file, source, args.common.memory.0, &args.common.progress("verify", "blocks"))?;
+    let (promise, delta) = (BoundReport::of(file.metadata()), largest_bound(file.metadata()));
     if args.common.json {
-        args.common.report(&report, false)?;
+        args.common.report(&Reported { report: &report, promise, delta }, false)?;
     } else if !args.common.quiet {
-        let m = file.metadata();
-        print(&summary(&report, &BoundReport::new(m.bound, m.tolerance, m.range())))?;
+        print(&summary(&report, &promise))?;
     }
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
@@ -111,9 +123,15 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     if let Some(c) = &r.against {
         let held = if missed(c).is_none() { "kept" } else { "MISSED" };
         text += &format!(
-            "{} bound {held}: {:.4} of it used; largest sample error {:.4e}, rms error {:.4e}, {} missing samples as they were, \
+            "{} bound {held}: {:.4} of it used ({}); largest sample error {:.4e}, rms error {:.4e}, {} missing samples as they were, \
              {} samples compared{estimate}\n",
-            promise.bound, c.largest_share_of_bound, c.largest_error, c.rms_error, c.missing, c.samples
+            promise.bound,
+            c.largest_share_of_bound,
+            promise.promise,
+            c.largest_error,
+            c.rms_error,
+            c.missing,
+            c.samples
         );
     }
     text

@@ -11,6 +11,7 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
+use crate::file::promise::share_tolerance;
 use crate::file::{BlockBatch, CoefficientFile};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
@@ -62,7 +63,7 @@ impl Scene for CoefficientScene {
     }
 
     fn tolerance(&self) -> Option<f64> {
-        Some(self.file.metadata().tolerance)
+        Some(share_tolerance(self.file.metadata()))
     }
 
     fn batch_end(&self, frame: usize) -> usize {

@@ -78,6 +78,7 @@ fn config(input: &mut Input<'_>) -> ConvertConfig {
         bound: input.pick(&[Bound::Pointwise, Bound::Rms, Bound::Relative { floor }, sampled]),
         missing: input.pick(&[MissingPolicy::Mask, MissingPolicy::Error]),
         missing_value: input.pick(&[None, Some(0.0), Some(1e35), Some(-1.0)]),
+        refuse_fill: false, // any number may repeat
         block: Some(1 + input.below(6)),
         coding,
         window,

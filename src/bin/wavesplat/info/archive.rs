@@ -7,7 +7,7 @@ use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{note_text, print};
-use wavesplat::convert::estimate::{Estimate, estimate};
+use wavesplat::convert::estimate::{Estimate, estimates};
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::source::Archive;
 
@@ -37,6 +37,8 @@ struct Info<'a> {
     raw_bytes: Option<u64>,
     notes: Vec<String>,
     estimate: Option<Estimate>,
+    /// Of several tolerances.
+    estimates: Vec<Estimate>,
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
@@ -47,16 +49,20 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let mut source = args.select.narrow(source)?;
     let archive = source.archive().clone();
     let progress = args.common.progress("estimate", "windows");
-    let estimated = args
-        .estimate
-        .map(|tolerance| estimate(source.as_mut(), &config(tolerance, args.common.memory.0, &archive), &progress));
-    let estimated = estimated.transpose()?;
-    let info = Info::of(&archive, estimated);
+    let configs = |tolerances: &[f64]| -> Vec<ConvertConfig> {
+        tolerances.iter().map(|tolerance| config(*tolerance, args.common.memory.0, &archive)).collect()
+    };
+    let asked = args.estimate.map(|one| one.map_or(configs(&TOLERANCES), |one| configs(&[one]))).unwrap_or_default();
+    let estimates = estimates(source.as_mut(), &asked, &progress)?;
+    let info = Info::of(&archive, estimates, args.estimate.is_some_and(|one| one.is_some()));
     if args.common.json {
         return args.common.report(&info, false);
     }
     print(&info.text())
 }
+
+/// The tolerances of a table.
+const TOLERANCES: [f64; 5] = [0.1, 0.01, 1e-3, 1e-4, 1e-5];
 
 /// The default configuration of `convert`.
 fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
@@ -65,8 +71,9 @@ fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
 }
 
 impl<'a> Info<'a> {
-    fn of(archive: &'a Archive, estimate: Option<Estimate>) -> Self {
+    fn of(archive: &'a Archive, mut estimates: Vec<Estimate>, single: bool) -> Self {
         let labels = archive.time_labels();
+        let estimate = if single { estimates.pop() } else { None };
         let frame = (archive.grid.whole().voxels() * archive.sample.size()) as u64;
         Self {
             format: archive.format,
@@ -88,6 +95,7 @@ impl<'a> Info<'a> {
             raw_bytes: archive.frames.and_then(|frames| frame.checked_mul(frames as u64)),
             notes: archive.notes.iter().map(note_text).collect(),
             estimate,
+            estimates,
         }
     }
 
@@ -125,7 +133,26 @@ impl<'a> Info<'a> {
                 e.bytes, e.ratio, e.tolerance, e.range.0, e.range.1, e.blocks, e.windows
             );
         }
+        text += &self.table();
         self.notes.iter().for_each(|note| text += &format!("note       {note}\n"));
+        text
+    }
+
+    /// The estimates of several tolerances, a line for each; empty if there are none.
+    fn table(&self) -> String {
+        let Some(Estimate { range: (lo, hi), blocks, windows, .. }) = self.estimates.first() else {
+            return String::new();
+        };
+        let unit = self.units.map_or(String::new(), |unit| format!(" {unit}"));
+        let of = format!("range {lo:.4e} to {hi:.4e}{unit}, by {blocks} blocks of {windows} windows");
+        let mut text = format!("estimate   {of}; lost: voxels that change by less than the error\n");
+        let [tolerance, bytes, ratio, error, lost] = ["tolerance", "bytes", "smaller", "error", "lost"];
+        let _ = writeln!(text, "{tolerance:>20} {bytes:>13} {ratio:>9} {error:>10} {lost:>6}");
+        for Estimate { tolerance, bytes, ratio, error, lost, .. } in &self.estimates {
+            let lost = lost.map_or("-".into(), |lost| format!("{:.0} %", 100.0 * lost));
+            let _ =
+                writeln!(text, "{tolerance:>20} {bytes:>13} {:>9} {error:>10.2e} {lost:>6}", format!("{ratio:.1}x"));
+        }
         text
     }
 }

@@ -8,7 +8,8 @@ use wavesplat::base::description::Description;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
 use wavesplat::convert::{Bound, Packing, options};
-use wavesplat::file::report::{BoundReport, WindowReport};
+use wavesplat::file::promise::range_of_shares;
+use wavesplat::file::report::{BoundReport, WindowReport, largest_bound};
 use wavesplat::file::{CoefficientFile, time_labels};
 use wavesplat::source::CHANNELS;
 
@@ -34,7 +35,10 @@ struct Info {
     variable: Option<String>,
     #[serde(flatten)]
     promise: BoundReport,
+    /// The range of values that shares refer to.
     range: (f64, f64),
+    /// The largest error, or root mean square, that any window allows.
+    delta: f64,
     value_range: (f64, f64),
     missing_value: Option<f64>,
     block_edge: u32,
@@ -88,8 +92,9 @@ impl Info {
             dates: times.dates(),
             span: times.span(),
             variable: m.variable.clone(),
-            promise: BoundReport::new(m.bound, m.tolerance, m.range()),
-            range: m.range(),
+            promise: BoundReport::of(m),
+            range: range_of_shares(m),
+            delta: largest_bound(m),
             value_range: file.value_range(),
             missing_value: m.missing_value,
             block_edge: m.block_edge,

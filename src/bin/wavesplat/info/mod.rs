@@ -18,15 +18,16 @@ Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
+  wavesplat info frames/ --estimate
   wavesplat info frames/ --estimate 0.001")]
 pub(crate) struct InfoArgs {
     /// A coefficient file, or frames as for convert
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// For frames: convert a few blocks, and estimate the size of a coefficient file of this tolerance [0.01 if none is
-    /// given]
-    #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true, default_missing_value = "0.01")]
-    estimate: Option<f64>,
+    /// For frames: convert a few blocks, and estimate the size of a coefficient file of this tolerance [a table of five if
+    /// none is given]
+    #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true)]
+    estimate: Option<Option<f64>>,
     #[command(flatten)]
     select: SelectArgs,
     #[command(flatten)]
