@@ -23,6 +23,9 @@ fn each_variable_becomes_a_file() {
     assert_eq!(work.names().iter().filter(|name| name.starts_with("b_")).count(), 2);
     work.wavesplat(&format!("verify a_density.wspl --against {source}")).ok();
     work.wavesplat(&format!("convert {source} -o c.wspl --variable {two}")).fails(2, &["%n", "run_%n.wspl"]);
+    let one = input("vti/vector.vti");
+    work.wavesplat(&format!("convert {one} -o e_%n.wspl --variable all")).ok();
+    assert!(work.names().contains(&"e_velocity_2.wspl".to_string()), "{:?}", work.names());
     let twice = format!("convert {source} -o d_%n.wspl --variable {},{}", names[0], names[0]);
     work.wavesplat(&twice).fails(2, &["two variables"]);
 }

@@ -4,6 +4,7 @@ use super::convert::ConvertArgs;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
+use wavesplat::cli::InputArgs;
 
 /// What stands for the name of a variable in the name of the output.
 const NAME: &str = "%n";
@@ -15,21 +16,34 @@ const ALL: &str = "all";
 pub(super) fn commands(args: &ConvertArgs) -> Result<Option<Vec<ConvertArgs>>> {
     let Some(names) = names(args)? else { return Ok(None) };
     let mut outputs = BTreeSet::new();
-    let command = |name: String| {
+    let command = |Chosen { variable, name }: Chosen| {
         let output = output(args, &name)?;
         if !outputs.insert(output.clone()) {
             return Err(Error::usage(format!("{}: two variables would be written here", output.display())));
         }
         let mut one = args.clone();
-        one.input.variable = Some(name);
+        one.input.variable = variable;
         one.output = output;
         Ok(one)
     };
     names.into_iter().map(command).collect::<Result<Vec<_>>>().map(Some)
 }
 
-/// The names of several variables; none if one is meant.
-fn names(args: &ConvertArgs) -> Result<Option<Vec<String>>> {
+/// A variable to convert.
+struct Chosen {
+    /// What `--variable` would take; none for the only one of an archive.
+    variable: Option<String>,
+    name: String,
+}
+
+impl From<String> for Chosen {
+    fn from(name: String) -> Self {
+        Self { variable: Some(name.clone()), name }
+    }
+}
+
+/// Several variables; none if one is meant.
+fn names(args: &ConvertArgs) -> Result<Option<Vec<Chosen>>> {
     match args.input.variable.as_deref() {
         Some(ALL) => {
             let mut input = args.input.clone();
@@ -40,13 +54,21 @@ fn names(args: &ConvertArgs) -> Result<Option<Vec<String>>> {
                 n => (0..n).map(|component| format!("{}[{component}]", variable.name)).collect(),
             };
             match all.is_empty() {
-                true => Err(Error::usage("--variable all: the input has one variable; leave the option out")),
-                false => Ok(Some(all.iter().flat_map(components).collect())),
+                true => only(args, &input).map(|only| Some(vec![only])),
+                false => Ok(Some(all.iter().flat_map(components).map(Chosen::from).collect())),
             }
         }
-        Some(list) if list.contains(',') => Ok(Some(list.split(',').map(|name| name.trim().into()).collect())),
+        Some(list) if list.contains(',') => {
+            Ok(Some(list.split(',').map(|name| Chosen::from(name.trim().to_string())).collect()))
+        }
         _ => Ok(None),
     }
+}
+
+/// The only variable of an archive.
+fn only(args: &ConvertArgs, input: &InputArgs) -> Result<Chosen> {
+    let source = input.open_quietly(&args.inputs, args.common.stream_memory())?;
+    Ok(Chosen { variable: None, name: source.archive().variable.clone().unwrap_or_else(|| "values".into()) })
 }
 
 /// The output for a variable, whose name has no separators and brackets there.
