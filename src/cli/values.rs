@@ -72,7 +72,7 @@ impl MaxError {
             return Ok(*error);
         }
         let names: Vec<&str> = named.iter().map(|(name, _)| name.as_str()).collect();
-        let what = variable.map_or("the variable, which has no name: give one number".into(), |name| name.to_string());
+        let what = variable.map_or("the variable, which has no name: give one number".into(), ToString::to_string);
         Err(Error::usage(format!("--max-error: is given for {}, not for {what}", names.join(", "))))
     }
 }

@@ -89,9 +89,9 @@ fn amount(value: f64) -> String {
 /// The largest of 1, 2 and 5 times a power of ten that is not above `value`, which is above 0.
 fn round_down(value: f64) -> String {
     let exponent = libm::log10(value).floor() as i32;
-    let candidates = (exponent - 1..=exponent + 1).flat_map(|e| [1, 2, 5].map(|digit| format!("{digit}e{e}")));
+    let mut candidates = (exponent - 1..=exponent + 1).flat_map(|e| [1, 2, 5].map(|digit| format!("{digit}e{e}")));
     let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
-    let found = candidates.filter(|text| number(text) <= value).last().map_or(0.0, |text| number(&text));
+    let found = candidates.rfind(|text| number(text) <= value).map_or(0.0, |text| number(&text));
     format!("{found:?}")
 }
 

@@ -51,7 +51,8 @@ fn a_fill_value_near_the_samples_is_warned_of_and_ordinary_extremes_are_not() {
     let run = work.wavesplat("convert a.npy -o a.wspl --json").ok();
     assert!(fills(&run), "{}", run.err);
     assert_eq!(run.json()["warnings"][0]["remedy"], "if it means missing, add --missing-value -999");
-    let ordinary: [(&str, Box<dyn Fn(usize, f32) -> f32>); 7] = [
+    type Change = Box<dyn Fn(usize, f32) -> f32>;
+    let ordinary: [(&str, Change); 7] = [
         ("plain", Box::new(|_, v| v)),
         ("a background of 0", Box::new(|x, v| if x < 9 { 0.0 } else { 300.0 + v })),
         ("a hot body", Box::new(|x, v| if x < 4 { 1000.0 } else { 300.0 + v })),
