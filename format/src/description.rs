@@ -415,7 +415,7 @@ mod tests {
                         first: [f64::NAN; 3],
                         directions: [[0.0; 3]; 3],
                         spacing: [1.0; 3],
-                    })
+                    });
                 },
                 "finite",
             ),

@@ -75,14 +75,14 @@ impl Dataset {
         let dimensions = named_dimensions(description);
         let mut names: BTreeSet<String> = BTreeSet::from([sound(&contents.name)]);
         let is_new = |name: &String| names.insert(name.clone());
-        let own = description.variables.iter().filter_map(|variable| {
+        let own = description.variables.iter().map(|variable| {
             let values = match &variable.values {
                 Values::Times(ty) => as_type(*ty, &contents.times),
                 values => values.clone(),
             };
             let dimensions = variable.dimensions.iter().map(|dimension| *dimension as usize).collect();
             let (name, attributes) = (sound(&variable.name), variable.attributes.clone());
-            Some(DatasetVariable { name, dimensions, attributes, values })
+            DatasetVariable { name, dimensions, attributes, values }
         });
         let mut variables: Vec<DatasetVariable> = own.chain(lattice(contents, description, &dimensions)).collect();
         variables.retain({

@@ -88,7 +88,7 @@ impl Store {
         let chunks = Chunks::new(lengths, ty.size());
         let fill = samples.fill.map_or(Value::Null, |fill| fill_value(ty, fill));
         let compressor = json!({ "id": "zstd", "level": LEVEL });
-        let array = array(&chunks, dtype(number_type(ty)), fill, compressor);
+        let array = array(&chunks, &dtype(number_type(ty)), &fill, &compressor);
         builder.array(&samples.name, array, &samples.attributes, &names(&samples.dimensions, &dataset.dimensions));
         let metadata = json!({ "metadata": builder.all, "zarr_consolidated_format": 1 });
         Self { files: builder.files, metadata: text(&metadata), samples: folder(&samples.name), chunks }
@@ -120,7 +120,7 @@ impl Builder {
         let lengths: Vec<u64> = variable.dimensions.iter().map(|dimension| all[*dimension].1).collect();
         let (dtype, bytes) = bytes_of(&variable.values);
         let chunks = Chunks { chunk: lengths.clone(), lengths };
-        let (names, array) = (names(&variable.dimensions, all), array(&chunks, dtype, Value::Null, Value::Null));
+        let (names, array) = (names(&variable.dimensions, all), array(&chunks, &dtype, &Value::Null, &Value::Null));
         self.array(&variable.name, array, &variable.attributes, &names);
         let chunk = vec!["0"; chunks.lengths.len().max(1)].join(".");
         self.files.push((folder(&variable.name).join(chunk), bytes));
@@ -137,7 +137,7 @@ fn names<'a>(dimensions: &[usize], all: &'a [(String, u64)]) -> Vec<&'a str> {
     dimensions.iter().map(|dimension| all[*dimension].0.as_str()).collect()
 }
 
-fn array(chunks: &Chunks, dtype: String, fill: Value, compressor: Value) -> Value {
+fn array(chunks: &Chunks, dtype: &str, fill: &Value, compressor: &Value) -> Value {
     json!({
         "zarr_format": 2,
         "shape": chunks.lengths,

@@ -20,8 +20,8 @@ const MOST_PER_FRAME: usize = 64;
 /// Attributes that say how samples are stored. Samples are given as what they stand for.
 const OF_STORAGE: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "_Unsigned"];
 
-/// The limits of valid samples, as stored.
-const LIMITS: [&str; 3] = ["valid_min", "valid_max", "valid_range"];
+/// Attributes with stored numbers, which are others than the samples of packed arrays.
+const OF_PACKED: [&str; 4] = ["valid_min", "valid_max", "valid_range", "missing_value"];
 
 /// The samples' array, and what is known of it.
 pub(super) struct Samples<'a> {
@@ -95,10 +95,8 @@ impl Builder<'_> {
         let Samples { variable, packed, .. } = self.samples;
         let is_kept = |attribute: &Attribute| {
             let name = attribute.name.as_str();
-            is_users(attribute)
-                && !OF_STORAGE.contains(&name)
-                && !(*packed && LIMITS.contains(&name))
-                && !(*packed && name == "missing_value")
+            let is_packed = *packed && OF_PACKED.contains(&name);
+            is_users(attribute) && !OF_STORAGE.contains(&name) && !is_packed
         };
         self.file.described(&variable.path).into_iter().filter(is_kept).collect()
     }

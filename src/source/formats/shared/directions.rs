@@ -53,7 +53,7 @@ impl Directions {
     }
 
     /// The same axes from another first voxel, whose place is given in steps from this one.
-    pub(in crate::source) fn from_place(self, steps: [f64; 3]) -> Self {
+    pub(in crate::source) fn starting_at(self, steps: [f64; 3]) -> Self {
         Self { first: self.place(steps), ..self }
     }
 

@@ -133,7 +133,7 @@ fn directions(header: &VtiHeader, array: &VtiArray, points: [usize; 3]) -> Parse
     let columns = std::array::from_fn(|axis| [0, 1, 2].map(|row| matrix[3 * row + axis]));
     let lattice = Directions::of(columns, header.spacing, header.origin)?;
     let start = [0, 1, 2].map(|axis| header.whole.ends(axis).0 as f64);
-    Ok(lattice.from_place(array.of.origin(points, start, [1.0; 3])))
+    Ok(lattice.starting_at(array.of.origin(points, start, [1.0; 3])))
 }
 
 #[cfg(test)]
