@@ -19,21 +19,55 @@ fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Opt
     Some(Note::with(text, Remedy::Set("axes")))
 }
 
-/// What each axis counts, the slowest first, and a note on what is guessed; `index` is that of an axis beside space and
+/// An axis that probably counts frames, by how the array is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TimeHint {
+    axis: usize,
+    why: &'static str,
+}
+
+impl TimeHint {
+    /// By the axes along which the array may grow, or by its chunks: most programs write a step at a time.
+    pub(super) fn of(variable: &Variable, growing: &[usize]) -> Option<Self> {
+        if let [axis] = *growing {
+            return Some(Self { axis, why: "the array may grow along it" });
+        }
+        let chunk = variable.chunk.as_ref()?;
+        let is_single = |axis: &usize| chunk[*axis] == 1 && variable.lengths[*axis] > 1;
+        let mut single = (0..chunk.len()).filter(is_single);
+        let axis = single.next().filter(|_| single.next().is_none())?;
+        let others = chunk.iter().filter(|length| **length > 1).count();
+        (others >= 2).then_some(Self { axis, why: "each chunk has one item along it" })
+    }
+
+    /// Takes the axis as that of frames, unless it or another is known already. Says so if that is not the usual order.
+    fn apply(self, known: &mut [Option<Counts>]) -> Option<Note> {
+        if known.contains(&Some(Counts::Frames)) || known[self.axis].is_some() {
+            return None;
+        }
+        known[self.axis] = Some(Counts::Frames);
+        let text = || format!("axis {} is taken as time: {}", self.axis, self.why);
+        (self.axis > 0).then(|| Note::with(text(), Remedy::Set("axes")))
+    }
+}
+
+/// What each axis counts, the slowest first, and notes on what is guessed; `index` is that of an axis beside space and
 /// time, `letters` what the user says.
 pub(super) fn counts(
     variable: &Variable,
     all: &[Variable],
     index: Option<usize>,
     letters: Option<&str>,
-) -> Advised<(Vec<Counts>, Option<Note>)> {
+    hint: Option<TimeHint>,
+) -> Advised<(Vec<Counts>, Vec<Note>)> {
     let Some(letters) = letters else {
-        let known = known(variable, all);
+        let mut known = known(variable, all);
+        let hinted = hint.filter(|_| variable.lengths.len() > 3).and_then(|hint| hint.apply(&mut known));
         let counts = complete(variable, by_order(variable, known.clone(), index.is_some()), index)?;
-        let note = note(variable, &known, &counts);
-        return Ok((counts, note));
+        let guessed = note(variable, &known, &counts);
+        return Ok((counts, hinted.into_iter().chain(guessed).collect()));
     };
-    Ok((complete(variable, by_letters(variable, letters)?, index)?, None))
+    Ok((complete(variable, by_letters(variable, letters)?, index)?, Vec::new()))
 }
 
 /// Sets the axes that count neither voxels nor frames to the chosen index, or to the only one.
@@ -158,4 +192,38 @@ fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool)
         counts[axis] = Some(role);
     }
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Attributes, Variable};
+    use super::*;
+
+    fn variable(lengths: &[usize], chunk: Option<&[usize]>) -> Variable {
+        Variable {
+            path: "a".into(),
+            sample: Err("none".into()),
+            lengths: lengths.to_vec(),
+            dims: vec![String::new(); lengths.len()],
+            chunk: chunk.map(<[usize]>::to_vec),
+            attributes: Attributes::new(),
+        }
+    }
+
+    #[test]
+    fn time_is_the_axis_along_which_arrays_grow_or_chunks_are_single() {
+        let found = |chunk: Option<&[usize]>, growing: &[usize]| {
+            let variable = variable(&[128, 128, 128, 40], chunk);
+            let (counts, notes) =
+                counts(&variable, &[], None, None, TimeHint::of(&variable, growing)).expect("four axes");
+            (counts.iter().position(|c| *c == Counts::Frames), notes.len())
+        };
+        assert_eq!(found(Some(&[128, 128, 128, 1]), &[]), (Some(3), 2));
+        assert_eq!(found(None, &[3]), (Some(3), 2));
+        assert_eq!(found(Some(&[1, 64, 64, 40]), &[]), (Some(0), 1));
+        for no_hint in [None, Some(&[32, 32, 32, 8][..]), Some(&[1, 1, 128, 40]), Some(&[1, 128, 128, 1])] {
+            assert_eq!(found(no_hint, &[]), (Some(0), 1), "{no_hint:?}");
+        }
+        assert_eq!(found(Some(&[128, 128, 128, 1]), &[0, 3]), (Some(3), 2));
+    }
 }

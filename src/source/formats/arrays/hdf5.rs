@@ -98,6 +98,12 @@ impl ArrayFile for Hdf5ArrayFile {
         raw(&dataset, ty).map(|bytes| numbers(ty, &bytes)).map_err(|e| reason(&e))
     }
 
+    fn growing_axes(&self, path: &str) -> Vec<usize> {
+        let Ok(dataset) = self.0.dataset(path) else { return Vec::new() };
+        let most = dataset.max_dims().unwrap_or_default();
+        (0..most.len()).filter(|axis| most[*axis] == u64::MAX).collect()
+    }
+
     fn number_type(&self, path: &str) -> Parsed<NumberType> {
         number_type(self.0.dataset(path).map_err(|e| e.to_string())?.dtype())
     }

@@ -141,6 +141,12 @@ trait ArrayFile: Send {
         Ok(description::NumberType::F64)
     }
 
+    /// The axes along which an array may grow.
+    fn growing_axes(&self, path: &str) -> Vec<usize> {
+        let _ = path;
+        Vec::new()
+    }
+
     /// Whether the file may grow along a dimension.
     fn is_unlimited(&self, dimension: &str) -> bool {
         let _ = dimension;
@@ -396,7 +402,8 @@ impl Context<'_> {
         if variable.lengths.contains(&0) {
             return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths).into());
         }
-        let (counts, guessed) = axes::counts(&variable, self.all, self.index, self.axes)?;
+        let hint = axes::TimeHint::of(&variable, &self.file.growing_axes(&variable.path));
+        let (counts, guessed) = axes::counts(&variable, self.all, self.index, self.axes, hint)?;
         let mut places = Places::of((self.file, self.all), &variable, &counts, self.spaced);
         places.notes.extend(guessed);
         let axis = |(i, counts): (usize, &Counts)| match *counts {

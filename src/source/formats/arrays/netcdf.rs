@@ -118,6 +118,12 @@ impl ArrayFile for NetCdfArrayFile {
         number_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype())
     }
 
+    fn growing_axes(&self, path: &str) -> Vec<usize> {
+        let Ok(variable) = self.file.variable(path) else { return Vec::new() };
+        let dimensions = variable.dimensions();
+        (0..dimensions.len()).filter(|axis| dimensions[*axis].is_unlimited).collect()
+    }
+
     fn is_unlimited(&self, dimension: &str) -> bool {
         let dimensions = self.file.dimensions().unwrap_or_default();
         dimensions.iter().any(|known| known.name == dimension && known.is_unlimited)
