@@ -170,22 +170,35 @@ pub(super) fn of_name(dim: &str) -> Option<Counts> {
     })
 }
 
+/// Components that a vector or a tensor has at most.
+const MOST_COMPONENTS: usize = 9;
+
+/// Which of some axes, of which there is one, probably counts components: the only short one, else the last.
+fn component_axis(variable: &Variable, free: &[usize]) -> usize {
+    let is_short = |axis: &usize| (2..=MOST_COMPONENTS).contains(&variable.lengths[*axis]);
+    let mut short = (0..free.len()).filter(|at| is_short(&free[*at]));
+    short.next().filter(|_| short.next().is_none()).unwrap_or(free.len() - 1)
+}
+
 /// Names of axes along which an archive is not continued.
 const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
 
-/// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, the last such axis gets
-/// none.
+/// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, or if there are too many, the
+/// axis that probably counts components gets none.
 fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool) -> Vec<Option<Counts>> {
     let beside = |axis: &usize| BESIDE.contains(&variable.dims[*axis].to_lowercase().as_str());
     let mut free: Vec<usize> = (0..counts.len()).filter(|axis| counts[*axis].is_none() && !beside(axis)).collect();
     let mut roles: Vec<Counts> = ORDER.into_iter().filter(|role| !counts.contains(&Some(*role))).collect();
     if indexed && counts.len() - free.len() == counts.iter().flatten().count() {
-        free.pop();
+        free.remove(component_axis(variable, &free));
     }
     while free.len() > roles.len()
         && let Some(at) = free.iter().position(|axis| variable.lengths[*axis] == 1)
     {
         free.remove(at);
+    }
+    if free.len() > roles.len() {
+        free.remove(component_axis(variable, &free));
     }
     roles.drain(..roles.len().saturating_sub(free.len()));
     for (axis, role) in free.into_iter().zip(roles) {
@@ -208,6 +221,19 @@ mod tests {
             chunk: chunk.map(<[usize]>::to_vec),
             attributes: Attributes::new(),
         }
+    }
+
+    #[test]
+    fn the_only_short_axis_counts_components() {
+        let found = |lengths: &[usize]| {
+            let variable = variable(lengths, None);
+            let named = |index| counts(&variable, &[], index, None, None).map(|(counts, _)| counts);
+            assert!(named(None).is_err_and(|note| note.remedy.is_some()));
+            named(Some(1)).expect("a component").iter().position(|c| *c == Counts::Only(1))
+        };
+        assert_eq!(found(&[50, 3, 64, 65, 66]), Some(1));
+        assert_eq!(found(&[50, 64, 65, 66, 3]), Some(4));
+        assert_eq!(found(&[50, 3, 64, 65, 4]), Some(4));
     }
 
     #[test]
