@@ -87,6 +87,7 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
             "depth",
             "error",
             "error-image",
+            "exaggerate",
             "fast",
             "fps",
             "method",

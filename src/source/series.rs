@@ -107,7 +107,10 @@ impl Series {
 
     /// Adds what later files say of their frames, one for each file.
     fn describe_more(&mut self, more: Vec<Option<Description>>) {
-        let Some(first) = self.archive.description.take().filter(|_| !more.is_empty()) else { return };
+        if more.is_empty() {
+            return;
+        }
+        let Some(first) = self.archive.description.take() else { return };
         let (all, lost) = match more.into_iter().collect::<Option<Vec<_>>>() {
             Some(more) => joined(first, &more),
             None => extended(first, self.archive.frames.unwrap_or(0) as u64),

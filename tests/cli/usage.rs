@@ -100,7 +100,7 @@ fn an_extension_without_a_format_is_refused_with_the_known_ones() {
     work.render("a.wspl -o out.xyz").fails(2, &["out.xyz", ".xyz", ".png", ".apng", "npy y4m rgb24 gray16 exr"]);
     work.wavesplat("extract a.wspl -o out.xyz").fails(2, &["out.xyz", ".npy", ".raw"]);
     work.write("in.xyz", [7; 300]);
-    let remedy = "for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: .npy, .nrrd";
+    let remedy = "for headerless data type --dims NXxNYxNZ --dtype TYPE. Known formats: .npy, .npz, .nrrd";
     work.wavesplat("convert in.xyz -o b.wspl").fails(2, &["in.xyz", remedy, ".vti"]);
     work.piped("convert - -o b.wspl", &[7; 300]).fails(2, &["-:", "--dims"]);
     work.wavesplat("convert a.wspl a.npy -o b.wspl").fails(2, &["a.wspl", "coefficient file already"]);

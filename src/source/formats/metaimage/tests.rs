@@ -133,7 +133,7 @@ fn the_grid_and_times_are_read() {
     assert_eq!((a.grid.spacing, a.grid.origin), ([3.0; 3], [1.0; 3]));
     assert!(a.notes.is_empty());
     let a = archive("Orientation = 0.6 0.8 0 0 -0.8 0.6 0 0 0 0 1 0 0 0 0 1\nElementToIntensityFunctionSlope = 2\n");
-    assert!(a.times.is_empty() && a.notes[0].text.contains("not kept") && a.notes[1].text.contains("not applied"));
+    assert!(a.times.is_empty() && a.notes[0].text.contains("are oblique") && a.notes[1].text.contains("not applied"));
 }
 
 #[test]

@@ -217,7 +217,7 @@ fn the_grid_is_that_of_the_sform_or_the_qform_or_of_the_steps() {
     let a = archive(&header);
     assert_eq!((a.grid.spacing, a.grid.origin, a.notes.len()), ([3.0, 4.0, 5.0], [1.0, 2.0, 3.0], 0));
     header.real(SFORM, 1, 4.0);
-    assert!(archive(&header).notes[0].text.contains("directions of the NIfTI are not kept"));
+    assert!(archive(&header).notes[0].text.contains("directions of the NIfTI are oblique"));
 }
 
 #[test]

@@ -62,7 +62,7 @@ fn the_grid_and_times_are_read() {
     assert!(a.notes.is_empty() && a.times.is_empty());
     let a = archive("space directions: (-2,0,0) (0,3,4) (0,0,4) none\nkinds: space space space list\n");
     assert_eq!(a.grid.spacing, [2.0, 5.0, 4.0]);
-    assert!(a.notes[0].text.contains("not kept"));
+    assert!(a.notes[0].text.contains("are oblique"));
 }
 
 #[test]

@@ -272,7 +272,7 @@ fn an_oblique_direction_is_noted_and_frames_must_agree() {
     let a = folder.write("a1.vti", vti.bytes());
     let b = folder.write("b.vti", directed(&vti, "0.6 -0.8 0 0.8 0.6 0 0 0 1"));
     let source = open(&[b], &OpenOptions::default()).expect("opening");
-    assert!(source.archive().notes[0].text.contains("directions of the .vti are not kept"));
+    assert!(source.archive().notes[0].text.contains("directions of the .vti are oblique"));
     assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 2.0]);
     let renamed = Vti { arrays: vti.arrays.replace("\"J\"", "\"K\""), ..vti };
     let c = folder.write("c.vti", renamed.bytes());
