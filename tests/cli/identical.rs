@@ -16,5 +16,5 @@ fn archives_come_back_as_they_were() {
     let done = Command::new(python).arg(script).arg(CONVERT).arg(work.path("archives")).output().unwrap();
     let (said, wrong) = (String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
     assert!(done.status.success(), "{said}{wrong}");
-    assert!(said.lines().filter(|line| line.starts_with("ok ")).count() >= 7, "{said}");
+    assert!(said.lines().filter(|line| line.starts_with("ok ")).count() >= 9, "{said}");
 }

@@ -219,13 +219,13 @@ def check_nifti(run, folder):
         for key in before.header:
             if key not in ("vox_offset", "scl_slope", "scl_inter"):
                 np.testing.assert_array_equal(before.header[key], after.header[key], err_msg=key)
-        check_samples(before.get_fdata(), after.get_fdata())
+        assert_samples(before.get_fdata(), after.get_fdata())
         run("extract", folder / "scan.wspl", "-o", back, "--region", "2:8,1:9,3:11", "--force")
         crop = nibabel.load(back)
         np.testing.assert_allclose(crop.affine, before.slicer[2:8, 1:9, 3:11].affine, rtol=1e-6, atol=1e-4)
 
 
-def check_samples(before, after):
+def assert_samples(before, after):
     assert before.shape == after.shape, f"{before.shape} became {after.shape}"
     error = abs(before - after).max()
     assert error <= TOLERANCE * (before.max() - before.min()) * (1 + 1e-6), error
@@ -251,7 +251,7 @@ def check_metaimage(run, folder):
         after = itk.ReadImage(str(back))
         for get in ["GetDirection", "GetSpacing", "GetOrigin", "GetSize"]:
             np.testing.assert_allclose(getattr(image, get)(), getattr(after, get)(), rtol=1e-6, atol=1e-6, err_msg=f"{extension} {get}")
-        check_samples(frame, itk.GetArrayFromImage(after))
+        assert_samples(frame, itk.GetArrayFromImage(after))
         if extension == "mha":
             assert all(getattr(image, get)() == getattr(after, get)() for get in ["GetDirection", "GetSpacing", "GetOrigin"])
     assert b"Comment = after contrast" in (folder / "scan_back.mha").read_bytes()
@@ -276,7 +276,7 @@ def check_vtr(run, folder):
     np.testing.assert_array_equal(vtk_to_numpy(grid.GetZCoordinates()), np.sort(-data.depth.values if is_down(data) else data.depth.values))
     samples = vtk_to_numpy(grid.GetPointData().GetArray(variable)).reshape(grid.GetDimensions()[::-1])
     expected = np.moveaxis(data[variable].values[..., 0], [0, 1, 2], [2, 1, 0])
-    check_samples(expected[::-1] if is_down(data) else expected, samples)
+    assert_samples(expected[::-1] if is_down(data) else expected, samples)
 
 
 def check_rectilinear(run, folder):
@@ -305,7 +305,7 @@ def check_rectilinear(run, folder):
     after = reader.GetOutput()
     for get, at in zip([after.GetXCoordinates, after.GetYCoordinates, after.GetZCoordinates], places):
         np.testing.assert_array_equal(vtk_to_numpy(get()), at)
-    check_samples(frame, vtk_to_numpy(after.GetPointData().GetArray("density")).reshape(frame.shape))
+    assert_samples(frame, vtk_to_numpy(after.GetPointData().GetArray("density")).reshape(frame.shape))
 
 
 def is_down(data):
