@@ -46,8 +46,8 @@ impl Grid {
         Self { spacing: [x, y, z * factor], origin: [ox, oy, oz * factor], ..*self }
     }
 
-    /// The factor that makes heights visible where the volume is nearly a flat sheet: 1, 2 or 5 times a power of 10; 1 for
-    /// other volumes.
+    /// The factor that makes heights visible where the volume is nearly a flat sheet: about a quarter of the width, by 1, 2
+    /// or 5 times a power of 10; 1 for other volumes.
     pub fn sensible_exaggeration(&self) -> f64 {
         let extent = |axis: usize| self.spacing[axis] * (self.dims[axis] - 1) as f64;
         let (wide, high) = (extent(0).max(extent(1)), extent(2));
@@ -56,7 +56,8 @@ impl Grid {
         }
         let wanted = wide / high / VISIBLE;
         let power = 10_f64.powf(wanted.log10().floor());
-        [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|factor| *factor <= wanted).unwrap_or(1.0)
+        let is_near = |factor: &f64| *factor <= wanted * 1.25;
+        [10.0, 5.0, 2.0].into_iter().map(|digit| digit * power).find(is_near).unwrap_or(power)
     }
 
     /// The grid of a region of this one, at the same place in the world.
@@ -206,7 +207,7 @@ mod tests {
         let grid = |z: f64| Grid { spacing: [1000.0, 900.0, z], ..Grid::unit([101, 50, 31]) };
         // 100 km wide and 3000 z high: a quarter of the width is 25 km
         let factors = [10.0, 100.0, 160.0, 170.0].map(|z| grid(z).sensible_exaggeration());
-        assert_eq!(factors, [50.0, 5.0, 5.0, 1.0]);
+        assert_eq!(factors, [100.0, 10.0, 5.0, 1.0]);
         assert_eq!(Grid { dims: [101, 50, 1], ..grid(1.0) }.sensible_exaggeration(), 1.0);
         let drawn = Grid { origin: [1.0, 2.0, -3.0], ..grid(10.0) }.exaggerated(50.0);
         assert_eq!((drawn.spacing, drawn.origin), ([1000.0, 900.0, 500.0], [1.0, 2.0, -150.0]));

@@ -54,7 +54,9 @@ fn axis_line(description: &Description, along: usize) -> Option<String> {
         true => format!(", irregular: steps of {least} to {largest}"),
         false => String::new(),
     };
-    Some(format!("{} is {name}: {first} to {last} {}{irregular}", ["x", "y", "z"][along], unit.unwrap_or_default()))
+    let letter = ["x", "y", "z"][along];
+    let shown_name = if name == letter { letter.to_string() } else { format!("{letter} is {name}") };
+    Some(format!("{shown_name}: {first} to {last} {}{irregular}", unit.unwrap_or_default()))
 }
 
 fn attributes(of: &str, all: &[Attribute], verbose: bool) -> String {

@@ -173,10 +173,11 @@ pub(super) fn of_name(dim: &str) -> Option<Counts> {
 /// Components that a vector or a tensor has at most.
 const MOST_COMPONENTS: usize = 9;
 
-/// Which of some axes, of which there is one, probably counts components: the only short one, else the last.
-fn component_axis(variable: &Variable, free: &[usize]) -> usize {
+/// Which of some axes, of which there is one, probably counts components: the only short one, else the last. If no axis is
+/// known to count frames, the slowest one probably does.
+fn component_axis(variable: &Variable, free: &[usize], is_timed: bool) -> usize {
     let is_short = |axis: &usize| (2..=MOST_COMPONENTS).contains(&variable.lengths[*axis]);
-    let mut short = (0..free.len()).filter(|at| is_short(&free[*at]));
+    let mut short = (usize::from(!is_timed)..free.len()).filter(|at| is_short(&free[*at]));
     short.next().filter(|_| short.next().is_none()).unwrap_or(free.len() - 1)
 }
 
@@ -190,7 +191,7 @@ fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool)
     let mut free: Vec<usize> = (0..counts.len()).filter(|axis| counts[*axis].is_none() && !beside(axis)).collect();
     let mut roles: Vec<Counts> = ORDER.into_iter().filter(|role| !counts.contains(&Some(*role))).collect();
     if indexed && counts.len() - free.len() == counts.iter().flatten().count() {
-        free.remove(component_axis(variable, &free));
+        free.remove(component_axis(variable, &free, counts.contains(&Some(Counts::Frames))));
     }
     while free.len() > roles.len()
         && let Some(at) = free.iter().position(|axis| variable.lengths[*axis] == 1)
@@ -198,7 +199,7 @@ fn by_order(variable: &Variable, mut counts: Vec<Option<Counts>>, indexed: bool)
         free.remove(at);
     }
     if free.len() > roles.len() {
-        free.remove(component_axis(variable, &free));
+        free.remove(component_axis(variable, &free, counts.contains(&Some(Counts::Frames))));
     }
     roles.drain(..roles.len().saturating_sub(free.len()));
     for (axis, role) in free.into_iter().zip(roles) {
@@ -233,6 +234,7 @@ mod tests {
         };
         assert_eq!(found(&[50, 3, 64, 65, 66]), Some(1));
         assert_eq!(found(&[50, 64, 65, 66, 3]), Some(4));
+        assert_eq!(found(&[6, 3, 64, 65, 66]), Some(1));
         assert_eq!(found(&[50, 3, 64, 65, 4]), Some(4));
     }
 
