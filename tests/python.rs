@@ -47,7 +47,8 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let rainbow = TransferFunction::open("rainbow").unwrap();
     let colours = (random.below(8) == 0).then_some(rainbow); // most values lie beyond the ends of the map
     let block = Some(1 + random.below(24));
-    let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, ..plain };
+    let clip = random.below(3) == 0;
+    let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, clip, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()
 }
 

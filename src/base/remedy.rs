@@ -44,6 +44,8 @@ pub enum Remedy {
     DeclareMissing(String),
     /// Set this field to a value.
     Try(&'static str, String),
+    /// Set `clip`, which keeps extracted samples within the extremes of the source.
+    Clip,
     /// Allow larger errors by this field.
     Allow(&'static str),
     /// Build with this Cargo feature.

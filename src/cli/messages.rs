@@ -61,6 +61,7 @@ pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
         Remedy::MaskMissing => "--missing mask keeps them as missing samples",
         Remedy::DeclareMissing(value) => return format!("if it means missing, add --missing-value {value}").into(),
         Remedy::Try(field, value) => return format!("try --{} {value}", name(field)).into(),
+        Remedy::Clip => "--clip keeps extracted samples within the extremes of the source",
         Remedy::Allow(field) => return format!("allow a larger error by --{}", name(field)).into(),
         Remedy::BuildWith(feature) => {
             return format!("build with cargo build --release --features {feature}").into();

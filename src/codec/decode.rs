@@ -264,18 +264,19 @@ impl Block {
         if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
             let field = self.field(codec);
             if let Some(values) = field.singles() {
-                return self.stored_singles(values);
+                return self.stored_singles(codec, values);
             }
         }
         self.decode(codec, |_, _| {})
     }
 
     /// Samples whose nodes already have their type.
-    fn stored_singles(&self, values: &[f32]) -> Buffer<u8> {
+    fn stored_singles(&self, codec: &WindowCodec, values: &[f32]) -> Buffer<u8> {
         let mut out = Buffer::of(4 * values.len());
         for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {
             *bytes = value.to_le_bytes();
         }
+        clip(codec, &mut out);
         self.put_overrides(4, &mut out);
         out
     }
@@ -300,10 +301,13 @@ impl Block {
         let mut out = Buffer::of(codec.frames() * self.voxels * size);
         match &self.exact {
             Some(exact) => out.copy_from_slice(exact),
-            None => self.for_each_run(codec, |at, values| {
-                visit(at, values);
-                sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
-            }),
+            None => {
+                self.for_each_run(codec, |at, values| {
+                    visit(at, values);
+                    sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
+                });
+                clip(codec, &mut out);
+            }
         }
         self.put_overrides(size, &mut out);
         out
@@ -319,6 +323,21 @@ impl Block {
         }
     }
 }
+
+/// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
+fn clip(codec: &WindowCodec, samples: &mut [u8]) {
+    let (Some((lo, hi)), ty) = (codec.clip, codec.sample) else { return };
+    let mut values = vec![0.0; CLIPPED];
+    for run in samples.chunks_mut(CLIPPED * ty.size()) {
+        let values = &mut values[..run.len() / ty.size()];
+        sample::load(ty, run, values);
+        values.iter_mut().for_each(|value| *value = value.clamp(lo, hi));
+        sample::store(ty, values, run);
+    }
+}
+
+/// Samples that are clipped at a time.
+const CLIPPED: usize = 4 << 10;
 
 fn is_level(part: &PartEntry) -> bool {
     matches!(part.kind, PartKind::Level(_))

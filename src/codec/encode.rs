@@ -156,7 +156,7 @@ impl Encoder {
             let stats = PartStats { count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Outliers, stats, &self.raw)?);
         }
-        Ok(Parts::new(&coded.tally, coded.step, coded.dropped, parts))
+        Ok(Parts::new(&coded.tally, coded.step, coded.dropped, parts).clipped(codec.clip))
     }
 
     /// The parts of a block stored exactly.
@@ -215,6 +215,14 @@ struct Parts {
 }
 
 impl Parts {
+    /// The parts with the range that extracted samples are kept within.
+    fn clipped(mut self, clip: Option<(f64, f64)>) -> Self {
+        if let Some((lo, hi)) = clip.filter(|_| self.stats.min <= self.stats.max) {
+            (self.stats.min, self.stats.max) = (self.stats.min.clamp(lo, hi), self.stats.max.clamp(lo, hi));
+        }
+        self
+    }
+
     fn new(tally: &Tally, step: f64, dropped: f64, parts: Vec<EncodedPart>) -> Self {
         let &Tally { min, max, reached, squared_error, share, .. } = tally;
         Self { stats: BlockStats { step, min, max, reached, squared_error, dropped }, share, parts }

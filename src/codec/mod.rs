@@ -51,6 +51,8 @@ pub struct WindowCodec {
     pub promise: ErrorBound,
     /// The sample value that means "missing", besides NaN and infinities.
     pub missing_value: Option<f64>,
+    /// The range that extracted samples are kept within: that of the source's samples in the window.
+    pub clip: Option<(f64, f64)>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
     /// The level of detail: blocks are decoded on the lattice of every 2^lod-th voxel along each axis.
@@ -75,7 +77,7 @@ impl WindowCodec {
         let synthesis = wavelet::synthesis(basis.as_ref());
         let gain = wavelet::gain(&synthesis);
         let levels = wavelet::ranges(levels);
-        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, levels, lod: 0 }
+        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, clip: None, levels, lod: 0 }
     }
 
     /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
@@ -90,7 +92,8 @@ impl WindowCodec {
         let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
         let promise = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
         let codec = Self::with_levels(scheme, basis, file.sample, promise, &levels);
-        Ok(Self { missing_value: file.missing_value, ..codec })
+        let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && is_clipped(file));
+        Ok(Self { missing_value: file.missing_value, clip, ..codec })
     }
 
     /// The largest number of level parts of a block.
@@ -148,6 +151,14 @@ impl WindowCodec {
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
         if lost { f64::INFINITY } else { a.max(b) }
     }
+}
+
+/// The setting of files whose extracted samples are kept within the extremes of the source.
+pub(crate) const CLIP: (&str, &str) = ("clip", "true");
+
+/// Whether extracted samples are kept within the extremes of the source.
+fn is_clipped(file: &Metadata) -> bool {
+    file.settings.iter().any(|(name, value)| (name.as_str(), value.as_str()) == CLIP)
 }
 
 /// The last level part that a level of detail needs.

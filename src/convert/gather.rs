@@ -229,6 +229,8 @@ impl<'a> WindowReader<'a> {
         self.scheme = Some(scheme.clone());
         let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edges[0]);
         codec.missing_value = config.missing_value;
+        codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
+        self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
         let id = self.id(scan.digest)?;
         let index =
             u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;

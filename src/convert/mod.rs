@@ -98,6 +98,8 @@ pub struct ConvertConfig {
     /// Refuse a window in which an extreme repeats that probably means "missing", and makes a bound that refers to the value
     /// range larger than what the other samples hold. Default: true.
     pub refuse_fill: bool,
+    /// Whether extracted samples are kept within the extremes of the window's source samples. Default: no.
+    pub clip: bool,
     /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
     /// value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
@@ -125,6 +127,7 @@ impl ConvertConfig {
             missing: MissingPolicy::Error,
             missing_value: None,
             refuse_fill: true,
+            clip: false,
             colours: None,
             block: None,
             level: 3,

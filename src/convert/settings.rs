@@ -1,6 +1,7 @@
 //! The settings stored in a file: enough to verify it against its source, and to append to it.
 
 use super::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
+use crate::codec::CLIP;
 use crate::codec::bound::Bound;
 use crate::codec::scheme::Stencil;
 use crate::colour::TransferFunction;
@@ -29,6 +30,7 @@ pub(super) fn stored_settings(
         .chain(more)
         .chain(range)
         .chain(max_error)
+        .chain(config.clip.then(|| (CLIP.0, CLIP.1.to_string())))
         .chain(colour_transform.into_iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
     let ours: Vec<(String, String)> = all.chain(units).map(|(name, value)| (name.to_string(), value)).collect();
@@ -66,6 +68,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
         missing_value,
         refuse_fill: true,
+        clip: named(CLIP.0) == Some(CLIP.1),
         colours,
         block: Some(file.block_edge as usize),
         level: number(named("level")?)?,
@@ -106,7 +109,8 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
 }
 
 /// Settings of a file that are options by the same names.
-const STORED: [&str; 20] = [
+const STORED: [&str; 21] = [
+    "clip",
     "range",
     "missing",
     "missing-value",
@@ -181,7 +185,7 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 }
 
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
-const OWN: [&str; 7] = [MAX_ERROR, "basis", "space", "window", "level", "missing", "range"];
+const OWN: [&str; 8] = [MAX_ERROR, CLIP.0, "basis", "space", "window", "level", "missing", "range"];
 
 /// The stored name of a basis, which is that of the option. No basis means that any is allowed.
 fn basis_name(basis: Option<Basis>) -> &'static str {

@@ -14,6 +14,8 @@ pub(super) struct Findings {
     /// A value that may mean "missing", if one was seen.
     pub(super) fill: Option<Note>,
     pub(super) variation: Variation,
+    /// The range of the source's samples.
+    pub(super) range: Option<(f64, f64)>,
 }
 
 /// An extreme this many times farther from the others than their range is long decides what the range is.
@@ -56,7 +58,21 @@ pub(super) fn fill(extreme: &Extreme, samples: u64, ty: SampleType, allowed: Opt
 pub(super) fn warnings(config: &ConvertConfig, report: &ConvertReport, found: &Findings) -> Vec<Note> {
     let small = small_changes(config, report, found.variation.median());
     let of_file = larger_than_samples(config, report).or_else(|| short_windows(config, report));
-    found.fill.clone().into_iter().chain(small).chain(of_file).collect()
+    let negative = negative_samples(config, report, found.range);
+    found.fill.clone().into_iter().chain(small).chain(negative).chain(of_file).collect()
+}
+
+/// Samples that are not negative come back negative.
+fn negative_samples(config: &ConvertConfig, report: &ConvertReport, range: Option<(f64, f64)>) -> Option<Note> {
+    let least = report.per_window.iter().filter_map(|window| window.min).fold(f64::INFINITY, f64::min);
+    let is_surprise = !config.clip && config.colours.is_none() && range?.0 >= 0.0 && least < 0.0;
+    let text = || format!("no sample is negative, but some come back as {} at least", amount_below(least));
+    is_surprise.then(|| Note::with(text(), Remedy::Clip))
+}
+
+/// As [`amount`], of a number below 0.
+fn amount_below(value: f64) -> String {
+    format!("-{}", amount(-value))
 }
 
 /// The error allowed is larger than what most voxels change by.

@@ -1,6 +1,6 @@
 //! Warnings of conversions, and values that are refused since they probably mean "missing".
 
-use super::{Archive, Run, Work, npy, small};
+use super::{Archive, Run, Work, floats, npy, read_npy, small};
 
 /// The small archive, changed voxel by voxel; `x` and the value.
 fn changed(change: impl Fn(usize, f32) -> f32) -> Archive {
@@ -126,4 +126,29 @@ fn longer_windows_are_suggested_where_they_help() {
     assert!(warned.contains("try --window 128"), "{warned}");
     let longer = work.wavesplat("convert a.npy -o b.wspl --window 128").ok();
     assert!(work.read("b.wspl").len() < work.read("a.wspl").len() && !warnings(&longer).contains("--window"));
+}
+
+#[test]
+fn samples_that_come_back_negative_are_warned_of_and_clipped() {
+    let work = Work::new();
+    let archive = changed(|_, v| (v - 0.5).max(0.0));
+    let (least, most) = archive.values.iter().fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+    assert_eq!(least, 0.0);
+    work.write("a.npy", archive.npy());
+    let said = |run: &Run| warnings(run).contains("no sample is negative");
+    let run = work.wavesplat("convert a.npy -o a.wspl").ok();
+    assert!(said(&run) && run.err.contains("--clip"), "{}", run.err);
+    for options in ["--clip", "--clip --max-error 0.02", "--clip --bound rms", "--clip --basis haar --window 8"] {
+        assert!(!said(&work.wavesplat(&format!("convert a.npy -o b.wspl --force {options}")).ok()), "{options}");
+        work.wavesplat("extract b.wspl -o b.npy --force").ok();
+        let back = floats(&read_npy(&work.read("b.npy")).1);
+        assert!(back.iter().all(|v| (0.0..=most).contains(v)), "{options}");
+        work.wavesplat("verify b.wspl --against a.npy").ok();
+        let made = work.wavesplat("info b.wspl").ok();
+        assert!(made.text().contains("--clip=true"), "{}", made.text());
+    }
+    work.wavesplat("extract a.wspl -o a2.npy").ok();
+    assert!(floats(&read_npy(&work.read("a2.npy")).1).iter().any(|v| *v < 0.0));
+    work.write("signed.npy", changed(|_, v| v - 0.5).npy());
+    assert!(!said(&work.wavesplat("convert signed.npy -o c.wspl").ok()));
 }

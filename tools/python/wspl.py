@@ -1240,6 +1240,8 @@ class Archive:
                 c = self._coefficients(b, w, size, payloads)
                 need(np.isfinite(c).all(), b.place, "a coefficient is not finite")
                 out = to_samples(inverse(c, w), dtype, b.place).reshape(-1)
+                if ("clip", "true") in self.metadata.settings and w.min <= w.max:
+                    out = np.clip(out, dtype.type(w.min), dtype.type(w.max))
         for kind, read in ((OUTLIERS, read_outliers), (MISSING, read_missing)):
             if (kind, 0) in payloads:
                 p, data = payloads[kind, 0]

@@ -67,6 +67,10 @@ pub(crate) struct ConvertArgs {
     /// mask with --missing-value, and for files that declare a missing value]
     #[arg(long, value_enum, help_heading = ERROR_BOUND)]
     missing: Option<MissingName>,
+    /// Keep extracted samples within the extremes of the source's samples in their window: what is not negative does not
+    /// come back negative. Pictures do not need it
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value = "false", hide_default_value = true, hide_possible_values = true, action = clap::ArgAction::Set, help_heading = ERROR_BOUND)]
+    clip: bool,
     /// A value that means "missing"
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     missing_value: Option<f64>,
@@ -295,6 +299,7 @@ impl ConvertArgs {
             (self.missing.is_some(), "--missing"),
             (self.missing_value.is_some(), "--missing-value"),
             (self.floor.is_some(), "--floor"),
+            (self.clip, "--clip"),
             (self.samples.is_some(), "--samples"),
             (self.seed.is_some(), "--seed"),
             (self.transfer_function.is_some(), "--transfer-function"),
@@ -331,6 +336,7 @@ impl ConvertArgs {
             },
             missing_value: self.missing_value,
             refuse_fill: true,
+            clip: self.clip,
             colours: None, // may depend on the frames
             block: self.block,
             level: self.level,
