@@ -4,6 +4,7 @@
 mod contents;
 mod dataset;
 mod encoding;
+mod field_data;
 mod format;
 mod metaimage;
 mod netcdf;

@@ -1,6 +1,7 @@
 //! The text around the samples of a `.vti`, and the list of a `.pvd`.
 
 use super::contents::{Contents, Lattice};
+use super::field_data;
 use crate::base::sample::SampleType;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
@@ -19,13 +20,14 @@ pub(super) fn write_header(
     let (extent, name, ty_name) = (format!("0 {x} 0 {y} 0 {z}"), escape(&contents.name), name_of(ty));
     let [spacing, origin] = [lattice.spacing(), lattice.first].map(|v| v.map(|n| n.to_string()).join(" "));
     let direction = direction(lattice);
+    let fields = field_data::text(contents, time);
     write!(
         out,
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
   <ImageData WholeExtent="{extent}" Origin="{origin}" Spacing="{spacing}"{direction}>
     <FieldData>
-      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time}</DataArray>
+      {fields}
     </FieldData>
     <Piece Extent="{extent}">
       <PointData Scalars="{name}">

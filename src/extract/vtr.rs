@@ -1,6 +1,7 @@
 //! The text and the coordinates before the samples of a `.vtr`: a VTK rectilinear grid.
 
 use super::contents::Contents;
+use super::field_data;
 use super::vti::{name_of, units};
 use crate::base::sample::SampleType;
 use quick_xml::escape::escape;
@@ -11,6 +12,7 @@ pub(super) fn write_header(contents: &Contents, (ty, time): (SampleType, f64), o
     let [x, y, z] = contents.grid.dims.map(|n| n - 1);
     let (extent, name, ty_name) = (format!("0 {x} 0 {y} 0 {z}"), escape(&contents.name), name_of(ty));
     let places: Vec<Vec<f64>> = (0..3).map(|axis| contents.coordinates(axis)).collect();
+    let fields = field_data::text(contents, time);
     let mut offset = 0;
     let mut coordinates = String::new();
     for (axis, places) in ["x", "y", "z"].into_iter().zip(&places) {
@@ -24,7 +26,7 @@ pub(super) fn write_header(contents: &Contents, (ty, time): (SampleType, f64), o
 <VTKFile type="RectilinearGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">
   <RectilinearGrid WholeExtent="{extent}">
     <FieldData>
-      <DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{time}</DataArray>
+      {fields}
     </FieldData>
     <Piece Extent="{extent}">
       <PointData Scalars="{name}">

@@ -293,6 +293,11 @@ def check_rectilinear(run, folder):
     samples = numpy_to_vtk(frame.ravel(), deep=True)
     samples.SetName("density")
     grid.GetPointData().SetScalars(samples)
+    constants = {"Re": np.array([100.5]), "ids": np.array([2**60 + 1, -7], "i8"), "axis": np.array([[0, 0.1, 1]], "f4")}
+    for name, values in constants.items():
+        array = numpy_to_vtk(values, deep=True, array_type=vtk.VTK_LONG_LONG if values.dtype == "i8" else None)
+        array.SetName(name)
+        grid.GetFieldData().AddArray(array)
     writer = vtk.vtkXMLRectilinearGridWriter()
     writer.SetFileName(str(folder / "grid.vtr"))
     writer.SetInputData(grid)
@@ -306,6 +311,9 @@ def check_rectilinear(run, folder):
     for get, at in zip([after.GetXCoordinates, after.GetYCoordinates, after.GetZCoordinates], places):
         np.testing.assert_array_equal(vtk_to_numpy(get()), at)
     assert_samples(frame, vtk_to_numpy(after.GetPointData().GetArray("density")).reshape(frame.shape))
+    for name, values in constants.items():
+        back = vtk_to_numpy(after.GetFieldData().GetArray(name))
+        assert back.dtype == values.dtype and back.reshape(values.shape).tolist() == values.tolist(), name
 
 
 def is_down(data):

@@ -57,6 +57,8 @@ pub(super) struct VtiHeader {
     pub(super) scalars: Vec<(Association, String)>,
     /// The time that the file is of.
     pub(super) time: Option<VtiArray>,
+    /// Other arrays that belong to no point or cell, and how many tuples each has.
+    pub(super) fields: Vec<(VtiArray, usize)>,
     /// Of the appended data.
     pub(super) encoding: Option<String>,
     inside: Inside,
@@ -87,6 +89,7 @@ impl VtiHeader {
             declared: Vec::new(),
             scalars: Vec::new(),
             time: None,
+            fields: Vec::new(),
             encoding: None,
             inside: Inside::Nothing,
         }
@@ -203,7 +206,7 @@ impl VtiHeader {
         let name = attribute(e, "Name")?.unwrap_or_default();
         let of = match self.inside {
             Inside::Samples(of) if name != "vtkGhostType" => of, // VTK's own marks
-            Inside::FieldData if name == "TimeValue" => Association::Points,
+            Inside::FieldData => Association::Points,
             Inside::Coordinates => Association::Points,
             _ => return Ok(()),
         };
@@ -220,7 +223,11 @@ impl VtiHeader {
             name,
         };
         match (self.inside, self.pieces.last_mut()) {
-            (Inside::FieldData, _) => self.time = Some(array),
+            (Inside::FieldData, _) if array.name == "TimeValue" => self.time = Some(array),
+            (Inside::FieldData, _) => {
+                let tuples = attribute(e, "NumberOfTuples")?.and_then(|tuples| tuples.parse().ok());
+                self.fields.extend(tuples.map(|tuples| (array, tuples)));
+            }
             (Inside::Coordinates, Some(piece)) if !self.parallel => piece.coordinates.push(array),
             (Inside::Coordinates, _) => {} // the files of its pieces say where
             (_, Some(piece)) if !self.parallel => piece.arrays.push(array),
