@@ -143,6 +143,18 @@ pub fn with_frames(mut description: Description, frames: usize) -> Description {
     description
 }
 
+/// Whether its axes are as long as those of an archive with these voxels and frames.
+pub fn is_of(description: &Description, dims: [usize; 3], frames: usize) -> bool {
+    description.axes.iter().all(|axis| {
+        let expected = match (axis.role, axis.role.voxels()) {
+            (AxisRole::Frames, _) => frames,
+            (_, Some(along)) => dims[along],
+            (_, None) => 1,
+        };
+        description.dimensions[axis.dimension as usize].length == expected as u64
+    })
+}
+
 /// The dimension of frames.
 pub fn frames_of(description: &Description) -> Option<u32> {
     description.axes.iter().find(|axis| axis.role == AxisRole::Frames).map(|axis| axis.dimension)
@@ -283,6 +295,12 @@ mod tests {
         assert_eq!(coordinates(&narrow, 0), None);
         let every = narrowed(&description(0.0), &[0], &Region { start: [0; 3], end: [1, 2, 1] }, 2);
         assert_eq!((floats(&every, "y"), every.orientation.expect("kept").spacing[1]), (vec![30.0, 10.0], 4.0));
+    }
+
+    #[test]
+    fn axes_are_compared_with_those_of_an_archive() {
+        let (all, turned) = (description(0.0), [2, 3, 1]);
+        assert!(is_of(&all, turned, 2) && !is_of(&all, turned, 3) && !is_of(&all, [3, 2, 1], 2));
     }
 
     #[test]

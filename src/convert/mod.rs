@@ -31,7 +31,7 @@ mod to_file;
 mod variation;
 mod warnings;
 
-use crate::base::description::Description;
+use crate::base::description::{Description, is_of};
 use crate::base::error::{Error, Note, Result};
 use crate::base::memory;
 use crate::base::progress::Progress;
@@ -253,6 +253,7 @@ pub fn resume<W: Write>(
     let started = Instant::now();
     let Task { config, archive, colour_transform } = &Task::new(config, source.archive());
     let plan = Plan::new(config, archive, colour_transform.as_ref())?;
+    check_description(archive, begun.as_ref())?;
     let done = WindowsDone::of(begun.as_ref(), (&plan, archive), name)?;
     let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
@@ -273,6 +274,18 @@ pub fn resume<W: Write>(
     let report = recorder.finish(started, read_time, encode_time)?;
     progress.finish();
     Ok(report)
+}
+
+/// An error if what a source says beside its samples does not fit these: better at the start than at the end.
+fn check_description(archive: &Archive, begun: Option<&PartialFile>) -> Result<()> {
+    let is_appended = begun.is_some_and(|begun| begun.first_window > 0);
+    let fits = |description: &Description| {
+        is_appended || archive.frames.is_some_and(|frames| is_of(description, archive.grid.dims, frames))
+    };
+    match archive.description.as_ref().is_none_or(fits) {
+        true => Ok(()),
+        false => Err(Error::setting("description", "its axes are not those of the frames")),
+    }
 }
 
 /// The metadata of a file of `archive` before its first frame: all that is decided without reading samples.

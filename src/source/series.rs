@@ -7,7 +7,7 @@ use super::layout::Shape;
 use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
 use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, formats, times};
-use crate::base::description::{Description, Values, extended, joined};
+use crate::base::description::{Description, Values, extended, is_of, joined};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
@@ -150,8 +150,16 @@ impl Series {
         Ok(self)
     }
 
-    /// Drops a description that is too large for a coefficient file.
+    /// Drops a description that is too large for a coefficient file, or of an array with other axes than the archive.
     fn check_description(&mut self) {
+        let (dims, frames) = (self.archive.grid.dims, self.archive.frames.unwrap_or(0));
+        if self.archive.description.as_ref().is_some_and(|description| !is_of(description, dims, frames)) {
+            self.archive.description = None;
+            note_once(
+                &mut self.archive.notes,
+                "coordinates and attributes are not kept: frames are not those of the array",
+            );
+        }
         if let Some(Err(error)) = self.archive.description.as_ref().map(Description::check_size) {
             self.archive.description = None;
             note_once(&mut self.archive.notes, format!("coordinates and attributes are not kept: {error}"));
