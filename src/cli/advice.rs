@@ -114,6 +114,7 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
             "basis",
             "block",
             "bound",
+            "clip",
             "floor",
             "level",
             "max-error",

@@ -10,7 +10,8 @@ fn options(work: &Work, program: &str, command: &str) -> Vec<String> {
     let long = lines
         .filter(|line| (1..=6).contains(&indent(line)))
         .filter_map(|line| line.split_whitespace().find(|word| word.starts_with("--")));
-    long.map(String::from).collect()
+    let name = |word: &str| word.split(['[', '=']).next().unwrap_or(word).to_string();
+    long.map(name).collect()
 }
 
 #[test]
