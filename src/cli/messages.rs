@@ -20,13 +20,14 @@ pub fn of_note(note: &Note) -> String {
 }
 
 /// Fields whose options have other names.
-const OPTIONS: [(&str, &str); 6] = [
+const OPTIONS: [(&str, &str); 7] = [
     ("sample", "dtype"),
     ("big_endian", "endian"),
     ("azimuth", "view"),
     ("elevation", "view"),
     ("certify", "error-image"),
     ("limited", "error"),
+    ("surfaces", "iso"),
 ];
 
 /// The name of the option for a field.

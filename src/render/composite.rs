@@ -1,4 +1,4 @@
-//! Composites and maximum intensity projections: every frame batch slice by slice, one view after another.
+//! Composites, isosurfaces and maximum intensity projections: every frame batch slice by slice, one view after another.
 
 use super::config::{Mode, RenderConfig};
 use super::driver::{Job, for_each_batch};
@@ -7,8 +7,10 @@ use super::scene::{FrameBatch, Scene};
 use super::slices::SlicedView;
 use super::slices::batch::{Batch, bytes};
 use super::slices::blend::Composite;
+use super::slices::iso::Isosurfaces;
 use super::slices::mip::Largest;
 use super::slices::row::Blend;
+use super::slices::shade::Shader;
 use super::slices::table::Table;
 use crate::base::error::Result;
 use crate::base::memory;
@@ -29,10 +31,16 @@ pub(super) fn composite(
         let mut sink =
             |frame, picture: &[f32]| sink(Rendered { views: &[], view: number, frame, picture, error: None });
         match &config.mode {
-            Mode::Composite { transfer, unit, .. } => {
-                let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
-                let blend = Composite { table: Table::new(transfer, view.step / unit) };
+            Mode::Composite { transfer, unit, light, .. } => {
+                let spacing = scene.grid().largest_spacing();
+                let table = Table::new(transfer, view.step / unit.unwrap_or(spacing));
+                let shader = light.map(|light| Shader::new(light, view, table.faint(spacing)));
+                let blend = Composite { table, shader };
                 report.views[number].table_error = Some(blend.table.error());
+                Sliced { number, view, blend, config, progress }.render(scene, report, &mut sink)?;
+            }
+            Mode::Iso { surfaces, light, .. } => {
+                let blend = Isosurfaces::new(surfaces, Shader::new(*light, view, 0.0));
                 Sliced { number, view, blend, config, progress }.render(scene, report, &mut sink)?;
             }
             Mode::Mip { .. } => {
@@ -52,9 +60,11 @@ pub(super) fn least(scene: &dyn Scene, config: &RenderConfig, views: &[SlicedVie
 /// Bytes to render `frames` frames together, with `blocks` blocks decoded at a time.
 fn needed(scene: &dyn Scene, config: &RenderConfig, view: &SlicedView, (frames, blocks): (usize, usize)) -> usize {
     let grid = scene.blocks();
+    let is_shaded = config.mode.is_shaded();
     let frames_bytes = match config.mode {
-        Mode::Composite { .. } => bytes::<Composite>(view, frames, grid),
-        _ => bytes::<Largest>(view, frames, grid),
+        Mode::Composite { .. } => bytes::<Composite>(view, frames, grid, is_shaded),
+        Mode::Iso { .. } => bytes::<Isosurfaces>(view, frames, grid, is_shaded),
+        _ => bytes::<Largest>(view, frames, grid, is_shaded),
     };
     memory::FIXED + frames_bytes + blocks * block_bytes(scene, config, frames)
 }

@@ -1,5 +1,6 @@
 //! The settings of a rendering.
 
+use super::light::{Light, Surface, check_surfaces};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::{Grid, Region};
 use crate::colour::TransferFunction;
@@ -52,6 +53,17 @@ pub enum Mode {
         /// Slices per voxel along the ray, and cells of a slice per voxel across it; by default as many as the kernel and
         /// the scale of the view need.
         slices: Option<usize>,
+        /// The light that shades the colours; without, colours do not depend on direction.
+        light: Option<Light>,
+    },
+    /// Surfaces where the field has some value, shaded. Near ones hide far ones by their opacity (eq 41, 42).
+    Iso {
+        /// The surfaces.
+        surfaces: Vec<Surface>,
+        /// Their light.
+        light: Light,
+        /// Slices and cells per voxel, as in [`Self::Composite`].
+        slices: Option<usize>,
     },
     /// The maximum along the ray.
     Mip {
@@ -63,7 +75,15 @@ pub enum Mode {
 impl Mode {
     /// The kind of numbers in each pixel.
     pub fn pixel(&self) -> Pixel {
-        if matches!(self, Self::Composite { .. }) { Pixel::Light } else { Pixel::Value }
+        match self {
+            Self::Composite { .. } | Self::Iso { .. } => Pixel::Light,
+            Self::Projection | Self::Mip { .. } => Pixel::Value,
+        }
+    }
+
+    /// Whether this is [`Self::Iso`].
+    pub(super) fn is_of_surfaces(&self) -> bool {
+        matches!(self, Self::Iso { .. })
     }
 
     /// Whether this is [`Self::Projection`].
@@ -71,11 +91,29 @@ impl Mode {
         matches!(self, Self::Projection)
     }
 
+    /// Whether light falls on the field.
+    pub(super) fn is_shaded(&self) -> bool {
+        match self {
+            Self::Composite { light, .. } => light.is_some(),
+            Self::Iso { .. } => true,
+            Self::Projection | Self::Mip { .. } => false,
+        }
+    }
+
+    /// An error if the mode's own settings cannot be used.
+    fn check(&self) -> Result<()> {
+        match self {
+            Self::Composite { light, .. } => light.map_or(Ok(()), |light| light.check()),
+            Self::Iso { surfaces, light, .. } => light.check().and_then(|()| check_surfaces(surfaces)),
+            Self::Projection | Self::Mip { .. } => Ok(()),
+        }
+    }
+
     /// The number of slices per voxel that the caller set.
     pub(super) fn slices(&self) -> Option<usize> {
         match self {
             Self::Projection => None,
-            Self::Composite { slices, .. } | Self::Mip { slices } => *slices,
+            Self::Composite { slices, .. } | Self::Iso { slices, .. } | Self::Mip { slices } => *slices,
         }
     }
 }
@@ -166,6 +204,7 @@ impl RenderConfig {
         if self.quick && self.certify {
             return Err(Error::setting("quick", "has no bound, so it cannot be certified"));
         }
+        self.mode.check()?;
         if self.mode.is_projection() {
             return Ok(());
         }

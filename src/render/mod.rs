@@ -15,7 +15,7 @@
 //! Each module uses only the modules listed above it:
 //!
 //! ```text
-//! config            the caller's settings
+//! light             lamps and surfaces; config: the caller's settings
 //! layout            the planes of a batch; plane_values: a block's values, plane by plane
 //! splat/            a view's camera and backend; blocks into bands; bands into tiles
 //! weights           the divisors of means; expectation: the effect of block errors on the pixels of a view
@@ -23,7 +23,7 @@
 //! scene             the source of blocks: a frame batch and the blocks selected for it
 //! report            what a rendering did: counts, times and errors
 //! scenes/           a coefficient file or an archive's frames as a scene
-//! slices/           composites and maximum intensity projections: the field along rays, slice by slice
+//! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
 //! plan              how much fits in memory
 //! certificate       the error bound of a pixel; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
@@ -47,6 +47,7 @@
 //! missing samples included, so that means stay means. Composites and maximum intensity projections are not splatted:
 //! `slices` samples the field along rays.
 
+mod light;
 mod config;
 mod layout;
 mod plane_values;
@@ -73,6 +74,7 @@ pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
 pub use layout::{Layout, Order};
+pub use light::{Light, Surface};
 pub use overview::{OverviewRequest, Thinning, stride};
 pub use pictures::render_png;
 pub use plane_values::{BlockPlanes, PlaneValues, Scratch};

@@ -116,6 +116,14 @@ impl Camera {
         std::array::from_fn(|axis| self.center[axis] + length * self.right[axis])
     }
 
+    /// The direction to a point `azimuth` degrees to the right of the viewer and `elevation` degrees above.
+    pub(crate) fn towards(&self, azimuth: f64, elevation: f64) -> [f64; 3] {
+        let ((sin_a, cos_a), (sin_e, cos_e)) = (sin_cos_degrees(azimuth), sin_cos_degrees(elevation));
+        let share =
+            |axis: usize| cos_e * sin_a * self.right[axis] + sin_e * self.up[axis] - cos_e * cos_a * self.forward[axis];
+        std::array::from_fn(share)
+    }
+
     /// The depth of the nearest corner of `grid`, which may be a part of the camera's grid.
     pub(crate) fn nearest_of(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)

@@ -60,6 +60,40 @@ fn the_largest_value_takes_a_colour_map() {
 }
 
 #[test]
+fn light_changes_colours_and_no_opacity() {
+    let work = Work::with_file("--tolerance 1e-4");
+    for (name, more) in [("plain", ""), ("shaded", "--shade"), ("lit", "--light 60,0"), ("default", "--light -30,40")] {
+        work.render(&format!("a.wspl --mode composite --frames 2 {SIZE} {more} -o {name}.npy")).ok();
+    }
+    let [plain, shaded, lit, default] =
+        ["plain", "shaded", "lit", "default"].map(|n| singles(&work, &format!("{n}.npy")).1);
+    assert!(shaded != plain && lit != shaded && default == shaded);
+    let opacity = |light: &[f32]| light.iter().skip(3).step_by(4).copied().collect::<Vec<_>>();
+    let off = opacity(&plain).iter().zip(opacity(&shaded)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off < 1e-5, "{off:e}");
+}
+
+#[test]
+fn surfaces_are_named_by_value_or_share() {
+    let work = Work::with_file("--tolerance 1e-4");
+    let shown = format!("a.wspl --frames 2 {SIZE} --range 0,2");
+    for (name, more) in
+        [("one", "--iso 50%"), ("same", "--mode iso"), ("value", "--iso 1.0"), ("red", "--iso 1:ff0000:0.5")]
+    {
+        work.render(&format!("{shown} {more} -o {name}.npy")).ok();
+    }
+    let [one, same, value, red] = ["one", "same", "value", "red"].map(|n| singles(&work, &format!("{n}.npy")).1);
+    assert!(one == same && one == value);
+    let most = |light: &[f32], n: usize| light.iter().skip(n).step_by(4).copied().fold(0.0, f32::max);
+    assert!(most(&one, 3) > 0.9 && most(&red, 0) > most(&red, 2), "an opaque surface, and a red one");
+    let seen = |light: &[f32]| light.chunks(4).filter(|p| p[3] > 0.4).count();
+    assert!(seen(&one) > 20 && seen(&one).abs_diff(seen(&red)) < 20, "{} {}", seen(&one), seen(&red));
+    let json = work.render(&format!("{shown} --iso 0.5,1:00ff00 -o two.png --json")).ok().json();
+    let iso = json["picture"]["iso"].as_str().unwrap().to_string();
+    assert!(iso.starts_with("0.5:") && iso.ends_with("1:00ff00:0.5"), "{iso}");
+}
+
+#[test]
 fn options_without_meaning_for_a_mode_are_refused() {
     let work = Work::with_file("");
     work.wavesplat("convert a.npy -o c.wspl --transfer-function turbo").ok();
@@ -85,6 +119,14 @@ fn options_without_meaning_for_a_mode_are_refused() {
         ("a.wspl --mode composite --range 1,1", &["--range"]),
         ("a.wspl --mode composite --range 2,1", &["--range"]),
         ("c.wspl --mode composite", &["--mode", "colours already"]),
+        ("c.wspl --iso 1", &["--mode", "colours already"]),
+        ("a.wspl --shade", &["--shade", "--mode composite"]),
+        ("a.wspl --mode mip --light 1,2", &["--light", "--mode composite or iso"]),
+        ("a.wspl --mode composite --iso 1", &["--iso", "--mode iso"]),
+        ("a.wspl --iso 1 --opacity 0:0,1:1", &["--opacity", "--mode composite"]),
+        ("a.wspl --iso x", &["--iso", "40%"]),
+        ("a.wspl --iso 1::2", &["--iso", "at most 1"]),
+        ("a.wspl --iso 1 --tau 1", &["--tau"]),
     ] {
         work.render(&format!("{args} {SIZE} -o out.npy")).fails(2, words);
     }

@@ -1,18 +1,19 @@
 //! Options for the samples along a ray.
 
+use crate::surfaces::SurfaceList;
 use clap::{Args, ValueEnum};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{OpacityPoints, Pair, open_colours, stretched};
+use wavesplat::cli::{Numbers, OpacityPoints, Pair, open_colours, stretched};
 use wavesplat::colour::TransferFunction;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::Mode;
+use wavesplat::render::{Light, Mode};
 
 /// Options for the samples along a ray.
 #[derive(Debug, Args)]
 pub(crate) struct AlongArgs {
-    /// How the samples along a ray make a pixel
-    #[arg(long, value_enum, default_value = "projection", help_heading = "Along the ray")]
-    pub(crate) mode: ModeName,
+    /// How the samples along a ray make a pixel [default: iso with --iso, else projection]
+    #[arg(long, value_enum, help_heading = "Along the ray")]
+    mode: Option<ModeName>,
     /// Colours and opacities of a composite: a colour map's name or a file. For a projection with --method direct,
     /// samples are turned into these colours before they are splatted. --range gives the values of its first and last
     /// colour [default: viridis; its own values, or those of all frames]
@@ -24,6 +25,17 @@ pub(crate) struct AlongArgs {
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
+    /// Isosurfaces, as V[:RRGGBB[:OPACITY]],... V is a value, or a share of the range such as 40% [default: 50%; colours of
+    /// --transfer-function; opaque if there is one, else half opaque]
+    #[arg(long, value_name = "V,...", allow_hyphen_values = true, help_heading = "Along the ray")]
+    iso: Option<SurfaceList>,
+    /// Shade a composite by the gradient of the samples, so that it looks solid
+    #[arg(long, help_heading = "Along the ray")]
+    shade: bool,
+    /// Where the lamp of --shade and of isosurfaces stands: degrees to the right of the viewer and above [default:
+    /// -30,40]
+    #[arg(long, value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "Along the ray")]
+    light: Option<Pair>,
     /// Slices per voxel along the ray, and cells per voxel across it [default: by the kernel and the scale, mostly 2]
     #[arg(long, value_name = "N", help_heading = "Along the ray")]
     slices: Option<usize>,
@@ -37,6 +49,8 @@ pub(crate) enum ModeName {
     Composite,
     /// Show the largest value: see --colormap
     Mip,
+    /// Show surfaces of equal value: see --iso, --light
+    Iso,
 }
 
 impl ModeName {
@@ -45,21 +59,31 @@ impl ModeName {
             Self::Projection => "projection",
             Self::Composite => "composite",
             Self::Mip => "mip",
+            Self::Iso => "iso",
         }
     }
 
-    /// Whether samples along the ray have colours and opacities. In the other modes pixels have values, for --colormap.
+    /// Whether samples along the ray have colours. In the other modes pixels have values, for --colormap.
     pub(crate) fn colours_samples(self) -> bool {
         match self {
-            Self::Composite => true,
+            Self::Composite | Self::Iso => true,
             Self::Projection | Self::Mip => false,
         }
+    }
+
+    /// Whether all samples have opacities.
+    fn has_opacities(self) -> bool {
+        self == Self::Composite
+    }
+
+    fn is_of_surfaces(self) -> bool {
+        self == Self::Iso
     }
 
     /// Whether rays are sampled slice by slice.
     fn has_slices(self) -> bool {
         match self {
-            Self::Composite | Self::Mip => true,
+            Self::Composite | Self::Mip | Self::Iso => true,
             Self::Projection => false,
         }
     }
@@ -67,7 +91,7 @@ impl ModeName {
     /// Why --transfer-function does not apply to the mode, if it does not.
     fn refuse_colours(self, is_direct: bool) -> Option<String> {
         let why = match self {
-            Self::Composite => return None,
+            Self::Composite | Self::Iso => return None,
             Self::Projection if is_direct => return None, // frames are turned into colours before they are splatted
             Self::Projection => {
                 "with a coefficient file, it colours samples along the ray (--mode composite); --colormap colours \
@@ -86,20 +110,29 @@ impl ModeName {
 }
 
 impl AlongArgs {
+    /// The mode: as given, or the one that other options imply.
+    pub(crate) fn mode_name(&self) -> ModeName {
+        self.mode.unwrap_or(if self.iso.is_some() { ModeName::Iso } else { ModeName::Projection })
+    }
+
     /// An error if an option does not apply to the mode.
     pub(crate) fn check(&self, is_direct: bool, colour_map: bool) -> Result<()> {
+        let mode = self.mode_name();
         let needs = |given: bool, option: &str, of: fn(ModeName) -> bool| {
-            (given && !of(self.mode)).then(|| format!("{option}: needs --mode {}", ModeName::names(of)))
+            (given && !of(mode)).then(|| format!("{option}: needs --mode {}", ModeName::names(of)))
         };
         let colours = || {
-            (colour_map && self.mode.colours_samples())
-                .then(|| format!("--colormap: a {} takes its colours from --transfer-function", self.mode.name()))
+            (colour_map && mode.colours_samples())
+                .then(|| format!("--colormap: --mode {} takes its colours from --transfer-function", mode.name()))
         };
-        let refused = needs(self.opacity.is_some(), "--opacity", ModeName::colours_samples)
-            .or_else(|| needs(self.opacity_unit.is_some(), "--opacity-unit", ModeName::colours_samples))
+        let refused = needs(self.opacity.is_some(), "--opacity", ModeName::has_opacities)
+            .or_else(|| needs(self.opacity_unit.is_some(), "--opacity-unit", ModeName::has_opacities))
+            .or_else(|| needs(self.iso.is_some(), "--iso", ModeName::is_of_surfaces))
+            .or_else(|| needs(self.shade, "--shade", ModeName::has_opacities))
+            .or_else(|| needs(self.light.is_some(), "--light", ModeName::colours_samples))
             .or_else(|| needs(self.slices.is_some(), "--slices", ModeName::has_slices))
             .or_else(colours)
-            .or_else(|| self.transfer_function.as_ref().and_then(|_| self.mode.refuse_colours(is_direct)));
+            .or_else(|| self.transfer_function.as_ref().and_then(|_| mode.refuse_colours(is_direct)));
         if let Some(what) = refused {
             return Err(Error::usage(what));
         }
@@ -109,13 +142,13 @@ impl AlongArgs {
 
     /// The name of the colours of a composite, or of coloured frames.
     pub(crate) fn colours(&self) -> Option<&str> {
-        let of_composite = self.mode.colours_samples().then_some("viridis");
+        let of_composite = self.mode_name().colours_samples().then_some("viridis");
         self.transfer_function.as_deref().or(of_composite)
     }
 
     /// Whether the range of a composite's colours is automatic: neither given nor stored with the colours.
     pub(crate) fn is_automatic(&self, range: Option<Pair>) -> Result<bool> {
-        let Some(name) = self.colours().filter(|_| self.mode.colours_samples() && range.is_none()) else {
+        let Some(name) = self.colours().filter(|_| self.mode_name().colours_samples() && range.is_none()) else {
             return Ok(false);
         };
         Ok(!TransferFunction::open(name)?.is_of_values())
@@ -123,23 +156,39 @@ impl AlongArgs {
 
     /// The colours of a composite of a file, over the given range, their own range, or that of all samples.
     pub(crate) fn of_file(&self, range: Option<Pair>, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
-        let Some(name) = self.colours().filter(|_| self.mode.colours_samples()) else { return Ok(None) };
+        let Some(name) = self.colours().filter(|_| self.mode_name().colours_samples()) else { return Ok(None) };
         stretched(open_colours("--transfer-function", name)?, range, || Ok(file.source_range())).map(Some)
     }
 
     /// The mode with these colours, which a composite needs.
     pub(crate) fn mode(&self, colours: Option<&TransferFunction>) -> Result<Mode> {
         let slices = self.slices;
-        Ok(match self.mode {
+        Ok(match self.mode_name() {
             ModeName::Projection => Mode::Projection,
             ModeName::Composite => {
-                let transfer = colours.ok_or_else(|| Error::usage("--mode composite: needs --transfer-function"))?;
+                let transfer = needed(colours)?;
                 let points = self.opacity.as_ref().map(|points| transfer.with_opacity(&points.0));
                 let transfer = points.unwrap_or_else(|| Ok(transfer.clone()));
                 let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
-                Mode::Composite { transfer, unit: self.opacity_unit, slices }
+                let light = (self.shade || self.light.is_some()).then(|| self.lamp());
+                Mode::Composite { transfer, unit: self.opacity_unit, slices, light }
             }
             ModeName::Mip => Mode::Mip { slices },
+            ModeName::Iso => {
+                let list = self.iso.clone().unwrap_or_default();
+                let surfaces = list.surfaces(needed(colours)?, self.transfer_function.is_some());
+                Mode::Iso { surfaces, light: self.lamp(), slices }
+            }
         })
     }
+
+    fn lamp(&self) -> Light {
+        let default = Light::default();
+        self.light.map_or(default, |Numbers([azimuth, elevation])| Light { azimuth, elevation, ..default })
+    }
+}
+
+/// The colours of samples.
+fn needed(colours: Option<&TransferFunction>) -> Result<&TransferFunction> {
+    colours.ok_or_else(|| Error::usage("--mode: needs --transfer-function"))
 }

@@ -110,7 +110,7 @@ impl ColourArgs {
     }
 }
 
-fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
+pub(crate) fn parse_colour(text: &str) -> std::result::Result<Rgb, String> {
     let wrong = || "takes six hexadecimal digits, such as ffffff".to_string();
     let digits = text.trim_start_matches('#');
     let number = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6).ok_or_else(wrong)?;

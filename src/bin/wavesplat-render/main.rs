@@ -12,6 +12,7 @@ mod ranges;
 mod report;
 mod scene;
 mod sinks;
+mod surfaces;
 mod targets;
 mod views;
 

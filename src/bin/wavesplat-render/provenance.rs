@@ -8,7 +8,7 @@ use wavesplat::colour::{Norm, Scale};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::BoundReport;
 use wavesplat::render::sink::{Provenance, Shows};
-use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene};
+use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene, Surface};
 
 impl Cli {
     /// The settings that pictures are rendered with.
@@ -55,8 +55,8 @@ impl Cli {
                 MethodName::Coefficients => "coefficients",
                 MethodName::Direct => "direct",
             },
-            mode: self.along.mode.name(),
-            quantity: (self.along.mode == ModeName::Projection).then_some(quantity),
+            mode: self.along.mode_name().name(),
+            quantity: (self.along.mode_name() == ModeName::Projection).then_some(quantity),
             ..Provenance::default()
         }
     }
@@ -87,9 +87,26 @@ fn of_transfer(
     let painter = file.and_then(CoefficientFile::colour_transform).map(|painter| painter.colours.words());
     let words = || painter.unwrap_or_else(|| colouring.map.words());
     let provenance = Provenance { transfer_function: (colouring.pixel != Pixel::Value).then(words), ..provenance };
-    let Mode::Composite { transfer, unit, .. } = &config.mode else { return provenance };
-    let unit = unit.unwrap_or_else(|| scene.grid().largest_spacing());
-    Provenance { opacity: Some(transfer.opacity_words()), opacity_unit: Some(unit), ..provenance }
+    match &config.mode {
+        Mode::Composite { transfer, unit, light, .. } => Provenance {
+            opacity: Some(transfer.opacity_words()),
+            opacity_unit: Some(unit.unwrap_or_else(|| scene.grid().largest_spacing())),
+            light: light.map(|light| [light.azimuth, light.elevation]),
+            ..provenance
+        },
+        Mode::Iso { surfaces, light, .. } => Provenance {
+            iso: Some(surfaces.iter().map(words_of).collect::<Vec<_>>().join(",")),
+            light: Some([light.azimuth, light.elevation]),
+            ..provenance
+        },
+        Mode::Projection | Mode::Mip { .. } => provenance,
+    }
+}
+
+/// A surface in the form of --iso.
+fn words_of(Surface { value, colour, opacity }: &Surface) -> String {
+    let [r, g, b] = colour.map(|c| (c * 255.0).round() as u8);
+    format!("{value}:{r:02x}{g:02x}{b:02x}:{opacity}")
 }
 
 /// Adds the colours of pixels.

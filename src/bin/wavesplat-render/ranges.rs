@@ -61,7 +61,7 @@ fn small(config: &RenderConfig) -> RenderConfig {
         Mode::Projection => Mode::Projection,
         // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
         // where they end.
-        Mode::Composite { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
+        Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
     };
     small
 }

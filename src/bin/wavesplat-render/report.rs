@@ -35,7 +35,7 @@ impl Cli {
     /// Prints notes on the errors of pictures.
     pub(crate) fn note_errors(&self, report: &RenderReport) {
         let RenderReport { certified_sample_error, expected_error, left_out, .. } = report;
-        if self.tolerance.is_some() && self.along.mode != ModeName::Projection {
+        if self.tolerance.is_some() && self.along.mode_name() != ModeName::Projection {
             self.common.note(format_args!(
                 "no sample is off by more than {certified_sample_error:.4e}; {} coefficients left out",
                 left_out.coefficients

@@ -118,7 +118,7 @@ impl Cli {
             None => None,
         };
         let grid = source.archive().grid;
-        let scene = match colours.clone().filter(|_| !self.along.mode.colours_samples()) {
+        let scene = match colours.clone().filter(|_| !self.along.mode_name().colours_samples()) {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };

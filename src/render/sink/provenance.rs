@@ -56,6 +56,10 @@ pub struct Provenance {
     pub opacity: Option<String>,
     /// Length of the path that has these opacities, in world units.
     pub opacity_unit: Option<f64>,
+    /// Isosurfaces.
+    pub iso: Option<String>,
+    /// Degrees by which the lamp stands to the right of the viewer and above, if colours are shaded.
+    pub light: Option<[f64; 2]>,
     /// The values of the first and the last colour.
     pub range: Option<(f64, f64)>,
     /// How values are spread over the range.

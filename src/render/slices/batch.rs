@@ -52,15 +52,20 @@ fn groups(view: &SlicedView) -> usize {
 
 /// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
 fn most_layers(view: &SlicedView, blocks: BlockGrid) -> usize {
-    (blocks.edges[view.shear.axes[2]] + 2 * view.reach[2]).min(view.count[2])
+    (blocks.edges[view.shear.axes[2]] + 2 * (view.reach[2] + view.margin)).min(view.count[2])
 }
 
 /// Bytes of a batch of `frames` frames without decoded blocks.
-pub(in crate::render) fn bytes<B: Blend>(view: &SlicedView, frames: usize, blocks: BlockGrid) -> usize {
+pub(in crate::render) fn bytes<B: Blend>(
+    view: &SlicedView,
+    frames: usize,
+    blocks: BlockGrid,
+    is_shaded: bool,
+) -> usize {
     let layers = Layers::bytes(view, most_layers(view, blocks));
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
-    let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view));
+    let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view), is_shaded);
     frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLICES * Slice::bytes(view)
 }
 
@@ -203,7 +208,8 @@ impl<B: Blend> Batch<'_, B> {
         let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
         let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
         chunks.enumerate().for_each(|(n, (groups, limits))| {
-            let (work, rows) = (Work::new(view, rows), n * rows..((n + 1) * rows).min(view.extent[1]));
+            let (work, rows) =
+                (Work::new(view, rows, self.blend.is_shaded()), n * rows..((n + 1) * rows).min(view.extent[1]));
             let mut band = Band { view, blend: self.blend, rows, groups, limits, work };
             slices.iter().for_each(|slice| band.add(slice, &frame.layers));
         });

@@ -2,13 +2,16 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::row::{Blend, Row};
+use super::row::{Blend, Point, Row};
+use super::shade::{Lit, Shader};
 use super::table::{ENTRIES, Table};
 use super::units::Units;
 
 /// Emission and absorption: the light of each slice passes through the slices before it.
 pub(in crate::render) struct Composite {
     pub(in crate::render) table: Table,
+    /// The light on the colours, if they are shaded.
+    pub(in crate::render) shader: Option<Shader>,
 }
 
 /// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
@@ -31,6 +34,10 @@ impl Blend for Composite {
         self.table.units
     }
 
+    fn is_shaded(&self) -> bool {
+        self.shader.is_some()
+    }
+
     fn shows(&self, range: (f32, f32)) -> bool {
         self.table.shows(range)
     }
@@ -44,25 +51,18 @@ impl Blend for Composite {
     }
 
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]) {
-        add(row, &self.table.entries, groups, limits);
+        match &self.shader {
+            Some(shader) => add_shaded(row, &self.table.entries, shader, groups, limits),
+            None => add(row, &self.table.entries, groups, limits),
+        }
     }
 
     fn cells(group: &Self::Group) -> [[f32; 4]; GROUP] {
         *group
     }
 
-    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
-        let mut sum = [0.0; 4];
-        for (row, weight) in cells.into_iter().zip(down) {
-            let mut of_row = [0.0; 4];
-            for (cell, weight) in row.iter().zip(across) {
-                (0..4).for_each(|i| of_row[i] += weight * cell[i]);
-            }
-            (0..4).for_each(|i| sum[i] += weight * of_row[i]);
-        }
-        let [r, g, b, through] = sum;
-        let pixel = [r, g, b, 1.0 - through].map(|number| number.clamp(0.0, 1.0));
-        out.iter_mut().zip(pixel).for_each(|(to, from)| *to = from);
+    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]) {
+        pixel_of_light(cells, weights, out);
     }
 
     fn background(out: &mut [f32]) {
@@ -75,17 +75,41 @@ impl Blend for Composite {
         ([0.0, 0.0, 0.0, 1.0], false)
     }
 
-    fn step(&self, (light, met): &mut Self::Exact, value: f64, density: f64, share: f64) {
-        let (through, slice) = (light[3], self.table.exact(value, density * share));
+    fn step(&self, (light, met): &mut Self::Exact, point: &Point, share: f64) {
+        let (through, mut slice) = (light[3], self.table.exact(point.value, point.density * share));
+        if let Some(shader) = &self.shader {
+            let [colour, gloss] = shader.shade_one(point.gradient);
+            (0..3).for_each(|c| slice[c] = slice[c] * colour - slice[3] * gloss);
+        }
         light.iter_mut().zip(slice).for_each(|(sum, number)| *sum += through * number);
         *met = true;
     }
 
     fn off((light, met): &Self::Exact, pixel: &[f32]) -> Option<f64> {
-        let exact = [light[0], light[1], light[2], 1.0 - light[3]];
-        let off = pixel.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs());
-        met.then(|| off.fold(0.0, f64::max))
+        met.then(|| off_light(light, pixel))
     }
+}
+
+/// The light and opacity of a pixel, from the light and transmittance of the cells around it.
+pub(super) fn pixel_of_light(cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
+    let mut sum = [0.0; 4];
+    for (row, weight) in cells.into_iter().zip(down) {
+        let mut of_row = [0.0; 4];
+        for (cell, weight) in row.iter().zip(across) {
+            (0..4).for_each(|i| of_row[i] += weight * cell[i]);
+        }
+        (0..4).for_each(|i| sum[i] += weight * of_row[i]);
+    }
+    let [r, g, b, through] = sum;
+    let pixel = [r, g, b, 1.0 - through].map(|number| number.clamp(0.0, 1.0));
+    out.iter_mut().zip(pixel).for_each(|(to, from)| *to = from);
+}
+
+/// The largest difference of a pixel from exact light and transmittance.
+pub(super) fn off_light(exact: &[f64; 4], pixel: &[f32]) -> f64 {
+    let exact = [exact[0], exact[1], exact[2], 1.0 - exact[3]].map(|number| number.min(1.0));
+    let off = pixel.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs());
+    off.fold(0.0, f64::max)
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
@@ -101,6 +125,90 @@ fn add(row: &Row<'_>, entries: &[[f32; 8]; ENTRIES], groups: &mut [[[f32; 4]; GR
             add_part((&means, &lengths), entries, group, *limit)
         };
     }
+}
+
+/// The same as [`add`] with light on the colours (eq 42).
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn add_shaded(
+    row: &Row<'_>,
+    entries: &[[f32; 8]; ENTRIES],
+    shader: &Shader,
+    groups: &mut [[[f32; 4]; GROUP]],
+    limits: &mut [f32],
+) {
+    for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
+        if !row.live[n] {
+            continue;
+        }
+        let is_whole = row.is_whole(n);
+        let (means, lengths) = if is_whole { (row.sums(n), [1.0; GROUP]) } else { row.means(n) };
+        let Looked { lights, opacities, any } = look_up(&means, entries);
+        if any {
+            let lit = shader.shade(&row.gradient(n, (!is_whole).then_some(&means)));
+            let shares = if is_whole { [1.0; GROUP] } else { shares(&opacities, &lengths) };
+            *limit = put_lit_behind(group, &lights, (&opacities, &lit), &shares);
+        }
+    }
+}
+
+/// What the table has for sixteen values.
+struct Looked {
+    /// Red, green and blue times the opacity, and minus the opacity.
+    lights: [[f32; 4]; GROUP],
+    opacities: Sixteen,
+    /// Whether any is not transparent.
+    any: bool,
+}
+
+#[inline(always)]
+fn look_up(means: &Sixteen, entries: &[[f32; 8]; ENTRIES]) -> Looked {
+    let (places, rests) = places(means);
+    let (mut lights, mut opacities, mut sum) = ([[0.0; 4]; GROUP], [0.0; GROUP], [0.0; 4]);
+    for i in 0..GROUP {
+        let entry = &entries[places[i] as usize % ENTRIES];
+        for c in 0..4 {
+            lights[i][c] = entry[c] + rests[i] * entry[4 + c];
+            sum[c] += lights[i][c];
+        }
+        opacities[i] = -lights[i][3];
+    }
+    Looked { lights, opacities, any: sum[3] != 0.0 }
+}
+
+/// The same as [`put_behind`] with shaded colours and highlights (eq 42).
+#[inline(always)]
+fn put_lit_behind(
+    group: &mut [[f32; 4]; GROUP],
+    lights: &[[f32; 4]; GROUP],
+    (opacities, lit): (&Sixteen, &Lit),
+    shares: &Sixteen,
+) -> f32 {
+    /// Which of the four numbers are colours.
+    const COLOURS: [f32; 4] = [1.0, 1.0, 1.0, 0.0];
+    let mut sum = [0.0; 4];
+    for i in 0..GROUP {
+        let (through, more, gloss) = (group[i][3] * shares[i], lit.colour[i] - 1.0, lit.gloss[i] * opacities[i]);
+        for c in 0..4 {
+            let light = lights[i][c] + COLOURS[c] * (lights[i][c] * more + gloss);
+            group[i][c] += through * light;
+            sum[c] += group[i][c];
+        }
+    }
+    limit(group, sum[3])
+}
+
+/// Adds these shares of light behind a group of cells. Returns their limit.
+#[inline(always)]
+fn put_behind(group: &mut [[f32; 4]; GROUP], lights: &[[f32; 4]; GROUP], shares: &Sixteen) -> f32 {
+    let mut sum = [0.0; 4];
+    for i in 0..GROUP {
+        let through = group[i][3] * shares[i];
+        for c in 0..4 {
+            group[i][c] += through * lights[i][c];
+            sum[c] += group[i][c];
+        }
+    }
+    limit(group, sum[3])
 }
 
 /// For each number, the entry before it, and how far it is towards the next, from 0 to 1.
@@ -144,29 +252,8 @@ fn add_part(
     group: &mut [[f32; 4]; GROUP],
     before: f32,
 ) -> f32 {
-    let (places, rests) = places(means);
-    let (mut lights, mut opacities, mut sum) = ([[0.0; 4]; GROUP], [0.0; GROUP], [0.0; 4]);
-    for i in 0..GROUP {
-        let entry = &entries[places[i] as usize % ENTRIES];
-        for c in 0..4 {
-            lights[i][c] = entry[c] + rests[i] * entry[4 + c];
-            sum[c] += lights[i][c];
-        }
-        opacities[i] = -lights[i][3];
-    }
-    if sum[3] == 0.0 {
-        return before;
-    }
-    let shares = shares(&opacities, lengths);
-    sum = [0.0; 4];
-    for i in 0..GROUP {
-        let through = group[i][3] * shares[i];
-        for c in 0..4 {
-            group[i][c] += through * lights[i][c];
-            sum[c] += group[i][c];
-        }
-    }
-    limit(group, sum[3])
+    let Looked { lights, opacities, any } = look_up(means, entries);
+    if any { put_behind(group, &lights, &shares(&opacities, lengths)) } else { before }
 }
 
 /// The largest transmittance of a group; or, if some cell is open for sure, their sum.

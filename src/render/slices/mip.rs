@@ -3,7 +3,7 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::row::{Blend, Row};
+use super::row::{Blend, Point, Row};
 use super::units::Units;
 
 /// The maximum along the ray.
@@ -88,9 +88,9 @@ impl Blend for Largest {
         f64::NAN
     }
 
-    fn step(&self, largest: &mut f64, value: f64, density: f64, _: f64) {
-        if density >= f64::from(Self::LEAST) {
-            *largest = largest.max(value);
+    fn step(&self, largest: &mut f64, point: &Point, _: f64) {
+        if point.density >= f64::from(Self::LEAST) {
+            *largest = largest.max(point.value);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Composites and maximum intensity projections, slice by slice: the field of the kernels along the rays of a lattice.
+//! Composites, isosurfaces and maximum intensity projections, slice by slice: the field of the kernels along the rays of a lattice.
 //!
 //! The field at a point p is the mean of the samples, weighted by the kernel, which is a Gaussian; its density is the
 //! sum of the weights:
@@ -16,7 +16,8 @@
 //! light = sum over slices of (product of through before) (1 - through) colour(g)                          (eq 31)
 //! ```
 //!
-//! A maximum intensity projection takes the largest g of all slices.
+//! A maximum intensity projection takes the largest g of all slices. An isosurface is where g passes a value between two
+//! slices.
 //!
 //! The rays do not go through pixels. They go through the cells of the view's sheared lattice ([Lacroute](crate::bibliography), eq
 //! 35), where all voxels of a slice are at the same distances from the cells. So the kernel is three short filters, one
@@ -29,7 +30,7 @@
 //!     slice: sums along a         filter                           6 layers with the default kernel
 //!       phases: sums along b      filter                           whole rows
 //!         rows: sums along c      filter, row                      16 cells at a time
-//!           blend                 blend, mip, table                light and transmittance, or the largest
+//!           blend                 blend, iso, mip, table, shade    light and transmittance, or the largest
 //! cells to pixels                 finish                           4 x 4 cells
 //! ```
 //!
@@ -44,7 +45,9 @@ mod bricks;
 pub(super) mod layer;
 mod filter;
 pub(super) mod row;
+pub(super) mod shade;
 pub(super) mod blend;
+pub(super) mod iso;
 pub(super) mod mip;
 mod sweep;
 mod finish;

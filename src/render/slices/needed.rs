@@ -38,7 +38,7 @@ impl Known {
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
         let mut wide = ranges.clone();
         for (i, axis) in view.shear.axes.into_iter().enumerate() {
-            widen(&mut wide, blocks, axis, (2 * view.reach[i] - 1).div_ceil(blocks.edges[axis]));
+            widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin) - 1).div_ceil(blocks.edges[axis]));
         }
         Self { blocks, ranges, wide, has_values }
     }

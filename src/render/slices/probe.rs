@@ -6,7 +6,7 @@
 
 use super::LEAST;
 use super::layer::Layers;
-use super::row::Blend;
+use super::row::{Blend, Point};
 use super::taps::Taps;
 use super::units::Units;
 use super::view::SlicedView;
@@ -53,9 +53,13 @@ impl<B: Blend> Probe<B> {
         self.next = ready.end;
         for number in ready {
             for ray in &mut self.rays {
-                let (density, mean) = field(layers, &self.view.taps_at(number, ray.cell), self.view.count);
+                let taps = self.view.taps_at(number, ray.cell);
+                let (density, mean) = field(layers, &taps, self.view.count);
                 if density >= f64::from(LEAST) {
-                    blend.step(&mut ray.state, mean / units.per + units.zero, density, self.share);
+                    let gradient =
+                        if blend.is_shaded() { gradient(layers, &taps, self.view.count, mean) } else { [0.0; 3] };
+                    let value = mean / units.per + units.zero;
+                    blend.step(&mut ray.state, &Point { density, value, gradient }, self.share);
                 }
             }
         }
@@ -73,21 +77,37 @@ impl<B: Blend> Probe<B> {
 
 /// The density and the mean at a point, from the taps along b, c and a.
 fn field(layers: &Layers, [b, c, a]: &[Taps; 3], count: [usize; 3]) -> (f64, f64) {
-    let ((column, across), (row, down)) = (b.within(0, count[0]), c.within(0, count[1]));
-    let (slice, along) = a.within(0, count[2]);
-    if across.is_empty() || down.is_empty() || along.is_empty() {
-        return (0.0, 0.0);
+    let [present, sum] = sums(layers, [b, c, a].map(|taps| taps.along(false)), count);
+    if present > 0.0 { (present * b.density * c.density * a.density, sum / present) } else { (0.0, 0.0) }
+}
+
+/// The gradient along b, c and a, in units per voxel (eq 41).
+fn gradient(layers: &Layers, [b, c, a]: &[Taps; 3], count: [usize; 3], mean: f64) -> [f64; 3] {
+    let [present, _] = sums(layers, [b, c, a].map(|taps| taps.along(false)), count);
+    let along = |axis: usize| {
+        let [slope, sum] = sums(layers, [b.along(axis == 0), c.along(axis == 1), a.along(axis == 2)], count);
+        (sum - mean * slope) / present
+    };
+    [0, 1, 2].map(along)
+}
+
+/// The sum of the weights of present samples, and of these times the samples, with the given weights along b, c and a.
+fn sums(layers: &Layers, [b, c, a]: [(&Taps, &[f32]); 3], count: [usize; 3]) -> [f64; 2] {
+    let ((column, across), (row, down)) = (b.0.within(0, count[0]), c.0.within(0, count[1]));
+    let (slice, along) = a.0.within(0, count[2]);
+    let (mut present, mut sum) = (0.0, 0.0);
+    if across.is_empty() {
+        return [present, sum];
     }
-    let (mut weights, mut sum) = (0.0, 0.0);
-    for (slice, along) in (slice..).zip(&a.weights[along]) {
-        for (row, down) in (row..).zip(&c.weights[down.clone()]) {
+    for (slice, along) in (slice..).zip(&a.1[along]) {
+        for (row, down) in (row..).zip(&c.1[down.clone()]) {
             let values = &layers.layer(slice)[row * layers.stride + column..];
             let weight = f64::from(*along) * f64::from(*down);
-            for (value, across) in values.iter().zip(&b.weights[across.clone()]).filter(|(value, _)| !value.is_nan()) {
-                weights += weight * f64::from(*across);
+            for (value, across) in values.iter().zip(&b.1[across.clone()]).filter(|(value, _)| !value.is_nan()) {
+                present += weight * f64::from(*across);
                 sum += weight * f64::from(*across) * f64::from(*value);
             }
         }
     }
-    (weights * b.density * c.density * a.density, sum / weights)
+    [present, sum]
 }

@@ -4,18 +4,29 @@ use super::GROUP;
 use super::filter::{Sixteen, weighted_rows};
 use super::units::Units;
 
-/// One phase of a row of cells in a slice: sums of the kernel along a and b, to be summed along c.
-pub(in crate::render) struct Row<'a> {
-    /// Sums of values, from the first row of voxels on that the weights meet.
+/// Sums along a and b of a row of cells, from the first row of voxels on that the weights along c meet.
+#[derive(Clone, Copy)]
+pub(super) struct RowSums<'a> {
     pub(super) values: &'a [f32],
     /// Sums of the weights of present samples; `None` if none is missing.
     pub(super) present: Option<&'a [f32]>,
+}
+
+/// One phase of a row of cells in a slice: sums of the kernel along a and b, to be summed along c.
+pub(in crate::render) struct Row<'a> {
+    pub(super) sums: RowSums<'a>,
+    /// The derivatives of the sums along b and a; `None` unless a blend needs the gradient.
+    pub(super) slopes: Option<[RowSums<'a>; 2]>,
     pub(super) stride: usize,
-    /// Weights along c.
+    /// Weights along c, and their derivatives.
     pub(super) weights: &'a [f32],
+    pub(super) weight_slopes: &'a [f32],
     /// The sum of weights along a and c that meet the region, and along b for each cell.
     pub(super) share: f32,
     pub(super) shares: &'a [f32],
+    /// Their derivatives: of the sum along c and a, and along b for each cell.
+    pub(super) share_slopes: [f32; 2],
+    pub(super) shares_slopes: &'a [f32],
     /// The kernel's density without missing samples and edges.
     pub(super) density: f32,
     /// Where the density is less, there is nothing.
@@ -33,13 +44,16 @@ impl Row<'_> {
     /// Whether the means of a group are plain sums.
     #[inline(always)]
     pub(super) fn is_whole(&self, group: usize) -> bool {
-        self.present.is_none() && self.whole[group] && self.share > 1.0 - 1e-6 && (self.density - 1.0).abs() < WHOLE
+        self.sums.present.is_none()
+            && self.whole[group]
+            && self.share > 1.0 - 1e-6
+            && (self.density - 1.0).abs() < WHOLE
     }
 
     /// The sums of a group.
     #[inline(always)]
     pub(super) fn sums(&self, group: usize) -> Sixteen {
-        self.along_c(self.values, group)
+        self.along_c(self.sums.values, self.weights, group)
     }
 
     /// The means of a group, and the lengths of its rays as shares of the distance of two slices. A length is 0 where
@@ -47,13 +61,7 @@ impl Row<'_> {
     #[inline(always)]
     pub(super) fn means(&self, group: usize) -> (Sixteen, Sixteen) {
         let (mut means, mut lengths) = (self.sums(group), [0.0; GROUP]);
-        let present = match self.present {
-            Some(present) => self.along_c(present, group),
-            None => {
-                let shares = self.shares[group * GROUP..].first_chunk::<GROUP>();
-                shares.map_or([0.0; GROUP], |shares| shares.map(|share| share * self.share))
-            }
-        };
+        let present = self.presence(group);
         for i in 0..GROUP {
             let length = present[i] * self.density;
             let is_there = length >= self.least;
@@ -63,10 +71,81 @@ impl Row<'_> {
         (means, lengths)
     }
 
+    /// The sums of the weights of present samples.
     #[inline(always)]
-    fn along_c(&self, values: &[f32], group: usize) -> Sixteen {
-        weighted_rows(values, self.stride, self.weights, group * GROUP)
+    fn presence(&self, group: usize) -> Sixteen {
+        match self.sums.present {
+            Some(present) => self.along_c(present, self.weights, group),
+            None => {
+                let mut shares = sixteen_of(self.shares, group);
+                for share in &mut shares {
+                    *share *= self.share;
+                }
+                shares
+            }
+        }
     }
+
+    /// The gradient of the means of a group along b, c and a, per voxel (eq 41). `means` are `None` if the group is
+    /// whole.
+    #[inline(always)]
+    pub(super) fn gradient(&self, group: usize, means: Option<&Sixteen>) -> [Sixteen; 3] {
+        let Some([along_b, along_a]) = self.slopes else { return [[0.0; GROUP]; 3] };
+        let of = [(along_b, self.weights), (self.sums, self.weight_slopes), (along_a, self.weights)];
+        let mut gradient = [[0.0; GROUP]; 3];
+        // Loops instead of closures, which would not be compiled for the vector units.
+        for (component, (sums, weights)) in gradient.iter_mut().zip(of) {
+            *component = self.along_c(sums.values, weights, group);
+        }
+        if let Some(means) = means {
+            let (present, slopes) = (self.presence(group), self.presence_slopes(of, group));
+            for (component, slopes) in gradient.iter_mut().zip(&slopes) {
+                for i in 0..GROUP {
+                    component[i] = (component[i] - means[i] * slopes[i]) / present[i].max(f32::MIN_POSITIVE);
+                }
+            }
+        }
+        gradient
+    }
+
+    /// The derivatives of [`Self::presence`] along b, c and a.
+    #[inline(always)]
+    fn presence_slopes(&self, of: [(RowSums<'_>, &[f32]); 3], group: usize) -> [Sixteen; 3] {
+        let mut slopes = [[0.0; GROUP]; 3];
+        if self.sums.present.is_some() {
+            for (slopes, (sums, weights)) in slopes.iter_mut().zip(of) {
+                *slopes = self.along_c(sums.present.unwrap_or_default(), weights, group);
+            }
+            return slopes;
+        }
+        let (shares, [along_c, along_a]) = (sixteen_of(self.shares, group), self.share_slopes);
+        let along_b = sixteen_of(self.shares_slopes, group);
+        for i in 0..GROUP {
+            slopes[0][i] = along_b[i] * self.share;
+            slopes[1][i] = shares[i] * along_c;
+            slopes[2][i] = shares[i] * along_a;
+        }
+        slopes
+    }
+
+    #[inline(always)]
+    fn along_c(&self, values: &[f32], weights: &[f32], group: usize) -> Sixteen {
+        weighted_rows(values, self.stride, weights, group * GROUP)
+    }
+}
+
+/// The numbers of a group of cells.
+#[inline(always)]
+fn sixteen_of(numbers: &[f32], group: usize) -> Sixteen {
+    numbers[group * GROUP..].first_chunk::<GROUP>().copied().unwrap_or([0.0; GROUP])
+}
+
+/// The field at a point.
+pub(in crate::render) struct Point {
+    pub(super) density: f64,
+    pub(super) value: f64,
+    /// The change of the value per voxel along b, c and a; zero unless the blend is shaded.
+    pub(super) gradient: [f64; 3],
 }
 
 /// A way to combine the slices along the rays of cells.
@@ -90,6 +169,11 @@ pub(in crate::render) trait Blend: Sync {
 
     /// The units of values. `middle` is a value near those of the frame.
     fn units(&self, middle: f64) -> Units;
+
+    /// Whether the gradient of the field is needed.
+    fn is_shaded(&self) -> bool {
+        false
+    }
 
     /// Whether any value in this range is visible.
     fn shows(&self, range: (f32, f32)) -> bool;
@@ -115,8 +199,8 @@ pub(in crate::render) trait Blend: Sync {
     /// An exact ray before its first step.
     fn exact(&self) -> Self::Exact;
 
-    /// Adds a value behind the earlier ones: its density, over a share of the distance of two slices.
-    fn step(&self, ray: &mut Self::Exact, value: f64, density: f64, share: f64);
+    /// Adds a point of the field behind the earlier ones, for a share of the distance of two slices.
+    fn step(&self, ray: &mut Self::Exact, point: &Point, share: f64);
 
     /// The difference of a pixel from an exact ray; `None` if one of them has no value.
     fn off(ray: &Self::Exact, pixel: &[f32]) -> Option<f64>;

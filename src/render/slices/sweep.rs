@@ -3,7 +3,8 @@
 use super::bricks::Ranges;
 use super::filter::{Strip, mix, mix_present};
 use super::layer::Layers;
-use super::row::{Blend, Row};
+use super::row::{Blend, Row, RowSums};
+use super::taps::Taps;
 use super::view::{Slice, SlicedView};
 use super::{BRICK_ROWS, GROUP, LEAST};
 use std::ops::Range;
@@ -38,22 +39,29 @@ impl Sums {
     }
 }
 
-/// The sums of the slice in work.
+/// The sums of the slice in work. The derivatives are those that the gradient needs, if the blend is shaded.
 pub(super) struct Work {
     /// Zeros before and behind each row of sums along a.
     rim: usize,
-    along_a: Sums,
-    /// Sums along a and b, for each phase along b.
-    along_b: Vec<Sums>,
+    /// Sums along a, and their derivatives along a.
+    along_a: Vec<Sums>,
+    /// Sums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
+    along_b: Vec<Vec<Sums>>,
 }
 
 impl Work {
     /// For a band of `rows` rows.
-    pub(super) fn new(view: &SlicedView, rows: usize) -> Self {
+    pub(super) fn new(view: &SlicedView, rows: usize, is_shaded: bool) -> Self {
         let (rim, rows) = (2 * view.reach[0] + GROUP, Self::rows(view, rows));
-        let along_a = Sums::of(rows * Self::width(view, rim));
-        let along_b = (0..view.cells).map(|_| Sums::of(rows * view.extent[0])).collect();
-        Self { rim, along_a, along_b }
+        let [of_a, of_b] = Self::kinds(is_shaded);
+        let along_a = (0..of_a).map(|_| Sums::of(rows * Self::width(view, rim))).collect();
+        let phase = |_| (0..of_b).map(|_| Sums::of(rows * view.extent[0])).collect();
+        Self { rim, along_a, along_b: (0..view.cells).map(phase).collect() }
+    }
+
+    /// The kinds of sums along a, and along a and b.
+    fn kinds(is_shaded: bool) -> [usize; 2] {
+        if is_shaded { [2, 3] } else { [1, 1] }
     }
 
     /// The most rows of voxels, in whole bricks, that a band of `rows` rows needs.
@@ -66,8 +74,9 @@ impl Work {
     }
 
     /// Bytes, if samples are missing.
-    pub(super) fn bytes(view: &SlicedView, rows: usize) -> usize {
-        let row = Self::width(view, 2 * view.reach[0] + GROUP) + view.cells * view.extent[0];
+    pub(super) fn bytes(view: &SlicedView, rows: usize, is_shaded: bool) -> usize {
+        let [of_a, of_b] = Self::kinds(is_shaded);
+        let row = of_a * Self::width(view, 2 * view.reach[0] + GROUP) + of_b * view.cells * view.extent[0];
         2 * size_of::<f32>() * Self::rows(view, rows) * row
     }
 }
@@ -78,8 +87,10 @@ struct Part<'a> {
     /// The layers that the kernel meets, with their weights.
     layers: Vec<&'a [f32]>,
     weights: &'a [f32],
-    /// The sum of these weights.
+    slopes: &'a [f32],
+    /// The sum of these weights, and its derivative.
     share: f32,
+    share_slope: f32,
     has_missing: bool,
     /// The rows of bricks that the band needs. Sums begin with the first of them.
     bricks: Range<usize>,
@@ -110,10 +121,10 @@ impl<B: Blend> Band<'_, B> {
         let view = self.view;
         let (first, met) = slice.along.within(0, view.count[2]);
         let numbers = first..first + met.len();
+        let near = first.saturating_sub(view.margin)..(first + met.len() + view.margin).min(view.count[2]);
         let columns = layers.stride / GROUP;
-        let ranges =
-            Ranges::joint(numbers.clone().map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
-        let wide = ranges.dilated((2 * view.reach[1]).div_ceil(BRICK_ROWS));
+        let ranges = Ranges::joint(near.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
+        let wide = ranges.dilated((2 * (view.reach[1] + view.margin)).div_ceil(BRICK_ROWS));
         let firsts = slice.across[1].iter().map(|taps| taps.first);
         let (least, most) = (firsts.clone().min().unwrap_or(0), firsts.max().unwrap_or(0));
         let rows = [least + self.rows.start as i64, most + (self.rows.end + 2 * view.reach[1]) as i64];
@@ -121,8 +132,10 @@ impl<B: Blend> Band<'_, B> {
         Part {
             slice,
             layers: numbers.clone().map(|layer| layers.layer(layer)).collect(),
-            weights: &slice.along.weights[met],
+            weights: &slice.along.weights[met.clone()],
+            slopes: &slice.along.slopes[met],
             share: slice.along.presence(0, view.count[2]),
+            share_slope: slice.along.presence_slope(0, view.count[2]),
             has_missing: numbers.into_iter().any(|layer| layers.is_missing(layer)),
             bricks: rows[0] / BRICK_ROWS..rows[1].div_ceil(BRICK_ROWS),
             ranges,
@@ -135,9 +148,8 @@ impl<B: Blend> Band<'_, B> {
         let (view, rim) = (self.view, self.work.rim);
         let (columns, stride) = (part.ranges.columns, Work::width(view, rim));
         let reach = (GROUP + 2 * view.reach[0]) / GROUP + 1;
-        let sums = &mut self.work.along_a;
         if part.has_missing {
-            sums.with_present();
+            self.work.along_a.iter_mut().for_each(Sums::with_present);
         }
         for row in part.bricks.clone() {
             for column in 0..columns {
@@ -148,12 +160,14 @@ impl<B: Blend> Band<'_, B> {
                 let (first, rows) = rows_of(row, layers.rows);
                 let from = Strip { at: first * layers.stride + column * GROUP, stride: layers.stride };
                 let to = Strip { at: (first - part.start()) * stride + rim + column * GROUP, stride };
-                if part.has_missing {
-                    let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
-                    let out = (to, sums.values.as_mut_slice(), sums.present.as_mut_slice());
-                    mix_present(&part.layers, part.weights, (from, &mask), rows, out);
-                } else {
-                    mix(&part.layers, part.weights, from, rows, (to, &mut sums.values));
+                for (sums, weights) in self.work.along_a.iter_mut().zip([part.weights, part.slopes]) {
+                    if part.has_missing {
+                        let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
+                        let out = (to, sums.values.as_mut_slice(), sums.present.as_mut_slice());
+                        mix_present(&part.layers, weights, (from, &mask), rows, out);
+                    } else {
+                        mix(&part.layers, weights, from, rows, (to, &mut sums.values));
+                    }
                 }
             }
         }
@@ -166,10 +180,13 @@ impl<B: Blend> Band<'_, B> {
         let (from, to) = (Work::width(view, rim), view.extent[0]);
         let sums = &mut self.work.along_b[phase];
         if part.has_missing {
-            sums.with_present();
+            sums.iter_mut().for_each(Sums::with_present);
         }
+        // Plain sums, and the derivatives along b and along a.
+        let kinds = [(0, &taps.weights), (0, &taps.slopes), (1, &taps.weights)];
         let shifted = |sums| shifted(sums, taps.weights.len());
-        let (values, present) = (shifted(&self.work.along_a.values), shifted(&self.work.along_a.present));
+        let sources: Vec<[Vec<&[f32]>; 2]> =
+            self.work.along_a.iter().map(|sums| [shifted(&sums.values), shifted(&sums.present)]).collect();
         for group in 0..view.extent[0] / GROUP {
             let columns = columns_of(view, taps.first, group);
             let at = rim as i64 + taps.first + (group * GROUP) as i64;
@@ -181,9 +198,12 @@ impl<B: Blend> Band<'_, B> {
                 let first = first - part.start();
                 let strip = Strip { at: first * from + at as usize, stride: from };
                 let out = Strip { at: first * to + group * GROUP, stride: to };
-                mix(&values, &taps.weights, strip, rows, (out, &mut sums.values));
-                if part.has_missing {
-                    mix(&present, &taps.weights, strip, rows, (out, &mut sums.present));
+                for (sums, (source, weights)) in sums.iter_mut().zip(kinds) {
+                    let [values, present] = &sources[source];
+                    mix(values, weights, strip, rows, (out, &mut sums.values));
+                    if part.has_missing {
+                        mix(present, weights, strip, rows, (out, &mut sums.present));
+                    }
                 }
             }
         }
@@ -193,52 +213,118 @@ impl<B: Blend> Band<'_, B> {
     fn along_c(&mut self, part: &Part<'_>) {
         let view = self.view;
         let count = view.extent[0] / GROUP;
-        let shares: Vec<Vec<f32>> = part.slice.across[0].iter().map(|taps| shares_of(view, taps)).collect();
-        let is_whole = |group: &[f32]| group.iter().all(|share| *share == 1.0);
-        let whole: Vec<Vec<bool>> =
-            shares.iter().map(|shares| shares.chunks_exact(GROUP).map(is_whole).collect()).collect();
+        let phases: Vec<Across> = part.slice.across[0].iter().map(|taps| Across::new(view, taps)).collect();
         let mut visible = vec![Visible::default(); view.cells];
         let mut live = vec![false; count];
         for row in self.rows.clone() {
             for (down, taps) in part.slice.across[1].iter().enumerate() {
-                let (first, met) = taps.within(row as i64, view.count[1]);
-                if met.is_empty() {
-                    continue;
-                }
-                let bricks = first / BRICK_ROWS..(first + met.len() - 1) / BRICK_ROWS + 1;
-                visible[down].update(part, bricks, |range| self.blend.shows(range), view);
-                let share = part.share * taps.presence(row as i64, view.count[1]);
-                for (phase, across) in part.slice.across[0].iter().enumerate() {
-                    let density = part.slice.along.density * taps.density * across.density;
-                    if share * (density as f32) < LEAST {
+                let Some(meets) = Down::new(view, part, row, taps) else { continue };
+                visible[down].update(part, meets.bricks(view), |range| self.blend.shows(range), view);
+                for (phase, across) in phases.iter().enumerate() {
+                    if meets.least_density(across) < LEAST {
                         continue;
                     }
                     let at = (((row - self.rows.start) * view.cells + down) * view.cells + phase) * count;
                     let (groups, limits) = (&mut self.groups[at..at + count], &mut self.limits[at..at + count]);
-                    if !visible[down].live::<B>(phase, limits, &mut live) {
-                        continue;
+                    if visible[down].live::<B>(phase, limits, &mut live) {
+                        let sums = &self.work.along_b[phase];
+                        let row = Row { least: B::LEAST, ..meets.row((view, part), sums, (across, &live)) };
+                        self.blend.add(&row, groups, limits);
                     }
-                    let sums = &self.work.along_b[phase];
-                    let from = (first - part.start()) * view.extent[0];
-                    self.blend.add(
-                        &Row {
-                            values: &sums.values[from..],
-                            present: part.has_missing.then(|| &sums.present[from..]),
-                            stride: view.extent[0],
-                            weights: &taps.weights[met.clone()],
-                            share,
-                            shares: &shares[phase],
-                            density: density as f32,
-                            least: B::LEAST,
-                            live: &live,
-                            whole: &whole[phase],
-                            slice: part.slice.number,
-                        },
-                        groups,
-                        limits,
-                    );
                 }
             }
+        }
+    }
+}
+
+/// The weights along b of one phase, for all cells of a row.
+struct Across {
+    density: f64,
+    /// The sums of weights that meet the region, and their derivatives.
+    shares: Vec<f32>,
+    slopes: Vec<f32>,
+    /// For each group, whether all weights of all its cells meet the region.
+    whole: Vec<bool>,
+}
+
+impl Across {
+    fn new(view: &SlicedView, taps: &Taps) -> Self {
+        let cells = || 0..view.extent[0] as i64;
+        let shares: Vec<f32> = cells().map(|cell| taps.presence(cell, view.count[0])).collect();
+        let slopes = cells().map(|cell| taps.presence_slope(cell, view.count[0])).collect();
+        let whole = shares.chunks_exact(GROUP).map(|group| group.iter().all(|share| *share == 1.0)).collect();
+        Self { density: taps.density, shares, slopes, whole }
+    }
+}
+
+/// The weights along c of a row of cells, and what they make of those along a.
+struct Down<'a> {
+    /// The first row of voxels that the weights meet.
+    first: usize,
+    weights: &'a [f32],
+    slopes: &'a [f32],
+    density: f64,
+    /// The sum of weights along a and c that meet the region, and its derivatives along c and a.
+    share: f32,
+    share_slopes: [f32; 2],
+}
+
+impl<'a> Down<'a> {
+    /// `None` if no weight meets the region.
+    fn new(view: &SlicedView, part: &Part<'_>, row: usize, taps: &'a Taps) -> Option<Self> {
+        let (first, met) = taps.within(row as i64, view.count[1]);
+        if met.is_empty() {
+            return None;
+        }
+        let (of_row, slope) =
+            (taps.presence(row as i64, view.count[1]), taps.presence_slope(row as i64, view.count[1]));
+        Some(Self {
+            first,
+            weights: &taps.weights[met.clone()],
+            slopes: &taps.slopes[met],
+            density: part.slice.along.density * taps.density,
+            share: part.share * of_row,
+            share_slopes: [part.share * slope, part.share_slope * of_row],
+        })
+    }
+
+    /// The rows of bricks that decide what is visible.
+    fn bricks(&self, view: &SlicedView) -> Range<usize> {
+        let last = (self.first + self.weights.len() - 1 + view.margin).min(view.count[1] - 1);
+        self.first.saturating_sub(view.margin) / BRICK_ROWS..last / BRICK_ROWS + 1
+    }
+
+    /// No cell has more density where samples are missing along a and c.
+    fn least_density(&self, across: &Across) -> f32 {
+        self.share * (self.density * across.density) as f32
+    }
+
+    fn row<'r>(
+        &'r self,
+        (view, part): (&SlicedView, &Part<'_>),
+        sums: &'r [Sums],
+        (across, live): (&'r Across, &'r [bool]),
+    ) -> Row<'r> {
+        let from = (self.first - part.start()) * view.extent[0];
+        let of = |sums: &'r Sums| RowSums {
+            values: &sums.values[from..],
+            present: part.has_missing.then(|| &sums.present[from..]),
+        };
+        Row {
+            sums: of(&sums[0]),
+            slopes: sums.get(1..3).map(|slopes| [of(&slopes[0]), of(&slopes[1])]),
+            stride: view.extent[0],
+            weights: self.weights,
+            weight_slopes: self.slopes,
+            share: self.share,
+            shares: &across.shares,
+            share_slopes: self.share_slopes,
+            shares_slopes: &across.slopes,
+            density: (self.density * across.density) as f32,
+            least: LEAST,
+            live,
+            whole: &across.whole,
+            slice: part.slice.number,
         }
     }
 }
@@ -284,14 +370,10 @@ fn rows_of(brick: usize, rows: usize) -> (usize, usize) {
 /// The columns of bricks that the cells of a group need, if the taps of the lattice's first cell start at `first`.
 fn columns_of(view: &SlicedView, first: i64, group: usize) -> Range<usize> {
     let from = first + (group * GROUP) as i64;
-    let ends = [from, from + (GROUP + 2 * view.reach[0] - 1) as i64];
+    let margin = view.margin as i64;
+    let ends = [from - margin, from + (GROUP + 2 * view.reach[0] - 1) as i64 + margin];
     let [from, to] = ends.map(|column| column.clamp(0, view.count[0] as i64) as usize);
     if from < to { from / GROUP..to.div_ceil(GROUP) } else { 0..0 }
-}
-
-/// For each cell of a row, the sum of weights along b that meet the region.
-fn shares_of(view: &SlicedView, taps: &super::taps::Taps) -> Vec<f32> {
-    (0..view.extent[0]).map(|cell| taps.presence(cell as i64, view.count[0])).collect()
 }
 
 /// The same numbers from the first, the second and so on.

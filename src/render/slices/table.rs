@@ -110,6 +110,12 @@ impl Table {
         Self { transfer: transfer.clone(), length, units, entries, visible }
     }
 
+    /// A gradient, in these units per world unit, whose direction means little: a hundredth of the range within eight
+    /// voxels.
+    pub(in crate::render) fn faint(&self, spacing: f64) -> f64 {
+        0.01 * LAST as f64 / (8.0 * spacing)
+    }
+
     /// The light and minus the opacity of a number of these units.
     pub(super) fn at(&self, number: f32) -> [f32; 4] {
         let at = number.clamp(0.0, LAST as f32);

@@ -20,6 +20,8 @@ pub(super) struct Taps {
     pub(super) first: i64,
     /// Weights of sum 1.
     pub(super) weights: Vec<f32>,
+    /// The derivatives of the weights by the position.
+    pub(super) slopes: Vec<f32>,
     /// The sum of the kernel at all voxels; about 1 unless the kernel is narrow.
     pub(super) density: f64,
 }
@@ -35,9 +37,13 @@ impl Taps {
         let shares: Vec<f64> = (1 - reach..=reach).map(share).collect();
         let sum: f64 = shares.iter().sum();
         let cut: f64 = (reach..3 * reach).map(|n| share(n + 1) + share(-n)).sum();
-        let weights = shares.iter().map(|share| (share / sum) as f32).collect();
+        let weights: Vec<f64> = shares.iter().map(|share| share / sum).collect();
+        let pull = |n: i64| (n as f64 - (position - below)) / (sigma * sigma);
+        let mean: f64 = (1 - reach..=reach).zip(&weights).map(|(n, weight)| weight * pull(n)).sum();
+        let slopes = (1 - reach..=reach).zip(&weights).map(|(n, weight)| (weight * (pull(n) - mean)) as f32).collect();
         let peak = libm::exp(-nearest * decay) / ((2.0 * std::f64::consts::PI).sqrt() * sigma);
-        Self { first: below as i64 + 1 - reach, weights, density: (sum + cut) * peak }
+        let weights = weights.into_iter().map(|weight| weight as f32).collect();
+        Self { first: below as i64 + 1 - reach, weights, slopes, density: (sum + cut) * peak }
     }
 
     /// The weights that meet the voxels from 0 to `count`, for a kernel moved by `by` voxels: the first such voxel, and
@@ -49,10 +55,21 @@ impl Taps {
         ((first + skipped).max(0) as usize, skipped as usize..end as usize)
     }
 
+    /// These taps with their weights, or with the derivatives of these.
+    pub(super) fn along(&self, derived: bool) -> (&Self, &[f32]) {
+        (self, if derived { &self.slopes } else { &self.weights })
+    }
+
     /// The sum of the weights that meet the voxels from 0 to `count`, for a kernel moved by `by` voxels.
     pub(super) fn presence(&self, by: i64, count: usize) -> f32 {
         let (_, met) = self.within(by, count);
         if met.len() == self.weights.len() { 1.0 } else { self.weights[met].iter().sum() }
+    }
+
+    /// The derivative of [`Self::presence`] by the position.
+    pub(super) fn presence_slope(&self, by: i64, count: usize) -> f32 {
+        let (_, met) = self.within(by, count);
+        if met.len() == self.weights.len() { 0.0 } else { self.slopes[met].iter().sum() }
     }
 }
 
@@ -80,6 +97,25 @@ mod tests {
                     let expected = gauss((taps.first + i as i64) as f64) / all;
                     assert!((f64::from(*weight) - expected).abs() < 2e-4, "{sigma} {position} {i}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_weights() {
+        const STEP: f64 = 1e-4;
+        for sigma in [0.3, 0.75, 2.0] {
+            for position in [3.01, 3.25, 3.5, 3.9] {
+                let taps = Taps::new(position, sigma);
+                let [before, after] = [position - STEP, position + STEP].map(|at| Taps::new(at, sigma).weights);
+                for (slope, (a, b)) in taps.slopes.iter().zip(before.iter().zip(after)) {
+                    let expected = (f64::from(b) - f64::from(*a)) / (2.0 * STEP);
+                    assert!((f64::from(*slope) - expected).abs() < 2e-3, "{sigma} {position}: {slope} {expected}");
+                }
+                let sum: f32 = taps.slopes.iter().sum();
+                assert!(
+                    sum.abs() < 1e-6 && taps.presence_slope(50, 1000) == 0.0 && taps.presence_slope(-3, 1000) > 0.0
+                );
             }
         }
     }

@@ -33,6 +33,8 @@ pub(in crate::render) struct SlicedView {
     start: [usize; 3],
     /// Whether the ray meets the last voxels along a first.
     reversed: bool,
+    /// World units between voxels along b, c and a.
+    spacing: [f64; 3],
     /// Standard deviation of the kernel along b, c and a, in voxels.
     sigma: [f64; 3],
     /// Voxels that the kernel reaches to either side, along b, c and a.
@@ -41,6 +43,8 @@ pub(in crate::render) struct SlicedView {
     pub(in crate::render) cells: usize,
     /// Slices per voxel along a.
     fineness: usize,
+    /// Voxels beyond the kernel that decide whether a cell is visible: what is between two slices shows in both.
+    pub(super) margin: usize,
     /// The lattice's first cell, in whole voxels.
     corner: [i64; 2],
     /// Width and height of the lattice in voxels; the width is a multiple of [`GROUP`].
@@ -63,7 +67,7 @@ impl Slice {
     /// Bytes of its weights.
     pub(super) fn bytes(view: &SlicedView) -> usize {
         let across = 2 * view.cells * (view.reach[0].max(view.reach[1]));
-        size_of::<Self>() + (across + view.reach[2]) * 2 * size_of::<f32>() + 2 * view.cells * size_of::<Taps>()
+        size_of::<Self>() + (across + view.reach[2]) * 4 * size_of::<f32>() + 2 * view.cells * size_of::<Taps>()
     }
 }
 
@@ -102,8 +106,7 @@ impl SlicedView {
             return Err(Error::setting("slices", format!("takes 1 to {MOST} per voxel, not {wrong}")));
         }
         let pixels = shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
-        let across = if pixels < FEW_PIXELS { 1 } else { per_voxel(FINE * sigma[0].min(sigma[1])) };
-        let cells = config.mode.slices().unwrap_or(across);
+        let cells = config.mode.slices().unwrap_or_else(|| default_cells(&config.mode, &sigma, pixels));
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
         let fineness = config.mode.slices().unwrap_or_else(|| default_slices(&config.mode, sigma[2], (voxel, grid)));
@@ -115,10 +118,12 @@ impl SlicedView {
             count,
             start,
             reversed: deeper < 0.0,
+            spacing: shear.axes.map(|axis| grid.spacing[axis]),
             sigma,
             reach: sigma.map(reach),
             cells,
             fineness,
+            margin: usize::from(config.mode.is_of_surfaces()),
             corner: [0; 2],
             extent: [0; 2],
             step,
@@ -182,7 +187,8 @@ impl SlicedView {
 
     /// The slices that need no voxel from `met` on, of all from `first` on: a range of numbers.
     pub(super) fn ready(&self, first: usize, met: usize) -> Range<usize> {
-        let needs = |number: &usize| self.position(*number).floor() as i64 + self.reach[2] as i64;
+        let beyond = (self.reach[2] + self.margin) as i64;
+        let needs = |number: &usize| self.position(*number).floor() as i64 + beyond;
         let all = self.slices();
         if met >= self.count[2] {
             return first..all;
@@ -192,7 +198,8 @@ impl SlicedView {
 
     /// The first voxel along a, counted along the ray, that slices from `number` on need.
     pub(super) fn first_needed(&self, number: usize) -> usize {
-        (self.position(number).floor() as i64 + 1 - self.reach[2] as i64).clamp(0, self.count[2] as i64) as usize
+        let beyond = (self.reach[2] + self.margin) as i64;
+        (self.position(number).floor() as i64 + 1 - beyond).clamp(0, self.count[2] as i64) as usize
     }
 
     /// A slice; `None` if the ray is too short in all of it.
@@ -223,6 +230,13 @@ impl SlicedView {
         [b, c, Taps::new(self.position(number), self.sigma[2])]
     }
 
+    /// The change per world unit of a value that changes by 1 per voxel along b, c and a. Voxels along a are counted
+    /// along the ray.
+    pub(super) fn per_world_unit(&self) -> [f64; 3] {
+        let [b, c, a] = self.spacing.map(|spacing| 1.0 / spacing);
+        [b, c, if self.reversed { -a } else { a }]
+    }
+
     /// The same view with a number of slices per voxel, and how many slices of this view make one of those.
     pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
         (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)
@@ -249,6 +263,13 @@ impl SlicedView {
         let [columns, rows] = [within(0, self.extent[0]), within(1, self.extent[1])];
         [columns.start / GROUP..columns.end.div_ceil(GROUP), rows]
     }
+}
+
+/// The default number of cells per voxel across the ray. Surfaces have sharp edges, so their cells are no larger than
+/// pixels.
+fn default_cells(mode: &Mode, sigma: &[f64; 3], pixels: f64) -> usize {
+    let smooth = if pixels < FEW_PIXELS { 1 } else { per_voxel(FINE * sigma[0].min(sigma[1])) };
+    if mode.is_of_surfaces() { smooth.max(per_voxel(1.0 / pixels)) } else { smooth }
 }
 
 /// The default number of slices per voxel for a kernel of `sigma` voxels. `voxel` is the length of a ray along which it

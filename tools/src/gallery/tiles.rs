@@ -103,7 +103,7 @@ impl SampleStyle {
         let transfer = transfer.with_opacity(&points.0).map_err(Error::usage)?;
         let unit = share * self.thickness;
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
-        let mode = Mode::Composite { transfer, unit: Some(unit), slices: None };
+        let mode = Mode::Composite { transfer, unit: Some(unit), slices: None, light: None };
         let map = TransferFunction::open(name)?;
         Ok(Tile { label: options, mode, map, norm: Norm::Linear })
     }

@@ -1,0 +1,178 @@
+//! Isosurfaces: where the field passes a value between two slices. The light of each such point is that of its gradient,
+//! and goes behind the surfaces in front of it.
+
+use super::GROUP;
+use super::blend::{off_light, pixel_of_light};
+use super::filter::Sixteen;
+use super::row::{Blend, Point, Row};
+use super::shade::Shader;
+use super::units::Units;
+use crate::render::light::Surface;
+
+/// Surfaces of several values.
+pub(in crate::render) struct Isosurfaces {
+    /// In the order of their values.
+    surfaces: Vec<Surface>,
+    /// Their values in units.
+    values: Vec<f32>,
+    shader: Shader,
+    units: Units,
+}
+
+/// Sixteen cells.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Front {
+    /// Red, green and blue of the light, and the transmittance.
+    light: [[f32; 4]; GROUP],
+    last: Slope,
+    /// The number of the last slice.
+    slice: u32,
+}
+
+/// The field at sixteen cells of a slice; NaN where there is none.
+#[derive(Debug, Clone, Copy)]
+struct Slope {
+    values: Sixteen,
+    gradient: [Sixteen; 3],
+}
+
+const NOTHING: Slope = Slope { values: [f32::NAN; GROUP], gradient: [[0.0; GROUP]; 3] };
+
+/// Rays with less transmittance are opaque.
+const CLOSED: f32 = 1.0 / 8192.0;
+
+impl Isosurfaces {
+    pub(in crate::render) fn new(surfaces: &[Surface], shader: Shader) -> Self {
+        let mut surfaces = surfaces.to_vec();
+        surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let most = surfaces.iter().map(|surface| surface.value.abs()).fold(0.0, f64::max);
+        let zero = surfaces[0].value;
+        let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
+        let values = surfaces.iter().map(|surface| units.of(surface.value)).collect();
+        Self { surfaces, values, shader, units }
+    }
+
+    /// Adds the surfaces between two points of a ray behind those in front of them. `cross` gives the gradient at a share
+    /// of the way.
+    fn pass(&self, light: &mut [f32; 4], [from, to]: [f32; 2], gradient_at: impl Fn(f32) -> [f64; 3]) {
+        let (below, above) = (from.min(to), from.max(to));
+        let passed = |n: &usize| below < self.values[*n] && self.values[*n] <= above;
+        let mut add = |n: usize| {
+            let surface = &self.surfaces[n];
+            let [colour, gloss] = self.shader.shade_one(gradient_at((self.values[n] - from) / (to - from)));
+            let through = light[3] * surface.opacity as f32;
+            for (sum, c) in light.iter_mut().zip(surface.colour) {
+                *sum += through * (c * colour + gloss).min(1.0) as f32;
+            }
+            light[3] -= through;
+        };
+        let all = 0..self.values.len();
+        if from < to { all.filter(passed).for_each(&mut add) } else { all.rev().filter(passed).for_each(&mut add) }
+    }
+
+    /// Whether any surface lies between two values.
+    #[inline(always)]
+    fn any_between(&self, from: &Sixteen, to: &Sixteen) -> bool {
+        let crossed = |value: &f32| (0..GROUP).any(|i| (from[i] < *value) != (to[i] < *value));
+        self.values.iter().any(crossed)
+    }
+}
+
+impl Blend for Isosurfaces {
+    type Group = Front;
+    type Cell = [f32; 4];
+
+    const EMPTY: Front = Front { light: [Self::NOTHING; GROUP], last: NOTHING, slice: u32::MAX - 1 };
+    const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+    /// The limit is the largest transmittance of a group.
+    const OPEN: f32 = 1.0;
+    const LEAST: f32 = 0.01;
+    const CENTRED: bool = false;
+    const NUMBERS: usize = 4;
+
+    fn units(&self, _: f64) -> Units {
+        self.units
+    }
+
+    fn is_shaded(&self) -> bool {
+        true
+    }
+
+    fn shows(&self, (lo, hi): (f32, f32)) -> bool {
+        self.values.iter().any(|value| lo <= *value && *value <= hi)
+    }
+
+    fn hides(limit: f32, _: (f32, f32)) -> bool {
+        Self::is_closed(limit)
+    }
+
+    fn is_closed(limit: f32) -> bool {
+        limit < CLOSED
+    }
+
+    fn add(&self, row: &Row<'_>, groups: &mut [Front], limits: &mut [f32]) {
+        for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate().filter(|(n, _)| row.live[*n]) {
+            let next = slope(row, n);
+            let follows = group.slice.wrapping_add(1) == row.slice;
+            if follows && self.any_between(&group.last.values, &next.values) {
+                for i in 0..GROUP {
+                    let (from, to) = (&group.last, &next);
+                    let mix = |share: f32| {
+                        [0, 1, 2].map(|axis| {
+                            let (a, b) = (from.gradient[axis][i], to.gradient[axis][i]);
+                            f64::from(a + share * (b - a))
+                        })
+                    };
+                    self.pass(&mut group.light[i], [from.values[i], to.values[i]], mix);
+                }
+                *limit = group.light.iter().map(|cell| cell[3]).fold(0.0, f32::max);
+            }
+            (group.last, group.slice) = (next, row.slice);
+        }
+    }
+
+    fn cells(group: &Front) -> [[f32; 4]; GROUP] {
+        group.light
+    }
+
+    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]) {
+        pixel_of_light(cells, weights, out);
+    }
+
+    fn background(out: &mut [f32]) {
+        out.fill(0.0);
+    }
+
+    /// The light, and the value and the gradient of the last point.
+    type Exact = ([f32; 4], Option<(f32, [f64; 3])>);
+
+    fn exact(&self) -> Self::Exact {
+        (Self::NOTHING, None)
+    }
+
+    fn step(&self, (light, last): &mut Self::Exact, point: &Point, _: f64) {
+        let to = self.units.of(point.value);
+        if let Some((from, gradient)) = *last {
+            let mix = |share: f32| {
+                std::array::from_fn(|i| gradient[i] + f64::from(share) * (point.gradient[i] - gradient[i]))
+            };
+            self.pass(light, [from, to], mix);
+        }
+        *last = Some((to, point.gradient));
+    }
+
+    fn off((light, last): &Self::Exact, pixel: &[f32]) -> Option<f64> {
+        last.map(|_| off_light(&light.map(f64::from), pixel))
+    }
+}
+
+/// The field at a group of cells.
+#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+fn slope(row: &Row<'_>, group: usize) -> Slope {
+    if row.is_whole(group) {
+        return Slope { values: row.sums(group), gradient: row.gradient(group, None) };
+    }
+    let (means, lengths) = row.means(group);
+    let values = std::array::from_fn(|i| if lengths[i] > 0.0 { means[i] } else { f32::NAN });
+    Slope { values, gradient: row.gradient(group, Some(&means)) }
+}
