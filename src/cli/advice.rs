@@ -83,6 +83,7 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
             "annotate",
             "background",
             "center",
+            "clear",
             "colormap",
             "depth",
             "error",

@@ -42,7 +42,8 @@ pub use program::{command, main};
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
 pub use values::{
-    Dims, FrameList, FrameRange, MaxError, Numbers, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share,
+    Dims, FrameList, FrameRange, MaxError, Numbers, Opacities, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole,
+    share,
 };
 
 use crate::base::error::{Error, Result};

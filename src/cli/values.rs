@@ -282,6 +282,27 @@ impl RegionSpec {
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpacityPoints(pub Vec<(f64, f64)>);
 
+/// Opacities that are given, or suggested from the samples.
+#[derive(Debug, Clone)]
+pub enum Opacities {
+    /// Suggested from the samples.
+    Auto,
+    /// At shares of the range.
+    Points(OpacityPoints),
+}
+
+impl FromStr for Opacities {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if text == "auto" {
+            Ok(Self::Auto)
+        } else {
+            text.parse().map(Self::Points).map_err(|what| format!("auto, or {what}"))
+        }
+    }
+}
+
 impl FromStr for OpacityPoints {
     type Err = String;
 

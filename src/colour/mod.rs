@@ -4,6 +4,7 @@
 //! range, or comes from a file (`file`). It is applied to samples before the transform (eq 28), to the means of pixels
 //! after projection, or along the ray (eq 31). [`Scale`] colours pixels.
 
+mod distribution;
 mod file;
 mod lab;
 mod named;
@@ -12,9 +13,10 @@ mod scale;
 mod space;
 mod table;
 
+pub use distribution::{Common, Distribution};
 pub use named::NAMES;
 use named::Named;
-pub use scale::{Norm, Scale};
+pub use scale::{Clear, Norm, Scale};
 pub use space::ColourSpace;
 
 use crate::base::error::{Error, Result};

@@ -13,6 +13,26 @@ pub enum Norm {
     Log,
 }
 
+/// Values that show the background: those of empty space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clear {
+    /// The least value that is clear.
+    pub lo: f64,
+    /// The largest value that is clear.
+    pub hi: f64,
+    /// The distance from the clear values at which colours are full.
+    pub fade: f64,
+}
+
+impl Clear {
+    /// How much of its colour a value shows, 0 to 1; it rises smoothly.
+    fn presence(&self, value: f64) -> f64 {
+        let away = (self.lo - value).max(value - self.hi);
+        let share = if self.fade > 0.0 { (away / self.fade).clamp(0.0, 1.0) } else { f64::from(u8::from(away > 0.0)) };
+        share * share * (3.0 - 2.0 * share)
+    }
+}
+
 /// The colours of pixels: a transfer function over a range, and the background.
 #[derive(Debug, Clone)]
 pub struct Scale {
@@ -23,6 +43,7 @@ pub struct Scale {
     range: (f64, f64),
     norm: Norm,
     background: Rgb,
+    clear: Option<Clear>,
 }
 
 /// Number of steps of the table, enough that colours are exact up to rounding.
@@ -53,15 +74,34 @@ impl Scale {
         let map = map.over((0.0, 1.0))?;
         let at = |i| map.colour(f64::from(i) / f64::from(SHARES)).map_or(background, bytes);
         let table = if map.is_slow() { (0..=SHARES).map(at).collect() } else { Vec::new() };
-        Ok(Self { map, table, range, norm, background })
+        Ok(Self { map, table, range, norm, background, clear: None })
+    }
+
+    /// The same with values that show the background.
+    #[must_use]
+    pub fn with_clear(self, clear: Option<Clear>) -> Self {
+        Self { clear, ..self }
+    }
+
+    /// The values that show the background.
+    pub fn clear(&self) -> Option<Clear> {
+        self.clear
     }
 
     /// The colour of a value. Values beyond the range get the colour of the nearer end; NaN gets the background.
     pub fn colour(&self, value: f32) -> Rgb {
-        if value.is_nan() {
-            return self.background;
+        match self.clear {
+            _ if value.is_nan() => self.background,
+            Some(clear) => bytes(self.faded(clear, f64::from(value), self.share(value))),
+            None => self.full_colour_at(self.share(value)),
         }
-        self.colour_at(self.share(value))
+    }
+
+    /// The colour of a value at a share of the range, over the background as far as it is clear.
+    fn faded(&self, clear: Clear, value: f64, share: f64) -> Colour {
+        let (background, presence) = (self.background.map(|c| f64::from(c) / 255.0), clear.presence(value));
+        let full = self.map.colour(share).unwrap_or(background);
+        std::array::from_fn(|i| background[i] + presence * (full[i] - background[i]))
     }
 
     /// The colour of a pixel of one value, of three channels (each spread over the range), or of light and its opacity.
@@ -78,7 +118,10 @@ impl Scale {
         let background = || self.background.map(|c| f64::from(c) / 255.0);
         match *numbers {
             _ if numbers.iter().any(|n| n.is_nan()) => background(),
-            [value] => self.map.colour(self.share(value)).unwrap_or_else(background),
+            [value] => match self.clear {
+                Some(clear) => self.faded(clear, f64::from(value), self.share(value)),
+                None => self.map.colour(self.share(value)).unwrap_or_else(background),
+            },
             [r, g, b] => [r, g, b].map(|c| self.share(c)),
             [r, g, b, opacity] => self.over_background([r, g, b], opacity),
             _ => background(),
@@ -93,6 +136,18 @@ impl Scale {
 
     /// The colour at a share of the range, 0 to 1.
     pub fn colour_at(&self, share: f64) -> Rgb {
+        self.clear
+            .map_or_else(|| self.full_colour_at(share), |clear| bytes(self.faded(clear, self.value(share), share)))
+    }
+
+    /// The value at a share of the range.
+    fn value(&self, share: f64) -> f64 {
+        let (lo, hi) = self.range;
+        if self.norm == Norm::Log { lo * libm::exp(share * libm::log(hi / lo)) } else { lo + share * (hi - lo) }
+    }
+
+    /// The colour at a share of the range, whether it is clear or not.
+    fn full_colour_at(&self, share: f64) -> Rgb {
         let tabled = self.table.get((share * f64::from(SHARES)).round() as usize);
         tabled.copied().or_else(|| self.map.colour(share).map(bytes)).unwrap_or(self.background)
     }
@@ -185,6 +240,28 @@ mod tests {
             Scale::new(&map, (0.0, 1.0), Norm::Linear, background).expect("a range").is_grey()
         };
         assert!(grey("grey", [7; 3]) && !grey("grey", [7, 7, 8]) && !grey("turbo", [0; 3]));
+    }
+
+    #[test]
+    fn clear_values_show_the_background_and_those_near_them_fade() {
+        let grey = TransferFunction::open("grey").expect("a known map");
+        let clear = Clear { lo: -0.1, hi: 0.1, fade: 0.2 };
+        for norm in [Norm::Linear, Norm::Log] {
+            let plain = Scale::new(&grey, (1e-3, 1.0), norm, [200, 0, 0]).expect("a range");
+            let scale = plain.clone().with_clear(Some(clear));
+            for value in [-0.1, 0.0, 0.05, 0.1] {
+                assert_eq!(scale.colour(value), [200, 0, 0], "{value}");
+            }
+            assert!([-0.31, 0.31, 0.9].iter().all(|value| scale.colour(*value) == plain.colour(*value)));
+            let half = scale.colour(0.2).map(f64::from);
+            let middle = plain.colour(0.2).map(|c| f64::from(c) / 2.0);
+            assert!((half[0] - middle[0] - 100.0).abs() < 1.5 && (half[1] - middle[1]).abs() < 1.5, "{half:?}");
+            for value in [0.01_f32, 0.15, 0.25, 0.7] {
+                let of_share = scale.colour_at(scale.share(value));
+                assert!(of_share.iter().zip(scale.colour(value)).all(|(a, b)| a.abs_diff(b) <= 1), "{value}");
+                assert_eq!(bytes(scale.exact_colour_of_pixel(&[value])), scale.colour(value));
+            }
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct Light {
 
 impl Default for Light {
     fn default() -> Self {
-        Self { azimuth: -30.0, elevation: 40.0, ambient: 0.35, diffuse: 0.75, specular: 0.25 }
+        Self { azimuth: -30.0, elevation: 40.0, ambient: 0.4, diffuse: 0.8, specular: 0.25 }
     }
 }
 

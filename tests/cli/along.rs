@@ -87,10 +87,10 @@ fn surfaces_are_named_by_value_or_share() {
     let most = |light: &[f32], n: usize| light.iter().skip(n).step_by(4).copied().fold(0.0, f32::max);
     assert!(most(&one, 3) > 0.9 && most(&red, 0) > most(&red, 2), "an opaque surface, and a red one");
     let seen = |light: &[f32]| light.chunks(4).filter(|p| p[3] > 0.4).count();
-    assert!(seen(&one) > 20 && seen(&one).abs_diff(seen(&red)) < 20, "{} {}", seen(&one), seen(&red));
+    assert!(seen(&one) > 20 && seen(&one).abs_diff(seen(&red)) < 60, "{} {}", seen(&one), seen(&red));
     let json = work.render(&format!("{shown} --iso 0.5,1:00ff00 -o two.png --json")).ok().json();
     let iso = json["picture"]["iso"].as_str().unwrap().to_string();
-    assert!(iso.starts_with("0.5:") && iso.ends_with("1:00ff00:0.5"), "{iso}");
+    assert!(iso.starts_with("0.5:") && iso.ends_with("1:00ff00:0.6"), "{iso}");
 }
 
 #[test]
@@ -132,4 +132,48 @@ fn options_without_meaning_for_a_mode_are_refused() {
     }
     work.render(&format!("a.wspl --mode composite {SIZE} -o - --format gray16")).fails(2, &["gray16"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "c.wspl"]);
+}
+
+/// A volume that is 0 but for a bright box.
+fn nearly_empty(work: &Work) {
+    let value = |x: usize, y: usize, z: usize| if x / 4 == 1 && y / 4 == 1 && z / 4 == 1 { 3.0_f32 } else { 0.0 };
+    let frame: Vec<f32> = (0..16 * 16 * 16).map(|n| value(n % 16, n / 16 % 16, n / 256)).collect();
+    let bytes: Vec<u8> = [&frame[..], &frame[..]].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
+    work.write("box.raw", &bytes);
+    work.wavesplat("convert box.raw -o box.wspl --dims 16x16x16x2 --dtype f32 --tolerance 1e-4").ok();
+}
+
+#[test]
+fn empty_space_shows_the_background() {
+    let work = Work::new();
+    nearly_empty(&work);
+    let shown = |more: &str| {
+        let run = work.render(&format!("box.wspl --frames 0 {SIZE} --background ff0000 -o - {more}")).ok();
+        let red = decode_png(&run.out).chunks(3).filter(|pixel| *pixel == [255, 0, 0]).count();
+        (red, run.err.contains("--clear none"))
+    };
+    let (all, said) = shown("--clear none");
+    assert!(!said && all < 48 * 40 * 2 / 3, "{all}");
+    let (cleared, said) = shown("");
+    assert!(said && cleared > all + 200, "{cleared} {all}");
+    assert_eq!(shown("--clear 5,6").0, all, "no pixel has these values");
+    assert_eq!(shown("--clear=-1,9").0, 48 * 40, "all pixels have these");
+    assert!(shown("--mode mip").0 > shown("--mode mip --clear none").0 + 200);
+    work.render(&format!("box.wspl {SIZE} -o x.png --clear 2,1")).fails(2, &["--clear", "lower one first"]);
+}
+
+#[test]
+fn suggested_opacities_show_what_is_rare() {
+    let work = Work::new();
+    nearly_empty(&work);
+    let shown = |more: &str| {
+        work.render(&format!("box.wspl --frames 0 {SIZE} --mode composite {more} -o c.npy --force")).ok();
+        singles(&work, "c.npy").1
+    };
+    let (auto, none) = (shown(""), shown("--opacity auto"));
+    assert!(auto == none, "the default");
+    let opaque = |light: &[f32]| light.iter().skip(3).step_by(4).filter(|a| **a > 0.5).count();
+    assert!((10..400).contains(&opaque(&auto)), "the box alone: {}", opaque(&auto));
+    let full = shown("--opacity 0:1,1:1");
+    assert!(opaque(&full) > 2 * opaque(&auto));
 }

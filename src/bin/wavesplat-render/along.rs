@@ -3,7 +3,8 @@
 use crate::surfaces::SurfaceList;
 use clap::{Args, ValueEnum};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{Numbers, OpacityPoints, Pair, open_colours, stretched};
+use wavesplat::base::grid::Grid;
+use wavesplat::cli::{Numbers, Opacities, Pair, open_colours, stretched};
 use wavesplat::colour::TransferFunction;
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{Light, Mode};
@@ -19,14 +20,15 @@ pub(crate) struct AlongArgs {
     /// colour [default: viridis; its own values, or those of all frames]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
     pub(crate) transfer_function: Option<String>,
-    /// Opacities of a composite at shares of the range, like 0:0,0.5:0.1,1:0.8 [default: the file's, or 0 to 1]
+    /// Opacities of a composite at shares of the range, like 0:0,0.5:0.1,1:0.8, or auto: empty space (the
+    /// least value or 0), or else the most common value, is transparent, and rare values are opaque [default: the file's, or auto]
     #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
-    opacity: Option<OpacityPoints>,
+    opacity: Option<Opacities>,
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
     /// Isosurfaces, as V[:RRGGBB[:OPACITY]],... V is a value, or a share of the range such as 40% [default: 50%; colours of
-    /// --transfer-function; opaque if there is one, else half opaque]
+    /// --transfer-function; opaque if there is one, else 0.6]
     #[arg(long, value_name = "V,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     iso: Option<SurfaceList>,
     /// Shade a composite by the gradient of the samples, so that it looks solid
@@ -154,6 +156,21 @@ impl AlongArgs {
         Ok(!TransferFunction::open(name)?.is_of_values())
     }
 
+    /// Whether the opacities of a composite are to be suggested: neither given nor stored with the colours.
+    pub(crate) fn suggests_opacities(&self, colours: &TransferFunction) -> bool {
+        let suggests = match &self.opacity {
+            Some(Opacities::Auto) => true,
+            Some(Opacities::Points(_)) => false,
+            None => colours.name().is_some(),
+        };
+        suggests && self.mode_name().has_opacities()
+    }
+
+    /// The length over which opacities apply.
+    pub(crate) fn unit(&self, grid: &Grid) -> f64 {
+        self.opacity_unit.unwrap_or_else(|| grid.largest_spacing())
+    }
+
     /// The colours of a composite of a file, over the given range, their own range, or that of all samples.
     pub(crate) fn of_file(&self, range: Option<Pair>, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
         let Some(name) = self.colours().filter(|_| self.mode_name().colours_samples()) else { return Ok(None) };
@@ -167,8 +184,10 @@ impl AlongArgs {
             ModeName::Projection => Mode::Projection,
             ModeName::Composite => {
                 let transfer = needed(colours)?;
-                let points = self.opacity.as_ref().map(|points| transfer.with_opacity(&points.0));
-                let transfer = points.unwrap_or_else(|| Ok(transfer.clone()));
+                let transfer = match &self.opacity {
+                    Some(Opacities::Points(points)) => transfer.with_opacity(&points.0),
+                    Some(Opacities::Auto) | None => Ok(transfer.clone()),
+                };
                 let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
                 let light = (self.shade || self.light.is_some()).then(|| self.lamp());
                 Mode::Composite { transfer, unit: self.opacity_unit, slices, light }

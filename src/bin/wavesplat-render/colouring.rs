@@ -1,7 +1,7 @@
 //! The colours of the pictures of a run.
 
 use crate::args::{Cli, QuantityName};
-use crate::ranges::Ranges;
+use crate::ranges::{self, Ranges};
 use crate::targets::Targets;
 use serde::Serialize;
 use wavesplat::base::error::{Error, Result};
@@ -50,16 +50,20 @@ impl Cli {
         let in_colours = !pictures.format.is_of_numbers() || self.colour.is_asked();
         let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel, colours);
-        let needed = (in_colours && fixed.is_none(), of_errors);
+        let is_clear = pixel == Pixel::Value && self.colour.finds_clear();
+        let needed = (in_colours && (fixed.is_none() || is_clear), of_errors);
         let ranges = Ranges::small(scene, config, needed, &self.common)?;
         let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
         let (range, norm) = match pixel {
             Pixel::Value => self.colour.spread(&map, &ranges, in_colours, &self.common)?,
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
-        self.report_ranges(range, &ranges, needed);
+        self.report_ranges(range, &ranges, (needed.0 && fixed.is_none(), of_errors));
         let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
         let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
+        let clear =
+            if pixel == Pixel::Value && in_colours { self.colour.clear(&ranges, range, &self.common) } else { None };
+        let of_pictures = of_pictures.with_clear(clear);
         Ok(Colouring { pixel, of_pictures, of_errors: of_errors_too, in_colours: (in_colours, of_errors), map })
     }
 
@@ -102,21 +106,42 @@ impl Cli {
 }
 
 impl Cli {
-    /// The colours of a composite without a given range, up to the largest value of small pictures.
+    /// The colours of a composite or of surfaces. A range that is not given ends at the largest value of small pictures.
+    /// Opacities that are not given are suggested from an overview of the samples.
     pub(crate) fn automatic_colours(
         &self,
         scene: &mut dyn Scene,
         config: &mut RenderConfig,
         colours: Option<TransferFunction>,
     ) -> Result<Option<TransferFunction>> {
-        let Some(all) = colours.as_ref().filter(|_| config.mode.pixel() == Pixel::Light) else { return Ok(colours) };
-        if !self.along.is_automatic(self.colour.range)? {
-            return Ok(colours);
+        let Some(mut colours) = colours else { return Ok(None) };
+        if config.mode.pixel() != Pixel::Light {
+            return Ok(Some(colours));
         }
-        let colours = Ranges::small(scene, config, (true, false), &self.common)?.stretch(all)?;
-        let (lo, hi) = colours.range();
-        self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        if self.along.is_automatic(self.colour.range)? {
+            colours = Ranges::small(scene, config, (true, false), &self.common)?.stretch(&colours)?;
+            let (lo, hi) = colours.range();
+            self.common.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        }
+        if self.along.suggests_opacities(&colours) {
+            colours = self.suggested_opacities(scene, config, &colours)?;
+        }
         config.mode = self.along.mode(Some(&colours))?;
         Ok(Some(colours))
+    }
+
+    /// The same colours, with opacities by how rare values are.
+    fn suggested_opacities(
+        &self,
+        scene: &mut dyn Scene,
+        config: &RenderConfig,
+        colours: &TransferFunction,
+    ) -> Result<TransferFunction> {
+        let Some(samples) = ranges::distribution(scene, config, &self.common)? else { return Ok(colours.clone()) };
+        let grid = scene.grid();
+        let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
+        let path = volume.cbrt() / self.along.unit(grid);
+        let points = samples.opacities(colours.range(), path);
+        colours.with_opacity(&points).map_err(|what| Error::usage(format!("--opacity auto: {what}")))
     }
 }

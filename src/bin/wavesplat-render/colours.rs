@@ -2,9 +2,10 @@
 
 use crate::ranges::Ranges;
 use clap::{Args, ValueEnum};
+use std::str::FromStr;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, Pair, open_colours};
-use wavesplat::colour::{Norm, Rgb, TransferFunction};
+use wavesplat::colour::{Clear, Norm, Rgb, TransferFunction};
 use wavesplat::render::sink::PictureFormat;
 
 /// Options for colours.
@@ -21,6 +22,10 @@ pub(crate) struct ColourArgs {
     /// Map values to colours linearly, or by their logarithm (down to a ten-thousandth of the largest)
     #[arg(long, value_enum, default_value = "linear", help_heading = "Colour")]
     norm: NormName,
+    /// Values of means and largest values that show the background, as LO,HI, auto or none. auto takes the least
+    /// value, or 0, if many pixels of small pictures are near it
+    #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
+    clear: ClearSpec,
     /// Draw a colour bar and the time of each frame into the pictures
     #[arg(long, help_heading = "Colour")]
     pub(crate) annotate: bool,
@@ -28,6 +33,37 @@ pub(crate) struct ColourArgs {
     #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
     pub(crate) background: Rgb,
 }
+
+/// Which values show the background.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ClearSpec {
+    /// Those of empty space, if there is much of it.
+    Auto,
+    Nothing,
+    Values(Pair),
+}
+
+impl FromStr for ClearSpec {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "none" => Ok(Self::Nothing),
+            _ => match text.parse::<Pair>() {
+                Ok(pair) if pair.0[0] <= pair.0[1] => Ok(Self::Values(pair)),
+                _ => Err("auto, none, or two numbers, the lower one first".into()),
+            },
+        }
+    }
+}
+
+/// Shares of the pixels of small pictures above which empty space is clear: of values on one side of it, and on both.
+const EMPTY_SHARES: [f64; 2] = [0.25, 0.6];
+
+/// The distance from clear values at which colours are full, and the distance that counts as near, as shares of the range.
+const FADE: f64 = 0.08;
+const NEAR: f64 = 0.01;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum NormName {
@@ -48,6 +84,34 @@ impl ColourArgs {
     /// Whether --colormap was given, so that arrays hold colours too.
     pub(crate) fn is_asked(&self) -> bool {
         self.colormap.is_some()
+    }
+
+    /// Whether clear values are looked for in small pictures.
+    pub(crate) fn finds_clear(&self) -> bool {
+        self.clear == ClearSpec::Auto
+    }
+
+    /// The values that show the background.
+    pub(crate) fn clear(&self, ranges: &Ranges, (lo, hi): (f64, f64), common: &CommonArgs) -> Option<Clear> {
+        let fade = FADE * (hi - lo);
+        match self.clear {
+            ClearSpec::Nothing => None,
+            ClearSpec::Values(pair) => Some(Clear { lo: pair.0[0], hi: pair.0[1], fade }),
+            ClearSpec::Auto => {
+                let empty = ranges.empty()?;
+                let is_signed = empty.value - lo > 0.1 * (hi - lo) && hi - empty.value > 0.1 * (hi - lo);
+                if empty.share <= EMPTY_SHARES[usize::from(is_signed)] {
+                    return None;
+                }
+                let is_zero = empty.value.abs() < 1e-3 * (hi - lo);
+                let (value, percent) = (if is_zero { 0.0 } else { empty.value as f32 }, (100.0 * empty.share).round());
+                common.note(format_args!(
+                    "values near {value}, as in {percent} % of the pixels, show the background; --clear none colours them"
+                ));
+                let near = NEAR * (hi - lo);
+                Some(Clear { lo: empty.value - near, hi: empty.value + near, fade })
+            }
+        }
     }
 
     /// An error if a format cannot hold colours or annotations.

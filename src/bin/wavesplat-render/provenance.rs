@@ -121,6 +121,7 @@ fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> P
         range: Some(scale.range()),
         norm: Some(norm),
         background: Some(format!("{r:02x}{g:02x}{b:02x}")),
+        clear: scale.clear().map(|clear| [clear.lo, clear.hi]),
         ..provenance
     }
 }
@@ -133,6 +134,7 @@ pub(crate) fn error_provenance(provenance: &Provenance, colouring: &Colouring) -
         range: None,
         norm: None,
         background: None,
+        clear: None,
         ..provenance.clone()
     };
     match colouring.coloured().error_range {

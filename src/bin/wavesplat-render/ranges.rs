@@ -6,7 +6,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::{Progress, Silent};
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{CommonArgs, TerminalProgress};
-use wavesplat::colour::{Norm, TransferFunction};
+use wavesplat::colour::{Common, Distribution, Norm, TransferFunction};
 use wavesplat::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
 use wavesplat::render::{check, render, stride};
 use wavesplat::source::ArraySource;
@@ -36,6 +36,27 @@ const MOST_SAMPLES: usize = 5 << 20;
 
 /// Bytes of memory for each sample of an overview: it takes at most a quarter.
 const MEMORY_SHARE: usize = 32;
+
+/// The largest number of samples of a distribution.
+const MOST_OF_DISTRIBUTION: usize = 1 << 20;
+
+/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview.
+pub(crate) fn distribution(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    common: &CommonArgs,
+) -> Result<Option<Distribution>> {
+    let small = small(config);
+    let mut thinning = thinning(scene, &small)?;
+    while voxels(&thinning) * LEAST_FRAMES > MOST_OF_DISTRIBUTION && thinning.stride < 64 {
+        thinning.stride *= 2;
+    }
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let frames = spread(scene, LEAST_FRAMES);
+    let request = OverviewRequest { thinning, frames: &frames, region };
+    let samples = scene.overview(&request, &common.progress("overview", "steps"))?;
+    Ok(samples.map(Distribution::new))
+}
 
 /// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
 /// range.
@@ -178,11 +199,13 @@ pub(crate) struct Ranges {
     /// The smallest value above 0, if there is one.
     positive: Option<f64>,
     pub(crate) errors: (f64, f64),
+    /// The values of small pictures.
+    all: Distribution,
 }
 
 impl Default for Ranges {
     fn default() -> Self {
-        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0) }
+        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0), all: Distribution::default() }
     }
 }
 
@@ -216,12 +239,18 @@ impl Ranges {
         Ok(ranges)
     }
 
-    fn set_values(&mut self, mut values: Vec<f32>) {
-        values.sort_unstable_by(f32::total_cmp);
+    fn set_values(&mut self, values: Vec<f32>) {
+        self.all = Distribution::new(values);
+        let values = self.all.values();
         if !values.is_empty() {
-            self.values = robust_range(&values);
+            self.values = robust_range(values);
             self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
+    }
+
+    /// The value of empty space in small pictures.
+    pub(crate) fn empty(&self) -> Option<Common> {
+        self.all.empty(self.values)
     }
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would

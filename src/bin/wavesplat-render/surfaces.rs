@@ -81,7 +81,7 @@ impl SurfaceList {
                 At::Value(value) => value,
                 At::Share(share) => lo + share * (hi - lo),
             };
-            let opacity = named.opacity.unwrap_or(if is_single { 1.0 } else { 0.5 });
+            let opacity = named.opacity.unwrap_or(if is_single { 1.0 } else { 0.6 });
             Surface { value, colour: named.colour.unwrap_or_else(|| of_map(value)), opacity }
         };
         self.0.iter().map(surface).collect()
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(surfaces("25%", true), Ok(vec![(3.0, [0.25; 3], 1.0)]));
         assert_eq!(
             surfaces("-1e3:ff0000,50%::0.3", false),
-            Ok(vec![(-1e3, [1.0, 0.0, 0.0], 0.5), (4.0, [0.5; 3], 0.3)])
+            Ok(vec![(-1e3, [1.0, 0.0, 0.0], 0.6), (4.0, [0.5; 3], 0.3)])
         );
     }
 

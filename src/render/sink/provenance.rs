@@ -66,6 +66,8 @@ pub struct Provenance {
     pub norm: Option<&'static str>,
     /// The colour of the background.
     pub background: Option<String>,
+    /// The least and the largest value that show the background.
+    pub clear: Option<[f64; 2]>,
     /// Numbers of the frames.
     pub frames: Vec<usize>,
     /// Times of the frames, or empty.

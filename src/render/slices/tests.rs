@@ -442,8 +442,9 @@ fn isosurfaces_have_no_holes() {
                 let at = [(pixel % view.size[0]) as f64 + 0.5 - x, (pixel / view.size[0]) as f64 + 0.5 - y];
                 let away = at[0].hypot(at[1]) / camera.scale;
                 let expected = if away < value { 1.0 } else { 0.0 };
+                // Pixels are interpolated from cells up to two voxels away.
                 assert!(
-                    (away - value).abs() < 1.5 || (light[3] - expected).abs() < 1e-3,
+                    (away - value).abs() < 2.5 || (light[3] - expected).abs() < 1e-3,
                     "{value}: {light:?} at {away}"
                 );
             }
