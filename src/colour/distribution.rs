@@ -39,6 +39,9 @@ const MOST_OPAQUE: f64 = 0.9;
 /// Ranks, 0 to 1, are raised to this power: few values are much more opaque than most.
 const RARITY: i32 = 4;
 
+/// How much the rank counts, beside the distance itself.
+const BY_RANK: f64 = 0.75;
+
 impl Distribution {
     /// The distribution of the values that are finite.
     pub fn new(mut values: Vec<f32>) -> Self {
@@ -95,24 +98,24 @@ impl Distribution {
             return vec![(0.0, 0.0), (1.0, 1.0)];
         };
         let at = |point: usize| point as f64 / (POINTS - 1) as f64;
-        let farthest = (hi - common.value).max(common.value - lo);
-        let weight = |point: usize| {
-            let value = lo + at(point) * (hi - lo);
-            self.rarity(value, &common, NEAR * (hi - lo)) * (value - common.value).abs() / farthest
-        };
+        let weight = |point: usize| self.weight(lo + at(point) * (hi - lo), (lo, hi), &common);
         let weights: Vec<f64> = (0..POINTS).map(weight).collect();
         let scale = self.opacity_of_the_rarest(&weights, (lo, hi), length);
         (0..POINTS).map(|point| (at(point), (scale * weights[point]).min(MOST_OPAQUE))).collect()
     }
 
-    /// How rare values as far from the common one are, 0 to 1.
-    fn rarity(&self, value: f64, common: &Common, near: f64) -> f64 {
-        let distance = (value - common.value).abs();
-        if distance <= near || common.share >= 1.0 {
+    /// The opacity of a value before scaling, 0 to 1: it rises with the distance from the common value, in rank and by
+    /// itself. The ends of the range stand for the values beyond.
+    fn weight(&self, value: f64, (lo, hi): (f64, f64), common: &Common) -> f64 {
+        let (distance, farthest) = ((value - common.value).abs(), (hi - common.value).max(common.value - lo));
+        if distance <= NEAR * (hi - lo) {
             return 0.0;
         }
-        let nearer = self.share(common.value - distance, common.value + distance);
-        ((nearer - common.share) / (1.0 - common.share)).clamp(0.0, 1.0).powi(RARITY)
+        let (from, to) = (common.value - distance, common.value + distance);
+        let nearer = self.share(if from <= lo { f64::MIN } else { from }, if to >= hi { f64::MAX } else { to });
+        let rank = ((nearer - common.share) / (1.0 - common.share).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let share = distance / farthest;
+        share * (BY_RANK * rank.powi(RARITY) + (1.0 - BY_RANK) * share * share)
     }
 
     /// The factor of the weights with which a path of this length has the wanted depth.
