@@ -1,6 +1,6 @@
 //! The colours of a picture's pixels.
 
-use super::{Colour, Rgb, TransferFunction};
+use super::{Colour, Common, Distribution, Rgb, TransferFunction};
 use crate::base::error::{Error, Note, Remedy, Result};
 
 /// How values are spread over the colours.
@@ -24,7 +24,32 @@ pub struct Clear {
     pub fade: f64,
 }
 
+/// The distance from clear values at which colours are full, and the distance from empty space that is clear, as shares of
+/// the range.
+const FADE: f64 = 0.08;
+const NEAR: f64 = 0.01;
+
+/// Shares of pixels above which empty space is clear: if there are values on one side of it alone, and on both.
+const EMPTY_SHARES: [f64; 2] = [0.25, 0.6];
+
+/// A side of empty space counts if it has this share of the range.
+const SIDE: f64 = 0.1;
+
 impl Clear {
+    /// The values from `lo` to `hi`, for colours over `range`.
+    pub fn of_values((lo, hi): (f64, f64), range: (f64, f64)) -> Self {
+        Self { lo, hi, fade: FADE * (range.1 - range.0) }
+    }
+
+    /// The values of empty space, and how common they are, if many of the pixels have such a value.
+    pub fn of_empty(pixels: &Distribution, (lo, hi): (f64, f64)) -> Option<(Self, Common)> {
+        let empty = pixels.empty((lo, hi))?;
+        let (side, near) = (SIDE * (hi - lo), NEAR * (hi - lo));
+        let is_between = empty.value - lo > side && hi - empty.value > side;
+        let clear = Self::of_values((empty.value - near, empty.value + near), (lo, hi));
+        Some((clear, empty)).filter(|_| empty.share > EMPTY_SHARES[usize::from(is_between)])
+    }
+
     /// How much of its colour a value shows, 0 to 1; it rises smoothly.
     fn presence(&self, value: f64) -> f64 {
         let away = (self.lo - value).max(value - self.hi);
@@ -240,6 +265,16 @@ mod tests {
             Scale::new(&map, (0.0, 1.0), Norm::Linear, background).expect("a range").is_grey()
         };
         assert!(grey("grey", [7; 3]) && !grey("grey", [7, 7, 8]) && !grey("turbo", [0; 3]));
+    }
+
+    #[test]
+    fn empty_space_is_clear_if_there_is_much_of_it() {
+        let of = |value: f32, count: usize| {
+            let mut values: Vec<f32> = (0..=100).map(|n| n as f32 / 50.0 - 1.0).collect();
+            values.extend(vec![value; count]);
+            Clear::of_empty(&Distribution::new(values), (-1.0, 1.0)).map(|(clear, _)| clear.lo < clear.hi)
+        };
+        assert_eq!([of(-1.0, 20), of(-1.0, 60), of(0.0, 60), of(0.0, 300)], [None, Some(true), None, Some(true)]);
     }
 
     #[test]

@@ -58,13 +58,6 @@ impl FromStr for ClearSpec {
     }
 }
 
-/// Shares of the pixels of small pictures above which empty space is clear: of values on one side of it, and on both.
-const EMPTY_SHARES: [f64; 2] = [0.25, 0.6];
-
-/// The distance from clear values at which colours are full, and the distance that counts as near, as shares of the range.
-const FADE: f64 = 0.08;
-const NEAR: f64 = 0.01;
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum NormName {
     Linear,
@@ -93,23 +86,17 @@ impl ColourArgs {
 
     /// The values that show the background.
     pub(crate) fn clear(&self, ranges: &Ranges, (lo, hi): (f64, f64), common: &CommonArgs) -> Option<Clear> {
-        let fade = FADE * (hi - lo);
         match self.clear {
             ClearSpec::Nothing => None,
-            ClearSpec::Values(pair) => Some(Clear { lo: pair.0[0], hi: pair.0[1], fade }),
+            ClearSpec::Values(pair) => Some(Clear::of_values(pair.0.into(), (lo, hi))),
             ClearSpec::Auto => {
-                let empty = ranges.empty()?;
-                let is_signed = empty.value - lo > 0.1 * (hi - lo) && hi - empty.value > 0.1 * (hi - lo);
-                if empty.share <= EMPTY_SHARES[usize::from(is_signed)] {
-                    return None;
-                }
+                let (clear, empty) = ranges.clear((lo, hi))?;
                 let is_zero = empty.value.abs() < 1e-3 * (hi - lo);
                 let (value, percent) = (if is_zero { 0.0 } else { empty.value as f32 }, (100.0 * empty.share).round());
                 common.note(format_args!(
                     "values near {value}, as in {percent} % of the pixels, show the background; --clear none colours them"
                 ));
-                let near = NEAR * (hi - lo);
-                Some(Clear { lo: empty.value - near, hi: empty.value + near, fade })
+                Some(clear)
             }
         }
     }

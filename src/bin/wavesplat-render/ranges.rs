@@ -6,7 +6,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::{Progress, Silent};
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{CommonArgs, TerminalProgress};
-use wavesplat::colour::{Common, Distribution, Norm, TransferFunction};
+use wavesplat::colour::{Clear, Common, Distribution, Norm, TransferFunction};
 use wavesplat::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
 use wavesplat::render::{check, render, stride};
 use wavesplat::source::ArraySource;
@@ -248,9 +248,9 @@ impl Ranges {
         }
     }
 
-    /// The value of empty space in small pictures.
-    pub(crate) fn empty(&self) -> Option<Common> {
-        self.all.empty(self.values)
+    /// The values that show the background, if small pictures have much empty space.
+    pub(crate) fn clear(&self, range: (f64, f64)) -> Option<(Clear, Common)> {
+        Clear::of_empty(&self.all, range)
     }
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would
