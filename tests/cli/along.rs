@@ -88,6 +88,7 @@ fn surfaces_are_named_by_value_or_share() {
     assert!(most(&one, 3) > 0.9 && most(&red, 0) > most(&red, 2), "an opaque surface, and a red one");
     let seen = |light: &[f32]| light.chunks(4).filter(|p| p[3] > 0.4).count();
     assert!(seen(&one) > 20 && seen(&one).abs_diff(seen(&red)) < 60, "{} {}", seen(&one), seen(&red));
+    assert!(work.render(&format!("{shown} --iso 1e9 -o far.npy")).ok().err.contains("no sample reaches it"));
     let json = work.render(&format!("{shown} --iso 0.5,1:00ff00 -o two.png --json")).ok().json();
     let iso = json["picture"]["iso"].as_str().unwrap().to_string();
     assert!(iso.starts_with("0.5:") && iso.ends_with("1:00ff00:0.6"), "{iso}");

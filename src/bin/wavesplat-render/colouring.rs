@@ -6,8 +6,9 @@ use crate::targets::Targets;
 use serde::Serialize;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::colour::{Norm, Scale, TransferFunction};
+use wavesplat::file::CoefficientFile;
 use wavesplat::render::sink::PictureFormat;
-use wavesplat::render::{Pixel, RenderConfig, Scene};
+use wavesplat::render::{Mode, Pixel, RenderConfig, Scene};
 
 /// The colours of pictures and of pictures of their errors.
 pub(crate) struct Colouring {
@@ -128,6 +129,16 @@ impl Cli {
         }
         config.mode = self.along.mode(Some(&colours))?;
         Ok(Some(colours))
+    }
+
+    /// Says which surfaces no sample of the file reaches.
+    pub(crate) fn note_surfaces(&self, config: &RenderConfig, file: Option<&CoefficientFile>) {
+        let (Mode::Iso { surfaces, .. }, Some(file)) = (&config.mode, file) else { return };
+        let (lo, hi) = file.source_range();
+        for surface in surfaces.iter().filter(|surface| !(lo..=hi).contains(&surface.value)) {
+            let value = surface.value;
+            self.common.note(format_args!("--iso {value}: no sample reaches it; they are from {lo:.4e} to {hi:.4e}"));
+        }
     }
 
     /// The same colours, with opacities by how rare values are.

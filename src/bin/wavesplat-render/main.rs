@@ -38,6 +38,7 @@ impl Cli {
         let targets = self.targets(&config)?;
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
+        self.note_surfaces(&config, file.as_deref());
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = Provenance {
