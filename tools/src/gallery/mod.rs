@@ -15,13 +15,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tiles::{SampleStyle, Tile, short};
 use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Region;
 use wavesplat::base::output::Output;
+use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::cli::{InputArgs, Numbers};
-use wavesplat::colour::TransferFunction;
+use wavesplat::colour::{Distribution, TransferFunction};
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, Mode, RenderConfig, Scene, SplatSource};
+use wavesplat::render::{CoefficientScene, Mode, OverviewRequest, RenderConfig, Scene, SplatSource, Thinning};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 
@@ -157,7 +159,11 @@ impl Gallery {
     fn look(&self, scene: &mut dyn Scene, base: &RenderConfig, file: &CoefficientFile) -> Result<SampleStyle> {
         let mip = RenderConfig { mode: Mode::Mip { slices: None }, ..base.clone() };
         let (largest, _) = pictures(scene, &mip)?;
-        Ok(SampleStyle::new(file.metadata().range(), &largest, scene.grid()))
+        let region = Region { start: [0; 3], end: scene.grid().dims };
+        let thinning = Thinning { blocks: scene.blocks(), stride: 1 };
+        let samples = scene.overview(&OverviewRequest { thinning, frames: &base.frames, region }, &Silent)?;
+        let samples = Distribution::new(samples.unwrap_or_default());
+        Ok(SampleStyle::new(file.metadata().range(), (samples, &largest), scene.grid()))
     }
 
     fn shown(&self, scene: &mut dyn Scene, base: &RenderConfig, tile: &Tile) -> Result<Image> {
@@ -210,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn every_archive_has_a_row_of_six_pictures() {
+    fn every_archive_has_a_row_of_eight_pictures() {
         let folder = tempfile::tempdir().unwrap();
         let shape = Shape { dims: [9, 8, 7], frames: 5, ty: SampleType::F32 };
         let archive = |kind, name: &str| {
@@ -226,7 +232,7 @@ mod tests {
         assert_eq!(said.len(), 2 * 3, "{said:?}");
         let file = std::io::BufReader::new(fs::File::open(gallery.sheet()).unwrap());
         let (width, height) = png::Decoder::new(file).read_info().unwrap().info().size();
-        assert!(width as usize == GAP + 6 * (40 + GAP) && height > 80, "{width} {height}");
+        assert!(width as usize == GAP + 8 * (40 + GAP) && height > 80, "{width} {height}");
     }
 
     #[test]

@@ -4,8 +4,8 @@ use crate::sheet::{Image, Rgb};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::cli::OpacityPoints;
-use wavesplat::colour::{Norm, Scale, TransferFunction};
-use wavesplat::render::Mode;
+use wavesplat::colour::{Clear, Distribution, Norm, Scale, TransferFunction};
+use wavesplat::render::{Light, Mode, Surface};
 
 const BACKGROUND: Rgb = [0; 3];
 /// Rays reach the stated opacities over these shares of the volume's smallest extent: for haze, and for shells, which
@@ -36,6 +36,10 @@ pub(super) struct SampleStyle {
     pub(super) range: (f64, f64),
     /// The volume's smallest extent in world units.
     thickness: f64,
+    /// The samples of the frame.
+    samples: Distribution,
+    /// The length of a path through the volume, in spacings.
+    path: f64,
 }
 
 /// A picture of one mode.
@@ -50,7 +54,7 @@ pub(super) struct Tile {
 
 impl SampleStyle {
     /// For samples of a range, of which rays meet the `largest`.
-    pub(super) fn new((lo, hi): (f64, f64), largest: &[f32], grid: &Grid) -> Self {
+    pub(super) fn new((lo, hi): (f64, f64), (samples, largest): (Distribution, &[f32]), grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
         let reached = spread(largest, OF_RAYS).1;
         let range = match both_signs {
@@ -60,8 +64,9 @@ impl SampleStyle {
             false if lo.is_finite() => (lo, lo + lo.abs().max(1.0)), // of one value: the first colour
             false => (0.0, 1.0),                                     // of nothing
         };
-        let extent = (0..3).map(|a| grid.spacing[a] * grid.dims[a] as f64);
-        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min) }
+        let extent = [0, 1, 2].map(|a| grid.spacing[a] * grid.dims[a] as f64).into_iter();
+        let path = extent.clone().product::<f64>().cbrt() / grid.largest_spacing();
+        Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min), samples, path }
     }
 
     /// What suits values of one sign, or of both.
@@ -78,7 +83,33 @@ impl SampleStyle {
             Tile::of_values(mip, "--mode mip --colormap", "inferno")?,
             self.composite(self.either(RAMP, BOTH_ENDS), HAZE)?,
             self.composite(self.either(SHELLS, SHELLS_OF_BOTH), SHELL)?,
+            self.shaded()?,
+            self.surfaces()?,
         ])
+    }
+
+    fn colours(&self) -> Result<TransferFunction> {
+        TransferFunction::open(self.either("viridis", "coolwarm"))?.over(self.range)
+    }
+
+    /// Light on a composite with suggested opacities.
+    fn shaded(&self) -> Result<Tile> {
+        let points = self.samples.opacities(self.range, self.path);
+        let transfer = self.colours()?.with_opacity(&points).map_err(Error::usage)?;
+        let (map, light) = (transfer.clone(), Some(Light::default()));
+        let mode = Mode::Composite { transfer, unit: None, slices: None, light };
+        Ok(Tile { label: "--mode composite --opacity auto --shade".into(), mode, map, norm: Norm::Linear })
+    }
+
+    /// Two surfaces.
+    fn surfaces(&self) -> Result<Tile> {
+        let (map, (lo, hi)) = (self.colours()?, self.range);
+        let surface = |share: f64| {
+            let value = lo + share * (hi - lo);
+            Surface { value, colour: map.colour(value).unwrap_or_default(), opacity: 0.6 }
+        };
+        let mode = Mode::Iso { surfaces: [0.3, 0.7].map(surface).to_vec(), light: Light::default(), slices: None };
+        Ok(Tile { label: "--iso 30%,70%".into(), mode, map, norm: Norm::Linear })
     }
 
     /// The paper's way: colours before all else.
@@ -97,15 +128,12 @@ impl SampleStyle {
     }
 
     fn composite(&self, opacity: &str, share: f64) -> Result<Tile> {
-        let name = self.either("viridis", "coolwarm");
         let points: OpacityPoints = opacity.parse().map_err(Error::usage)?;
-        let transfer = TransferFunction::open(name)?.over(self.range)?;
-        let transfer = transfer.with_opacity(&points.0).map_err(Error::usage)?;
+        let transfer = self.colours()?.with_opacity(&points.0).map_err(Error::usage)?;
         let unit = share * self.thickness;
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
         let mode = Mode::Composite { transfer, unit: Some(unit), slices: None, light: None };
-        let map = TransferFunction::open(name)?;
-        Ok(Tile { label: options, mode, map, norm: Norm::Linear })
+        Ok(Tile { label: options, mode, map: self.colours()?, norm: Norm::Linear })
     }
 }
 
@@ -126,7 +154,8 @@ impl Tile {
     pub(super) fn image(&self, picture: &[f32], side: usize) -> Result<Image> {
         let numbers = picture.len() / (side * side);
         let range = if numbers == 1 { self.range(picture) } else { (0.0, 1.0) };
-        let scale = Scale::new(&self.map, range, self.norm, BACKGROUND)?;
+        let clear = Clear::of_empty(&Distribution::new(picture.to_vec()), range).filter(|_| numbers == 1);
+        let scale = Scale::new(&self.map, range, self.norm, BACKGROUND)?.with_clear(clear.map(|(clear, _)| clear));
         let pixels = picture.chunks_exact(numbers).map(|pixel| scale.colour_of_pixel(pixel)).collect();
         Ok(Image { width: side, height: side, pixels })
     }
@@ -157,7 +186,7 @@ mod tests {
     use super::*;
 
     fn look(range: (f64, f64), largest: &[f32]) -> SampleStyle {
-        SampleStyle::new(range, largest, &Grid::unit([9, 8, 4]))
+        SampleStyle::new(range, (Distribution::new(largest.to_vec()), largest), &Grid::unit([9, 8, 4]))
     }
 
     #[test]
