@@ -36,6 +36,9 @@ const DEPTH: f64 = 5.0;
 /// The opacity of a voxel is at most this.
 const MOST_OPAQUE: f64 = 0.9;
 
+/// Few small things never stop most light; their opacities are not raised by more than this.
+const MOST_SCALE: f64 = 8.0;
+
 /// Ranks, 0 to 1, are raised to this power: few values are much more opaque than most.
 const RARITY: i32 = 4;
 
@@ -130,7 +133,7 @@ impl Distribution {
             let of = |(weight, share): (&f64, &f64)| -share * libm::log1p(-(scale * weight).min(MOST_OPAQUE));
             length * weights.iter().zip(&shares).map(of).sum::<f64>()
         };
-        let (mut least, mut most) = (0.0, 1.0);
+        let (mut least, mut most) = (0.0, MOST_SCALE);
         for _ in 0..30 {
             let middle = (least + most) / 2.0;
             if depth(middle) < DEPTH { least = middle } else { most = middle }
