@@ -37,6 +37,8 @@ pub(crate) enum ModeName {
     Composite,
     /// Show the largest value: see --colormap
     Mip,
+    /// Show the samples on planes through the volume: see --slice, --colormap
+    Slice,
 }
 
 impl ModeName {
@@ -45,6 +47,7 @@ impl ModeName {
             Self::Projection => "projection",
             Self::Composite => "composite",
             Self::Mip => "mip",
+            Self::Slice => "slice",
         }
     }
 
@@ -52,7 +55,7 @@ impl ModeName {
     pub(crate) fn colours_samples(self) -> bool {
         match self {
             Self::Composite => true,
-            Self::Projection | Self::Mip => false,
+            Self::Projection | Self::Mip | Self::Slice => false,
         }
     }
 
@@ -60,7 +63,7 @@ impl ModeName {
     fn has_slices(self) -> bool {
         match self {
             Self::Composite | Self::Mip => true,
-            Self::Projection => false,
+            Self::Projection | Self::Slice => false,
         }
     }
 
@@ -74,6 +77,7 @@ impl ModeName {
                  projections, and wavesplat convert --transfer-function makes files of colours"
             }
             Self::Mip => "--mode mip takes --colormap",
+            Self::Slice => "--slice takes --colormap",
         };
         Some(format!("--transfer-function: {why}"))
     }
@@ -140,6 +144,7 @@ impl AlongArgs {
                 Mode::Composite { transfer, unit: self.opacity_unit, slices }
             }
             ModeName::Mip => Mode::Mip { slices },
+            ModeName::Slice => Mode::Planes { planes: Vec::new() },
         })
     }
 }
