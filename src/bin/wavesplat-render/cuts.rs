@@ -26,7 +26,7 @@ pub(crate) struct CutArgs {
         conflicts_with_all = ["sigma", "splat_error"],
         help_heading = "View"
     )]
-    pub(crate) slices: Vec<SliceSpec>,
+    pub(crate) planes: Vec<SliceSpec>,
 }
 
 /// A plane across an axis.
@@ -50,7 +50,7 @@ const OPTION: &str = "--slice";
 impl Cli {
     /// Takes the mode of slices if there are some.
     pub(crate) fn imply_mode(&mut self) -> Result<()> {
-        match (self.cuts.slices.is_empty(), self.along.mode) {
+        match (self.cuts.planes.is_empty(), self.along.mode) {
             (true, ModeName::Slice) => Err(Error::usage("--mode slice: needs --slice, like --slice z=0.5")),
             (true, _) => Ok(()),
             (false, ModeName::Projection | ModeName::Slice) => {
@@ -67,7 +67,7 @@ impl Cli {
             let axis = axes.find(OPTION, &slice.axis)?;
             Ok((axis, axes.voxel(OPTION, axis, &slice.place)?))
         };
-        self.cuts.slices.iter().map(place).collect()
+        self.cuts.planes.iter().map(place).collect()
     }
 
     /// Sets the planes of a mode of slices, and the view of a single one. `lod` is the level of detail of `grid`.
@@ -105,7 +105,7 @@ impl Cli {
 
     /// The axis of the only slice, if it is to be seen face-on.
     pub(crate) fn face(&self, axes: &Axes) -> Result<Option<usize>> {
-        match self.cuts.slices.as_slice() {
+        match self.cuts.planes.as_slice() {
             [only] if self.views.is_empty() && self.orbit == 1 => axes.find(OPTION, &only.axis).map(Some),
             _ => Ok(None),
         }

@@ -105,7 +105,7 @@ impl Axes {
     /// A place in voxels as the options accept it: `depth=120m`.
     pub(crate) fn text(&self, axis: usize, voxel: f64) -> String {
         let Axis { names, unit, .. } = &self.0[axis];
-        format!("{}=@{}{unit}", names[0], self.0[axis].coordinate(voxel))
+        format!("{}=@{}{unit}", names[0], without_rounding(self.0[axis].coordinate(voxel)))
     }
 }
 
@@ -168,6 +168,11 @@ impl Axis {
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
     }
+}
+
+/// A number without the digits that come from rounding.
+fn without_rounding(v: f64) -> f64 {
+    format!("{v:.12e}").parse().unwrap_or(v)
 }
 
 /// The names of an axis in a description, and its unit.

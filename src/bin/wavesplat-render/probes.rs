@@ -20,7 +20,8 @@ use wavesplat::file::{CoefficientFile, setting, time_labels};
 use wavesplat::render::planes::Taps;
 
 /// Options of pictures, which time series do not have.
-const OF_PICTURES: [&str; 30] = [
+const OF_PICTURES: [&str; 31] = [
+    "planes",
     "slices",
     "views",
     "orbit",
