@@ -233,7 +233,7 @@ mod tests {
             assert_eq!((up.index(at), down.index(at)), (Ok(voxel), Ok(2.0 - voxel)));
             assert_eq!((up.coordinate(voxel), down.coordinate(2.0 - voxel)), (at, at));
         }
-        let beyond = up.index(50.5).unwrap_err();
+        let beyond = up.index(50.5).expect_err("beyond");
         assert!(["50.5", "depth", "0 to 50 m"].iter().all(|word| beyond.contains(word)), "{beyond}");
         assert!(axis(&[0.0, 2.0, 1.0]).index(1.0).is_err());
         assert_eq!(axis(&[3.0]).index(3.0), Ok(0.0));
