@@ -29,6 +29,8 @@ const ALLOWED_FILES: [(&str, &[&str]); 23] = [
             "convert/sampled.rs",
             "source/scan.rs",
             "render/composite.rs",
+            "render/cut.rs",
+            "render/planes/",
             "render/slices/",
             "render/splat/accumulator.rs",
             "render/splat/band.rs",

@@ -57,6 +57,11 @@ impl TimeLabels {
         &self.times
     }
 
+    /// The unit of times, perhaps since when; empty if it is unknown.
+    pub fn unit(&self) -> &str {
+        &self.unit
+    }
+
     /// The date of a frame, such as `2016-02-03 00:00`: with seconds only if some frame has them, and without a time of day
     /// if all are at midnight. None if no date is known.
     pub fn date(&self, frame: usize) -> Option<String> {

@@ -46,7 +46,7 @@ pub(super) fn composite(
             Mode::Mip { .. } => {
                 Sliced { number, view, blend: Largest, config, progress }.render(scene, report, &mut sink)?;
             }
-            Mode::Projection => {}
+            Mode::Projection | Mode::Planes { .. } => {}
         }
     }
     Ok(())
@@ -70,7 +70,7 @@ fn needed(scene: &dyn Scene, config: &RenderConfig, view: &SlicedView, (frames, 
 }
 
 /// Bytes of a decoded block, with its samples in all frames, and its coefficients if these are inverted.
-fn block_bytes(scene: &dyn Scene, config: &RenderConfig, frames: usize) -> usize {
+pub(super) fn block_bytes(scene: &dyn Scene, config: &RenderConfig, frames: usize) -> usize {
     let voxels = scene.blocks().region(0).voxels();
     let coefficients = scene.most_planes(frames, config).saturating_sub(2 * frames + 1);
     let inverted = if coefficients > 0 { (coefficients + 2 * frames) * size_of::<f64>() } else { 0 };

@@ -70,6 +70,11 @@ pub enum Mode {
         /// Slices and cells per voxel, as in [`Self::Composite`].
         slices: Option<usize>,
     },
+    /// The interpolated samples on planes through the volume; near planes hide far ones.
+    Planes {
+        /// The planes, at least one.
+        planes: Vec<Plane>,
+    },
 }
 
 impl Mode {
@@ -77,7 +82,7 @@ impl Mode {
     pub fn pixel(&self) -> Pixel {
         match self {
             Self::Composite { .. } | Self::Iso { .. } => Pixel::Light,
-            Self::Projection | Self::Mip { .. } => Pixel::Value,
+            Self::Projection | Self::Mip { .. } | Self::Planes { .. } => Pixel::Value,
         }
     }
 
@@ -96,7 +101,7 @@ impl Mode {
         match self {
             Self::Composite { light, .. } => light.is_some(),
             Self::Iso { .. } => true,
-            Self::Projection | Self::Mip { .. } => false,
+            Self::Projection | Self::Mip { .. } | Self::Planes { .. } => false,
         }
     }
 
@@ -105,14 +110,14 @@ impl Mode {
         match self {
             Self::Composite { light, .. } => light.map_or(Ok(()), |light| light.check()),
             Self::Iso { surfaces, light, .. } => light.check().and_then(|()| check_surfaces(surfaces)),
-            Self::Projection | Self::Mip { .. } => Ok(()),
+            Self::Projection | Self::Mip { .. } | Self::Planes { .. } => Ok(()),
         }
     }
 
     /// The number of slices per voxel that the caller set.
     pub(super) fn slices(&self) -> Option<usize> {
         match self {
-            Self::Projection => None,
+            Self::Projection | Self::Planes { .. } => None,
             Self::Composite { slices, .. } | Self::Iso { slices, .. } | Self::Mip { slices } => *slices,
         }
     }
@@ -217,6 +222,25 @@ impl RenderConfig {
         ];
         let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));
         refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, setting)| Err(projects(setting)))
+    }
+}
+
+/// A plane across an axis of the lattice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plane {
+    /// The axis: 0 is x, 1 is y, 2 is z.
+    pub axis: usize,
+    /// Its place along the axis, in voxels: 0 is the first voxel, 0.5 is halfway to the second.
+    pub at: f64,
+}
+
+impl Plane {
+    /// Whether the plane lies within a region: from its first voxel to its last.
+    pub fn is_within(&self, region: &Region) -> bool {
+        self.axis < 3
+            && !region.is_empty()
+            && self.at >= region.start[self.axis] as f64
+            && self.at <= (region.end[self.axis] - 1) as f64
     }
 }
 

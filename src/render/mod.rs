@@ -24,11 +24,12 @@
 //! report            what a rendering did: counts, times and errors
 //! scenes/           a coefficient file or an archive's frames as a scene
 //! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
+//! planes/           planes through the volume: where rays meet them, and the samples there
 //! plan              how much fits in memory
 //! certificate       the error bound of a pixel; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
-//! project           the pictures of a batch as projections; composite: slice by slice
+//! project           the pictures of a batch as projections; composite: slice by slice; cut: planes through the volume
 //! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
 //! ```
 //!
@@ -59,6 +60,7 @@ mod scene;
 mod report;
 mod scenes;
 mod slices;
+pub mod planes;
 mod plan;
 mod certificate;
 mod weigh;
@@ -66,12 +68,13 @@ mod reconstruct;
 mod driver;
 mod project;
 mod composite;
+mod cut;
 pub mod annotate;
 pub mod sink;
 mod pictures;
 
 pub use crate::wavelet::{LANES, Lane};
-pub use config::{Limit, Mode, Pixel, Quantity, RenderConfig, default_splat_error, splat_method};
+pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use expectation::Expectation;
 pub use layout::{Layout, Order};
 pub use light::{Light, Surface};
@@ -88,6 +91,7 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use plan::Budget;
+use planes::PlanesView;
 use slices::SlicedView;
 use splat::ViewSetup;
 use splat::reference_weights::{with_backend, without_dim_voxels};
@@ -119,6 +123,7 @@ pub fn render(
     match &setups {
         Setups::Splatted(setups) => project::project(scene, config, setups, progress, &mut report, &mut sink)?,
         Setups::Sliced(views) => composite::composite(scene, config, views, progress, &mut report, &mut sink)?,
+        Setups::Planes(views) => cut::cut(scene, config, views, progress, &mut report, &mut sink)?,
     }
     progress.finish();
     report.sum_up_expected_errors();
@@ -148,6 +153,8 @@ enum Setups {
     Splatted(Vec<ViewSetup>),
     /// Of composites and maximum intensity projections.
     Sliced(Vec<SlicedView>),
+    /// Of planes through the volume.
+    Planes(Vec<PlanesView>),
 }
 
 impl Setups {
@@ -166,6 +173,13 @@ impl Setups {
             let what = "the samples are colours already, and colours are rendered as projections only";
             return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
         }
+        if let Mode::Planes { planes } = &config.mode {
+            let clip = config.clip(grid)?;
+            return views
+                .map(|view| PlanesView::new(grid, clip, planes, view))
+                .collect::<Result<_>>()
+                .map(Self::Planes);
+        }
         views.map(|view| SlicedView::new(grid, config, view)).collect::<Result<_>>().map(Self::Sliced)
     }
 
@@ -174,6 +188,7 @@ impl Setups {
         match self {
             Self::Splatted(setups) => Budget::least(config, scene, setups),
             Self::Sliced(views) => composite::least(scene, config, views),
+            Self::Planes(views) => cut::least(scene, config, views),
         }
     }
 
@@ -194,6 +209,7 @@ impl Setups {
                 };
                 views.zip(all).map(of).collect()
             }
+            Self::Planes(all) => views.zip(all).map(|(view, of)| ViewReport::of_planes(view, &of.camera)).collect(),
         }
     }
 }

@@ -161,6 +161,12 @@ impl ViewReport {
         Self { method: "slices", slices, cells, stated_splat_error: none, expected_error: none, ..of_camera }
     }
 
+    /// The report of planes through the volume.
+    pub(super) fn of_planes(view: &View, camera: &Camera) -> Self {
+        let none = f64::NAN;
+        Self { method: "planes", stated_splat_error: none, expected_error: none, ..Self::of(view, camera) }
+    }
+
     fn of(view: &View, camera: &Camera) -> Self {
         let &View { azimuth, elevation, roll, .. } = view;
         Self { azimuth, elevation, roll, scale: camera.scale, center: camera.beside(0.0), ..Self::default() }

@@ -106,6 +106,15 @@ impl Camera {
         [self.scale * along(self.right), -self.scale * along(self.up), along(self.forward)]
     }
 
+    /// The ray through a point of the picture: its world position at depth 0, and the unit vector along which depths
+    /// grow.
+    pub fn ray(&self, [x, y]: [f64; 2]) -> ([f64; 3], [f64; 3]) {
+        let right = (x - self.size[0] as f64 / 2.0) / self.scale;
+        let up = (self.size[1] as f64 / 2.0 - y) / self.scale;
+        let across = |a: usize| right * self.right[a] + up * self.up[a];
+        (std::array::from_fn(|a| self.center[a] + across(a) + self.nearest * self.forward[a]), self.forward)
+    }
+
     /// The depth of the farthest corner of `grid`, in world units.
     pub fn depth(&self, grid: &Grid) -> f64 {
         corners(grid).map(|p| self.project(p)[2]).fold(0.0, f64::max)
@@ -218,6 +227,17 @@ mod tests {
         let c = camera(0.0, 90.0);
         assert_eq!(c.project([1.0, 1.0, 0.0])[2], 2.0);
         assert_eq!(c.project([1.0, 0.0, 1.0])[1], 40.0, "the far side, -y, is up");
+    }
+
+    #[test]
+    fn a_ray_is_the_inverse_of_the_projection() {
+        let c = camera(37.0, -21.0);
+        for position in [[0.0, 1.0, 2.0], [-3.0, 0.5, 9.0]] {
+            let [x, y, depth] = c.project(position);
+            let (start, along) = c.ray([x, y]);
+            let found: [f64; 3] = std::array::from_fn(|a| start[a] + depth * along[a]);
+            assert!((0..3).all(|a| (found[a] - position[a]).abs() < 1e-12), "{found:?}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use wavesplat::render::{Light, Mode};
 /// Options for the samples along a ray.
 #[derive(Debug, Args)]
 pub(crate) struct AlongArgs {
-    /// How the samples along a ray make a pixel [default: iso with --iso, else projection]
+    /// How the samples along a ray make a pixel [default: iso with --iso, slice with --slice, else projection]
     #[arg(long, value_enum, help_heading = "Along the ray")]
     mode: Option<ModeName>,
     /// Colours and opacities of a composite: a colour map's name or a file. For a projection with --method direct,
@@ -53,6 +53,8 @@ pub(crate) enum ModeName {
     Mip,
     /// Show surfaces of equal value: see --iso, --light
     Iso,
+    /// Show the samples on planes through the volume: see --slice, --colormap
+    Slice,
 }
 
 impl ModeName {
@@ -62,6 +64,7 @@ impl ModeName {
             Self::Composite => "composite",
             Self::Mip => "mip",
             Self::Iso => "iso",
+            Self::Slice => "slice",
         }
     }
 
@@ -69,7 +72,7 @@ impl ModeName {
     pub(crate) fn colours_samples(self) -> bool {
         match self {
             Self::Composite | Self::Iso => true,
-            Self::Projection | Self::Mip => false,
+            Self::Projection | Self::Mip | Self::Slice => false,
         }
     }
 
@@ -86,7 +89,7 @@ impl ModeName {
     fn has_slices(self) -> bool {
         match self {
             Self::Composite | Self::Mip | Self::Iso => true,
-            Self::Projection => false,
+            Self::Projection | Self::Slice => false,
         }
     }
 
@@ -100,6 +103,7 @@ impl ModeName {
                  projections, and wavesplat convert --transfer-function makes files of colours"
             }
             Self::Mip => "--mode mip takes --colormap",
+            Self::Slice => "--slice takes --colormap",
         };
         Some(format!("--transfer-function: {why}"))
     }
@@ -112,6 +116,16 @@ impl ModeName {
 }
 
 impl AlongArgs {
+    /// The mode that was given.
+    pub(crate) fn given_mode(&self) -> Option<ModeName> {
+        self.mode
+    }
+
+    /// Sets the mode.
+    pub(crate) fn take_mode(&mut self, mode: ModeName) {
+        self.mode = Some(mode);
+    }
+
     /// The mode: as given, or the one that other options imply.
     pub(crate) fn mode_name(&self) -> ModeName {
         self.mode.unwrap_or(if self.iso.is_some() { ModeName::Iso } else { ModeName::Projection })
@@ -198,6 +212,7 @@ impl AlongArgs {
                 let surfaces = list.surfaces(needed(colours)?, self.transfer_function.is_some());
                 Mode::Iso { surfaces, light: self.lamp(), slices }
             }
+            ModeName::Slice => Mode::Planes { planes: Vec::new() },
         })
     }
 

@@ -2,6 +2,8 @@
 
 use crate::along::AlongArgs;
 use crate::colours::ColourArgs;
+use crate::cuts::CutArgs;
+use crate::probes::ProbeArgs;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use wavesplat::cli::{CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share};
@@ -24,6 +26,8 @@ Examples:
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
   wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
+  wavesplat-render run.wspl --slice x=0.5,z=0.25 --frames 10 -o slices.png
+  wavesplat-render run.wspl --probe 0.5,0.5,0.5 -o series.svg
   wavesplat-render frames/ --method direct -o frame_%04d.png",
     after_help = "\
 An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; with --colormap it \
@@ -43,14 +47,8 @@ pub(crate) struct Cli {
     #[arg(long, help_heading = "Output")]
     pub(crate) force: bool,
     /// Azimuth and elevation in degrees; repeat for more views. The views of one run share its reading, and need %v in
-    /// the file name
-    #[arg(
-        long = "view",
-        value_name = "AZ,EL",
-        default_value = "30,30",
-        allow_hyphen_values = true,
-        help_heading = "View"
-    )]
+    /// the file name [default: 30,30; one --slice is seen face-on]
+    #[arg(long = "view", value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "View")]
     pub(crate) views: Vec<Pair>,
     /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
     /// their scales
@@ -117,6 +115,10 @@ pub(crate) struct Cli {
     pub(crate) colour: ColourArgs,
     #[command(flatten)]
     pub(crate) along: AlongArgs,
+    #[command(flatten)]
+    pub(crate) cuts: CutArgs,
+    #[command(flatten)]
+    pub(crate) probes: ProbeArgs,
     /// Render from coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     pub(crate) method: MethodName,

@@ -1,5 +1,6 @@
 //! The colours of the pictures of a run.
 
+use crate::along::ModeName;
 use crate::args::{Cli, QuantityName};
 use crate::ranges::{self, Ranges};
 use crate::targets::Targets;
@@ -51,7 +52,7 @@ impl Cli {
         let in_colours = !pictures.format.is_of_numbers() || self.colour.is_asked();
         let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel, colours);
-        let is_clear = pixel == Pixel::Value && self.colour.finds_clear();
+        let is_clear = self.may_be_clear(pixel) && self.colour.finds_clear();
         let needed = (in_colours && (fixed.is_none() || is_clear), of_errors);
         let ranges = Ranges::small(scene, config, needed, &self.common)?;
         let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
@@ -62,10 +63,14 @@ impl Cli {
         self.report_ranges(range, &ranges, (needed.0 && fixed.is_none(), of_errors));
         let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
         let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
-        let clear =
-            if pixel == Pixel::Value && in_colours { self.colour.clear(&ranges, range, &self.common) } else { None };
-        let of_pictures = of_pictures.with_clear(clear);
+        let clear = (in_colours && self.may_be_clear(pixel)).then(|| self.colour.clear(&ranges, range, &self.common));
+        let of_pictures = of_pictures.with_clear(clear.flatten());
         Ok(Colouring { pixel, of_pictures, of_errors: of_errors_too, in_colours: (in_colours, of_errors), map })
+    }
+
+    /// Whether some values may show the background. Slices show them all.
+    fn may_be_clear(&self, pixel: Pixel) -> bool {
+        pixel == Pixel::Value && self.along.mode_name() != ModeName::Slice
     }
 
     fn report_ranges(&self, (lo, hi): (f64, f64), ranges: &Ranges, (of_pictures, of_errors): (bool, bool)) {

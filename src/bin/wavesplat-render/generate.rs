@@ -14,7 +14,10 @@ pub(crate) enum Program {
 impl Program {
     pub(crate) fn run(self) -> Result<()> {
         match self {
-            Self::Render(cli) => cli.run(),
+            Self::Render(mut cli) => {
+                cli.imply_mode()?;
+                cli.run()
+            }
             Self::Generate(what) => what.run(cli::command::<Self>()),
         }
     }

@@ -3,10 +3,14 @@
 
 mod along;
 mod args;
+mod chart;
 mod colouring;
 mod colours;
 mod config;
+mod cuts;
 mod generate;
+mod places;
+mod probes;
 mod provenance;
 mod ranges;
 mod report;
@@ -33,8 +37,13 @@ fn main() -> ExitCode {
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
-        let Opened { mut scene, file, exaggeration, annotation, colours } = self.scene()?;
+        if self.probes.is_asked() {
+            return self.probe();
+        }
+        let Opened { mut scene, file, exaggeration, annotation, colours, axes } = self.scene()?;
         let mut config = self.config(scene.as_ref(), file.as_deref(), colours.as_ref())?;
+        let (whole, lod) = file.as_ref().map_or((*scene.grid(), 0), |file| (file.whole_grid(), file.lod()));
+        self.set_planes(&mut config, &axes, (scene.grid(), &whole, lod))?;
         let targets = self.targets(&config)?;
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
@@ -42,6 +51,7 @@ impl Cli {
         let targets = (&targets.0, targets.1.as_ref());
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = Provenance {
+            slice: self.slice_texts(&axes)?,
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };

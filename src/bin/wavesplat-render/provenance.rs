@@ -99,7 +99,7 @@ fn of_transfer(
             light: Some([light.azimuth, light.elevation]),
             ..provenance
         },
-        Mode::Projection | Mode::Mip { .. } => provenance,
+        Mode::Projection | Mode::Mip { .. } | Mode::Planes { .. } => provenance,
     }
 }
 

@@ -72,14 +72,17 @@ fn robust_range(values: &[f32]) -> (f64, f64) {
 /// The settings of small pictures.
 fn small(config: &RenderConfig) -> RenderConfig {
     let mut small = config.clone();
+    small.certify = false;
+    if matches!(config.mode, Mode::Planes { .. }) {
+        return small; // planes are small already: their blocks are the work, and not their pixels
+    }
     for view in &mut small.views {
         let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
         view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
         view.scale = view.scale.map(|s| s * shrink);
     }
-    small.certify = false;
     small.mode = match config.mode {
-        Mode::Projection => Mode::Projection,
+        Mode::Projection | Mode::Planes { .. } => config.mode.clone(),
         // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
         // where they end.
         Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
@@ -126,6 +129,9 @@ fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, common: &Common
 
 /// The values of small pictures of an overview; none if the scene has none, or the volume is too small for one.
 fn values_of_overview(scene: &mut dyn Scene, small: &RenderConfig, common: &CommonArgs) -> Result<Option<Vec<f32>>> {
+    if matches!(small.mode, Mode::Planes { .. }) {
+        return Ok(None);
+    }
     let thinning = thinning(scene, small)?;
     if thinning.stride == 1 {
         return Ok(None);

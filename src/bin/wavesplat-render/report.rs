@@ -28,7 +28,10 @@ pub(crate) struct Reported<'a> {
 
 /// What the progress of pictures counts.
 pub(crate) fn unit(mode: &Mode) -> &'static str {
-    if mode.is_projection() { "pictures" } else { "slices" }
+    match mode {
+        Mode::Projection | Mode::Planes { .. } => "pictures",
+        Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => "slices",
+    }
 }
 
 impl Cli {

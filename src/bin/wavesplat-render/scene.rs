@@ -1,6 +1,7 @@
 //! The scene to render: a coefficient file, or frames.
 
 use crate::args::{Cli, Detail, Exaggeration, MethodName};
+use crate::places::Axes;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat::base::description::{coordinates, is_regular};
@@ -25,6 +26,8 @@ pub(crate) struct Opened {
     pub(crate) annotation: Annotation,
     /// The colours of samples, applied before splatting or along the ray.
     pub(crate) colours: Option<TransferFunction>,
+    /// The axes of all voxels.
+    pub(crate) axes: Axes,
 }
 
 impl Cli {
@@ -62,7 +65,8 @@ impl Cli {
         let annotation = Annotation { times: time_labels(file.metadata()) };
         let colours = self.along.of_file(self.colour.range, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), what));
-        Ok(Opened { scene, file: Some(file), exaggeration, annotation, colours })
+        let axes = Axes::of_file(&file)?;
+        Ok(Opened { scene, file: Some(file), exaggeration, annotation, colours, axes })
     }
 
     /// The factor by which heights are drawn taller, with a note if nobody asked for it.
@@ -118,13 +122,14 @@ impl Cli {
             None => None,
         };
         let grid = source.archive().grid;
+        let axes = Axes::new(&grid, source.archive().description.as_ref());
         let scene = match colours.clone().filter(|_| !self.along.mode_name().colours_samples()) {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };
         let exaggeration = self.exaggeration(&grid);
         let scene = Box::new(scene.with_grid(grid.exaggerated(exaggeration)));
-        Ok(Opened { scene, file: None, exaggeration, annotation, colours })
+        Ok(Opened { scene, file: None, exaggeration, annotation, colours, axes })
     }
 
     /// An error if an option or the input is not for frames.

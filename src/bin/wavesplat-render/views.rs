@@ -6,10 +6,15 @@ use wavesplat::base::grid::Grid;
 use wavesplat::render::annotate::colour_bar_width;
 use wavesplat::view::camera::{Camera, View};
 
+/// Azimuth and elevation of the view if none is given.
+const USUAL: [f64; 2] = [30.0, 30.0];
+
 impl Cli {
     /// All views, including those of orbits.
     pub(crate) fn views(&self, grid: &Grid) -> Result<Vec<View>> {
-        let orbits = self.views.iter().map(|first| self.orbit(first.0, grid));
+        let given: Vec<[f64; 2]> = self.views.iter().map(|view| view.0).collect();
+        let first = if given.is_empty() { vec![USUAL] } else { given };
+        let orbits = first.into_iter().map(|first| self.orbit(first, grid));
         Ok(orbits.collect::<Result<Vec<_>>>()?.concat())
     }
 

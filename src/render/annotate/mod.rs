@@ -5,6 +5,8 @@
 mod text;
 mod ticks;
 
+pub use ticks::round_values;
+
 use crate::base::decimal;
 use crate::base::time_labels::TimeLabels;
 use crate::colour::{Rgb, Scale};

@@ -9,11 +9,11 @@ pub(super) fn ticks(scale: &Scale, wanted: usize) -> Vec<f64> {
         return vec![lo];
     }
     let decades = if scale.norm() == Norm::Log { decades(lo, hi, wanted) } else { Vec::new() };
-    if decades.len() > 1 { decades } else { even(lo, hi, wanted) }
+    if decades.len() > 1 { decades } else { round_values(lo, hi, wanted) }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten.
-fn even(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
+/// About `wanted` multiples of 1, 2 or 5 times a power of ten between two numbers.
+pub fn round_values(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
     let least = (hi - lo) / wanted as f64;
     let power = exponent(least);
     let step =

@@ -16,6 +16,8 @@ pub struct Provenance {
     pub method: &'static str,
     /// How the values along a ray are combined.
     pub mode: &'static str,
+    /// The planes that are shown, at their true coordinates.
+    pub slice: Option<String>,
     /// The quantity that a pixel shows; projections only.
     pub quantity: Option<&'static str>,
     /// Whether the file shows the picture or the certified error of its pixels.

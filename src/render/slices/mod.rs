@@ -37,7 +37,7 @@
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
 
-mod units;
+pub(super) mod units;
 pub(super) mod table;
 mod taps;
 pub(super) mod view;
@@ -52,7 +52,7 @@ pub(super) mod mip;
 mod sweep;
 mod finish;
 mod probe;
-mod values;
+pub(super) mod values;
 mod needed;
 pub(super) mod batch;
 

@@ -8,7 +8,11 @@ use crate::render::scene::FrameBatch;
 use crate::wavelet::{LANES, Lane};
 
 /// The samples of a block in each frame, in the frame's units; NaN is missing.
-pub(super) fn samples(batch: &dyn FrameBatch, block: &dyn BlockPlanes, units: &[Units]) -> Result<Vec<Vec<f32>>> {
+pub(in crate::render) fn samples(
+    batch: &dyn FrameBatch,
+    block: &dyn BlockPlanes,
+    units: &[Units],
+) -> Result<Vec<Vec<f32>>> {
     let (layout, scratch) = (batch.layout(), &mut Scratch::default());
     let mut frames = Vec::with_capacity(units.len());
     if layout.coefficients > 0 {
