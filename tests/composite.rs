@@ -41,7 +41,7 @@ fn medium(value: f64) -> [f64; 4] {
 }
 
 fn composite(slices: Option<usize>) -> Mode {
-    Mode::Composite { transfer: transfer(), unit: Some(UNIT), slices, light: None }
+    Mode::Composite { transfer: transfer(), unit: Some(UNIT), slices, light: None, planes: Vec::new() }
 }
 
 fn seen(view: View, grid: &Grid, mode: Mode) -> RenderConfig {

@@ -55,6 +55,8 @@ pub enum Mode {
         slices: Option<usize>,
         /// The light that shades the colours; without, colours do not depend on direction.
         light: Option<Light>,
+        /// Opaque planes through the volume, in the colours of their samples.
+        planes: Vec<Plane>,
     },
     /// Surfaces where the field has some value, shaded. Near ones hide far ones by their opacity (eq 41, 42).
     Iso {
@@ -103,6 +105,11 @@ impl Mode {
             Self::Iso { .. } => true,
             Self::Projection | Self::Mip { .. } | Self::Planes { .. } => false,
         }
+    }
+
+    /// Whether planes are shown within a volume.
+    pub(super) fn has_planes(&self) -> bool {
+        matches!(self, Self::Composite { planes, .. } if !planes.is_empty())
     }
 
     /// An error if the mode's own settings cannot be used.

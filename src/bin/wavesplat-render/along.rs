@@ -204,7 +204,7 @@ impl AlongArgs {
                 };
                 let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
                 let light = (self.shade || self.light.is_some()).then(|| self.lamp());
-                Mode::Composite { transfer, unit: self.opacity_unit, slices, light }
+                Mode::Composite { transfer, unit: self.opacity_unit, slices, light, planes: Vec::new() }
             }
             ModeName::Mip => Mode::Mip { slices },
             ModeName::Iso => {

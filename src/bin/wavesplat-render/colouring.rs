@@ -2,6 +2,7 @@
 
 use crate::along::ModeName;
 use crate::args::{Cli, QuantityName};
+use crate::cuts::{planes_of, with_planes};
 use crate::ranges::{self, Ranges};
 use crate::targets::Targets;
 use serde::Serialize;
@@ -132,7 +133,8 @@ impl Cli {
         if self.along.suggests_opacities(&colours) {
             colours = self.suggested_opacities(scene, config, &colours)?;
         }
-        config.mode = self.along.mode(Some(&colours))?;
+        let planes = planes_of(&config.mode);
+        config.mode = with_planes(self.along.mode(Some(&colours))?, planes);
         Ok(Some(colours))
     }
 

@@ -24,8 +24,8 @@ fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
 /// A mode whose opacities apply over the largest spacing of all voxels, whatever the level of detail.
 fn of_whole(mode: Mode, whole: &Grid) -> Mode {
     match mode {
-        Mode::Composite { transfer, unit: None, slices, light } => {
-            Mode::Composite { transfer, unit: Some(whole.largest_spacing()), slices, light }
+        Mode::Composite { transfer, unit: None, slices, light, planes } => {
+            Mode::Composite { transfer, unit: Some(whole.largest_spacing()), slices, light, planes }
         }
         other => other,
     }

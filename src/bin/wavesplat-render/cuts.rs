@@ -14,7 +14,7 @@ use wavesplat::view::camera::{Camera, View};
 /// Options for slices.
 #[derive(Debug, Args)]
 pub(crate) struct CutArgs {
-    /// Show the samples on a plane across an axis; repeat it, or put commas between, for more planes. AXIS is x, y, z or
+    /// Show the samples on a plane across an axis, alone or within --mode composite; repeat it, or put commas between, for more planes. AXIS is x, y, z or
     /// the data's own name, like lat. PLACE is a share like 0.3 (with a point, 0.0 to 1.0) or 30%, a voxel like #12, or
     /// else a coordinate like 45, -500 or 120m; @0.3 is always a coordinate. One slice is seen face-on unless there is
     /// a --view
@@ -27,6 +27,25 @@ pub(crate) struct CutArgs {
         help_heading = "View"
     )]
     pub(crate) planes: Vec<SliceSpec>,
+}
+
+/// The planes of a mode.
+pub(crate) fn planes_of(mode: &Mode) -> Vec<Plane> {
+    match mode {
+        Mode::Composite { planes, .. } | Mode::Planes { planes } => planes.clone(),
+        Mode::Projection | Mode::Iso { .. } | Mode::Mip { .. } => Vec::new(),
+    }
+}
+
+/// A mode with other planes, if it takes some.
+pub(crate) fn with_planes(mode: Mode, planes: Vec<Plane>) -> Mode {
+    match mode {
+        Mode::Composite { transfer, unit, slices, light, .. } => {
+            Mode::Composite { transfer, unit, slices, light, planes }
+        }
+        Mode::Planes { .. } => Mode::Planes { planes },
+        other => other,
+    }
 }
 
 /// A plane across an axis.
@@ -57,7 +76,10 @@ impl Cli {
                 self.along.take_mode(ModeName::Slice);
                 Ok(())
             }
-            (false, Some(mode)) => Err(Error::usage(format!("{OPTION}: needs --mode slice, not {}", mode.name()))),
+            (false, Some(ModeName::Composite)) => Ok(()),
+            (false, Some(mode)) => {
+                Err(Error::usage(format!("{OPTION}: needs --mode slice or composite, not {}", mode.name())))
+            }
         }
     }
 
@@ -77,7 +99,7 @@ impl Cli {
         axes: &Axes,
         (grid, whole, lod): (&Grid, &Grid, u32),
     ) -> Result<()> {
-        if self.along.mode_name() != ModeName::Slice {
+        if self.cuts.planes.is_empty() {
             return Ok(());
         }
         if let Some(axis) = self.face(axes)? {
@@ -93,7 +115,7 @@ impl Cli {
             let at = axes.text(outside.axis, outside.at * f64::from(1_u32 << lod));
             return Err(Error::usage(format!("{OPTION}: {at} is outside of --region")));
         }
-        config.mode = Mode::Planes { planes };
+        config.mode = with_planes(config.mode.clone(), planes);
         Ok(())
     }
 
@@ -106,7 +128,9 @@ impl Cli {
     /// The axis of the only slice, if it is to be seen face-on.
     pub(crate) fn face(&self, axes: &Axes) -> Result<Option<usize>> {
         match self.cuts.planes.as_slice() {
-            [only] if self.views.is_empty() && self.orbit == 1 => axes.find(OPTION, &only.axis).map(Some),
+            [only] if self.views.is_empty() && self.orbit == 1 && self.along.mode_name() == ModeName::Slice => {
+                axes.find(OPTION, &only.axis).map(Some)
+            }
             _ => Ok(None),
         }
     }

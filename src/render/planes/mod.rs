@@ -7,9 +7,12 @@
 //! ```text
 //! hits    pure geometry: the nearest plane of a ray; the voxels around a place, and their weights
 //! view    the planes of a view, block by block
+//! batch   the pictures of a batch of frames
 //! ```
 
 mod hits;
 mod view;
+mod batch;
 
+pub(super) use batch::Cut;
 pub use hits::{Hit, PlanesView, Taps};

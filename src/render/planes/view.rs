@@ -58,6 +58,11 @@ impl PlanesView {
         })
     }
 
+    /// Bytes of the pictures of `frames` frames, and of their sums.
+    pub(in crate::render) fn bytes(&self, frames: usize) -> usize {
+        frames * self.camera.size.iter().product::<usize>() * (size_of::<f64>() + size_of::<f32>())
+    }
+
     /// Whether any pixel needs a voxel of a region.
     pub(in crate::render) fn needs(&self, region: &Region) -> bool {
         let [columns, mut rows] = self.pixels(region);

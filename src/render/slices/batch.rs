@@ -4,6 +4,7 @@ use super::layer::Layers;
 use super::needed::{Known, Need};
 use super::probe::Probe;
 use super::row::Blend;
+use super::stops::Stops;
 use super::sweep::{Band, Work};
 use super::units::Units;
 use super::values::samples;
@@ -22,6 +23,8 @@ pub(in crate::render) struct Batch<'a, B: Blend> {
     pub(in crate::render) number: usize,
     pub(in crate::render) view: &'a SlicedView,
     pub(in crate::render) blend: &'a B,
+    /// Where rays end early, if any does.
+    pub(in crate::render) stops: Option<&'a Stops>,
     pub(in crate::render) blocks: BlockGrid,
     pub(in crate::render) batch: &'a dyn FrameBatch,
     /// Blocks to decode at a time.
@@ -81,7 +84,8 @@ impl<B: Blend> Batch<'_, B> {
         let known = Known::new(self.view, self.blocks, self.batch.selection());
         let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks));
         let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
-        let mut probe = report.views[self.number].probed.is_none().then(|| Probe::new(self.view, self.blend));
+        let mut probe = (report.views[self.number].probed.is_none() && self.stops.is_none())
+            .then(|| Probe::new(self.view, self.blend));
         let mut next = 0;
         for layer in self.layers() {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
@@ -210,7 +214,9 @@ impl<B: Blend> Batch<'_, B> {
         chunks.enumerate().for_each(|(n, (groups, limits))| {
             let (work, rows) =
                 (Work::new(view, rows, self.blend.is_shaded()), n * rows..((n + 1) * rows).min(view.extent[1]));
-            let mut band = Band { view, blend: self.blend, rows, groups, limits, work };
+            let first = n * rows_of_band(view) * of_row;
+            let stops = self.stops.map_or(&[][..], |stops| stops.of(first..first + groups.len()));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, stops, work };
             slices.iter().for_each(|slice| band.add(slice, &frame.layers));
         });
     }

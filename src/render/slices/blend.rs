@@ -26,6 +26,7 @@ impl Blend for Composite {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is at least the largest transmittance of a group.
     const OPEN: f32 = GROUP as f32;
+    const OVER: f32 = 0.0;
     const LEAST: f32 = super::LEAST;
     const CENTRED: bool = false;
     const NUMBERS: usize = 4;

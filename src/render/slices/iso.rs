@@ -86,6 +86,7 @@ impl Blend for Isosurfaces {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is the largest transmittance of a group.
     const OPEN: f32 = 1.0;
+    const OVER: f32 = 0.0;
     const LEAST: f32 = 0.01;
     const CENTRED: bool = false;
     const NUMBERS: usize = 4;

@@ -32,6 +32,7 @@ impl Blend for Largest {
     const NOTHING: f32 = NONE;
     /// The limit is the least of a group's largest values.
     const OPEN: f32 = NONE;
+    const OVER: f32 = f32::INFINITY;
     /// A value that hardly any sample supports is not taken for the largest.
     const LEAST: f32 = 0.01;
     const CENTRED: bool = true;

@@ -41,6 +41,7 @@ pub(super) mod units;
 pub(super) mod table;
 mod taps;
 pub(super) mod view;
+pub(super) mod stops;
 mod bricks;
 pub(super) mod layer;
 mod filter;

@@ -1,8 +1,8 @@
 //! A row of cells in a slice: means and lengths, sixteen cells at a time, and the ways to combine the slices.
 
-use super::GROUP;
 use super::filter::{Sixteen, weighted_rows};
 use super::units::Units;
+use super::{GROUP, stops};
 
 /// Sums along a and b of a row of cells, from the first row of voxels on that the weights along c meet.
 #[derive(Clone, Copy)]
@@ -35,6 +35,8 @@ pub(in crate::render) struct Row<'a> {
     pub(super) live: &'a [bool],
     pub(super) whole: &'a [bool],
     pub(super) slice: u32,
+    /// The stops of each group; none if no ray ends early.
+    pub(super) stops: &'a [Sixteen],
 }
 
 /// Densities this close to 1 count as 1.
@@ -67,6 +69,12 @@ impl Row<'_> {
             let is_there = length >= self.least;
             means[i] = if is_there { means[i] / present[i] } else { 0.0 };
             lengths[i] = if is_there { length } else { 0.0 };
+        }
+        if let Some(stops) = self.stops.get(group) {
+            let shares = stops::shares(stops, self.slice);
+            for i in 0..GROUP {
+                lengths[i] *= shares[i];
+            }
         }
         (means, lengths)
     }
@@ -183,6 +191,9 @@ pub(in crate::render) trait Blend: Sync {
 
     /// Whether cells with this limit hide everything.
     fn is_closed(limit: f32) -> bool;
+
+    /// The limit of a group whose rays are over.
+    const OVER: f32;
 
     /// Adds the live groups of a row behind the slices before, and updates their limits.
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]);

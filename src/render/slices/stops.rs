@@ -35,7 +35,7 @@ impl Stops {
     }
 
     /// Bytes of the stops of a view.
-    pub(super) fn bytes(view: &SlicedView) -> usize {
+    pub(in crate::render) fn bytes(view: &SlicedView) -> usize {
         view.extent[0] * view.extent[1] * view.cells * view.cells * size_of::<f32>()
     }
 }

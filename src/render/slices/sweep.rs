@@ -1,9 +1,10 @@
 //! Adds slices to a band of the lattice: the kernel along a, then along b and c for each phase, then a blend.
 
 use super::bricks::Ranges;
-use super::filter::{Strip, mix, mix_present};
+use super::filter::{Sixteen, Strip, mix, mix_present};
 use super::layer::Layers;
 use super::row::{Blend, Row, RowSums};
+use super::stops::are_over;
 use super::taps::Taps;
 use super::view::{Slice, SlicedView};
 use super::{BRICK_ROWS, GROUP, LEAST};
@@ -18,6 +19,8 @@ pub(super) struct Band<'a, B: Blend> {
     /// Groups of cells and their limits: row by row, phase by phase.
     pub(super) groups: &'a mut [B::Group],
     pub(super) limits: &'a mut [f32],
+    /// The stops of these groups; none if no ray ends early.
+    pub(super) stops: &'a [Sixteen],
     pub(super) work: Work,
 }
 
@@ -228,8 +231,11 @@ impl<B: Blend> Band<'_, B> {
                     let (groups, limits) = (&mut self.groups[at..at + count], &mut self.limits[at..at + count]);
                     if visible[down].live::<B>(phase, limits, &mut live) {
                         let sums = &self.work.along_b[phase];
-                        let row = Row { least: B::LEAST, ..meets.row((view, part), sums, (across, &live)) };
+                        let stops = self.stops.get(at..at + count).unwrap_or_default();
+                        let row = Row { least: B::LEAST, stops, ..meets.row((view, part), sums, (across, &live)) };
                         self.blend.add(&row, groups, limits);
+                        let over = limits.iter_mut().zip(stops).filter(|(_, stops)| are_over(stops, row.slice));
+                        over.for_each(|(limit, _)| *limit = B::OVER);
                     }
                 }
             }
@@ -325,6 +331,7 @@ impl<'a> Down<'a> {
             live,
             whole: &across.whole,
             slice: part.slice.number,
+            stops: &[],
         }
     }
 }

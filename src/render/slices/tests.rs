@@ -5,7 +5,7 @@ use crate::base::grid::{Grid, Region};
 use crate::base::progress::Silent;
 use crate::base::sample::{SampleType, store};
 use crate::colour::TransferFunction;
-use crate::render::{FrameScene, Light, Mode, RenderConfig, RenderReport, Rendered, Surface, render};
+use crate::render::{FrameScene, Light, Mode, Plane, RenderConfig, RenderReport, Rendered, Surface, render};
 use crate::source::ArraySource;
 use crate::view::camera::{Camera, View};
 
@@ -49,7 +49,7 @@ fn transfer() -> TransferFunction {
 }
 
 fn composite(slices: Option<usize>) -> Mode {
-    Mode::Composite { transfer: transfer(), unit: None, slices, light: None }
+    Mode::Composite { transfer: transfer(), unit: None, slices, light: None, planes: Vec::new() }
 }
 
 impl Case {
@@ -213,7 +213,8 @@ fn offsets_of_a_million_change_nothing_but_the_last_digits() {
     let plain = case.picture(composite(None));
     let far = Case { values: case.values.iter().map(|v| v + 1e6).collect(), ..case.clone() };
     let over = transfer().over((1e6 + 0.1, 1e6 + 1.0)).expect("a range");
-    let moved = far.picture(Mode::Composite { transfer: over, unit: None, slices: None, light: None });
+    let moved =
+        far.picture(Mode::Composite { transfer: over, unit: None, slices: None, light: None, planes: Vec::new() });
     let off: Vec<f64> = plain.iter().zip(&moved).map(|(a, b)| f64::from((a - b).abs())).collect();
     assert!(errors(&off).1 < 1e-5, "{:?}", errors(&off));
     let [near, far] = [&case, &far].map(|case| case.picture(Mode::Mip { slices: None }));
@@ -267,7 +268,8 @@ fn probed_rays_tell_the_errors_of_the_picture() {
 fn report_of_a_step() -> f64 {
     let case = case([5, 4, 3], view(30.0, 25.0, 0.0));
     let step = transfer().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
-    let (_, report) = case.rendered(Mode::Composite { transfer: step, unit: None, slices: None, light: None });
+    let (_, report) =
+        case.rendered(Mode::Composite { transfer: step, unit: None, slices: None, light: None, planes: Vec::new() });
     report.views[0].table_error.expect("a table")
 }
 
@@ -370,7 +372,13 @@ fn shaded_composites_are_those_of_brute_force() {
             }
             [light[0].min(1.0), light[1].min(1.0), light[2].min(1.0), 1.0 - through]
         };
-        let mode = Mode::Composite { transfer: transfer.clone(), unit: None, slices: Some(3), light: Some(LAMP) };
+        let mode = Mode::Composite {
+            transfer: transfer.clone(),
+            unit: None,
+            slices: Some(3),
+            light: Some(LAMP),
+            planes: Vec::new(),
+        };
         let (found, report) = case.rendered(mode);
         let expected: Vec<f64> = (0..22 * 20).flat_map(pixel).collect();
         let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
@@ -424,6 +432,65 @@ fn isosurfaces_are_those_of_brute_force() {
     }
 }
 
+/// Rays end at planes, which have the colours of interpolated samples.
+#[test]
+fn planes_in_composites_are_those_of_brute_force() {
+    const STEP: f64 = 1.0 / 16.0;
+    let planes = vec![Plane { axis: 0, at: 6.0 }, Plane { axis: 2, at: 3.5 }];
+    for (n, view) in views().into_iter().enumerate().filter(|(n, _)| n % 3 == 0) {
+        let case = case([12, 11, 9], View { size: [24, 22], ..view });
+        let (world, transfer, grid) = (World::new(&case), transfer(), &case.grid);
+        let voxel = |at: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| (at[i] - grid.origin[i]) / grid.spacing[i]) };
+        let value = |at: [f64; 3]| {
+            let near = |[x, y, z]: [usize; 3]| {
+                (1.0 - (at[0] - x as f64).abs()).max(0.0)
+                    * (1.0 - (at[1] - y as f64).abs()).max(0.0)
+                    * (1.0 - (at[2] - z as f64).abs()).max(0.0)
+            };
+            grid.whole().iter().zip(&case.values).map(|(voxel, value)| near(voxel) * value).sum::<f64>()
+        };
+        let pixel = |pixel: usize| {
+            let (mut light, mut through, mut before) = ([0.0; 3], 1.0, None::<[f64; 3]>);
+            for at in world.ray(pixel, STEP) {
+                let now = voxel(at);
+                let crosses =
+                    |plane: &&Plane| before.is_some_and(|b| (b[plane.axis] < plane.at) != (now[plane.axis] < plane.at));
+                let inside = (0..3).all(|a| now[a] > 0.0 && now[a] < (grid.dims[a] - 1) as f64);
+                if let Some(plane) = planes.iter().find(crosses).filter(|_| inside) {
+                    let mut place = now;
+                    place[plane.axis] = plane.at;
+                    let colour = transfer.colour(value(place)).expect("a colour");
+                    (0..3).for_each(|c| light[c] += through * colour[c]);
+                    return [light[0], light[1], light[2], 1.0];
+                }
+                let (density, mean) = world.field(at);
+                if density > 1e-3 {
+                    let passed = (1.0 - transfer.opacity(mean)).powf(density * STEP);
+                    let colour = transfer.colour(mean).expect("a colour");
+                    (0..3).for_each(|c| light[c] += through * (1.0 - passed) * colour[c]);
+                    through *= passed;
+                }
+                before = Some(now);
+            }
+            [light[0], light[1], light[2], 1.0 - through]
+        };
+        let mode = Mode::Composite {
+            transfer: transfer.clone(),
+            unit: None,
+            slices: Some(3),
+            light: None,
+            planes: planes.clone(),
+        };
+        let found = case.picture(mode);
+        let expected: Vec<f64> = (0..24 * 22).flat_map(pixel).collect();
+        let mut off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
+        off.sort_by(f64::total_cmp);
+        let of_share = |share: f64| off[(share * off.len() as f64) as usize];
+        assert!(expected.chunks(4).filter(|p| p[3] == 1.0).count() > 24 * 22 / 8, "view {n} shows planes");
+        assert!(of_share(0.5) < 2e-3 && of_share(0.85) < 2e-2, "view {n}: {:e}, {:e}", of_share(0.5), of_share(0.85));
+    }
+}
+
 /// A surface is drawn wherever blocks and bricks begin, and whatever is skipped.
 #[test]
 fn isosurfaces_have_no_holes() {
@@ -457,7 +524,8 @@ fn isosurfaces_have_no_holes() {
 fn threads_change_no_bit_of_a_composite() {
     let mut case = case([40, 47, 13], view(75.0, 15.0, 20.0));
     case.values[1000..1100].fill(f64::NAN);
-    let shaded = Mode::Composite { transfer: transfer(), unit: None, slices: None, light: Some(LAMP) };
+    let shaded =
+        Mode::Composite { transfer: transfer(), unit: None, slices: None, light: Some(LAMP), planes: Vec::new() };
     let surface = Surface { value: 0.5, colour: [1.0; 3], opacity: 0.5 };
     let iso = Mode::Iso { surfaces: vec![surface], light: LAMP, slices: None };
     for mode in [composite(None), Mode::Mip { slices: None }, shaded, iso] {

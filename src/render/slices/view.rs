@@ -175,6 +175,24 @@ impl SlicedView {
         [0, 1].map(|i| (at[i] - self.corner[i] as f64) * self.cells as f64)
     }
 
+    /// The point of the picture that the ray of a cell goes through. Cells are counted from the first one.
+    pub(super) fn pixel_of(&self, cell: [usize; 2]) -> [f64; 2] {
+        let at = [0, 1].map(|i| self.corner[i] as f64 + cell[i] as f64 / self.cells as f64);
+        self.shear.pixel(at)
+    }
+
+    /// The position along a of a place in voxels along x, y, z.
+    pub(in crate::render) fn along(&self, place: [f64; 3]) -> f64 {
+        place[self.shear.axes[2]]
+    }
+
+    /// The number of slices that a ray crosses before it comes to voxel `at` along a.
+    pub(super) fn slices_before(&self, at: f64) -> f64 {
+        let last = (self.start[2] + self.count[2] - 1) as f64;
+        let met = if self.reversed { last - at } else { at - self.start[2] as f64 };
+        (met + self.reach[2] as f64) * self.fineness as f64
+    }
+
     /// Number of slices.
     pub(in crate::render) fn slices(&self) -> usize {
         (self.count[2] - 1 + 2 * self.reach[2]) * self.fineness

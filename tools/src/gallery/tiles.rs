@@ -97,7 +97,7 @@ impl SampleStyle {
         let points = self.samples.opacities(self.range, self.path);
         let transfer = self.colours()?.with_opacity(&points).map_err(Error::usage)?;
         let (map, light) = (transfer.clone(), Some(Light::default()));
-        let mode = Mode::Composite { transfer, unit: None, slices: None, light };
+        let mode = Mode::Composite { transfer, unit: None, slices: None, light, planes: Vec::new() };
         Ok(Tile { label: "--mode composite --opacity auto --shade".into(), mode, map, norm: Norm::Linear })
     }
 
@@ -132,7 +132,7 @@ impl SampleStyle {
         let transfer = self.colours()?.with_opacity(&points.0).map_err(Error::usage)?;
         let unit = share * self.thickness;
         let options = format!("--mode composite --opacity-unit {} --opacity {opacity}", short(unit));
-        let mode = Mode::Composite { transfer, unit: Some(unit), slices: None, light: None };
+        let mode = Mode::Composite { transfer, unit: Some(unit), slices: None, light: None, planes: Vec::new() };
         Ok(Tile { label: options, mode, map: self.colours()?, norm: Norm::Linear })
     }
 }

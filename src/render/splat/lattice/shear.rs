@@ -64,7 +64,7 @@ impl Shear {
     }
 
     /// Converts a position in cells to pixels.
-    pub(super) fn pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(in crate::render) fn pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [b, c] = [u, v].map(|cells| cells / self.fineness as f64);
         std::array::from_fn(|i| self.origin[i] + b * self.pixels[0][i] + c * self.pixels[1][i])
     }
