@@ -46,7 +46,8 @@ impl Row<'_> {
     /// Whether the means of a group are plain sums.
     #[inline(always)]
     pub(super) fn is_whole(&self, group: usize) -> bool {
-        self.sums.present.is_none()
+        self.stops.is_empty()
+            && self.sums.present.is_none()
             && self.whole[group]
             && self.share > 1.0 - 1e-6
             && (self.density - 1.0).abs() < WHOLE
