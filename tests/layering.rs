@@ -58,7 +58,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 23] = [
     ("exr::", &["render/sink/"]),
     ("colorous::", &["colour/named.rs"]),
     ("csv::", &["colour/table.rs"]),
-    ("spleen_font::", &["render/annotate/"]),
+    ("ab_glyph::", &["render/annotate/"]),
     ("quick_xml::", &["source/formats/", "extract/vti.rs", "extract/vtr.rs", "extract/field_data.rs"]),
     ("flate2::", &["source/formats/", "extract/sink.rs"]),
     ("tiff::", &["source/formats/tif/"]),

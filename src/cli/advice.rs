@@ -112,6 +112,8 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
             "slices",
             "splat-error",
             "tau",
+            "theme",
+            "title",
             "view",
         ],
     ),

@@ -153,6 +153,16 @@ impl Scale {
         }
     }
 
+    /// How far a pixel hides the background, 0 to 1.
+    pub(crate) fn opacity_of_pixel(&self, numbers: &[f32]) -> f64 {
+        match *numbers {
+            _ if numbers.iter().any(|n| n.is_nan()) => 0.0,
+            [value] => self.clear.map_or(1.0, |clear| clear.presence(f64::from(value))),
+            [.., opacity] if numbers.len() == 4 => f64::from(opacity),
+            _ => 1.0,
+        }
+    }
+
     /// The colour of light with this opacity in front of the background.
     fn over_background(&self, light: [f32; 3], opacity: f32) -> Colour {
         let behind = f64::from(1.0 - opacity) / 255.0;

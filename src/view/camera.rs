@@ -125,6 +125,11 @@ impl Camera {
         std::array::from_fn(|axis| self.center[axis] + length * self.right[axis])
     }
 
+    /// The world point `right` and `up` world units from the point in the middle of the picture.
+    pub fn moved(&self, right: f64, up: f64) -> [f64; 3] {
+        std::array::from_fn(|axis| self.center[axis] + right * self.right[axis] + up * self.up[axis])
+    }
+
     /// The direction to a point `azimuth` degrees to the right of the viewer and `elevation` degrees above.
     pub(crate) fn towards(&self, azimuth: f64, elevation: f64) -> [f64; 3] {
         let ((sin_a, cos_a), (sin_e, cos_e)) = (sin_cos_degrees(azimuth), sin_cos_degrees(elevation));

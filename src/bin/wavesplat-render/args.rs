@@ -1,6 +1,7 @@
 //! The arguments of `wavesplat-render`.
 
 use crate::along::AlongArgs;
+use crate::annotations::AnnotationArgs;
 use crate::colours::ColourArgs;
 use crate::cuts::CutArgs;
 use crate::probes::ProbeArgs;
@@ -113,6 +114,8 @@ pub(crate) struct Cli {
     pub(crate) quantity: QuantityName,
     #[command(flatten)]
     pub(crate) colour: ColourArgs,
+    #[command(flatten)]
+    pub(crate) around: AnnotationArgs,
     #[command(flatten)]
     pub(crate) along: AlongArgs,
     #[command(flatten)]

@@ -7,7 +7,7 @@ use crate::ranges::{self, Ranges};
 use crate::targets::Targets;
 use serde::Serialize;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::colour::{Norm, Scale, TransferFunction};
+use wavesplat::colour::{Norm, Rgb, Scale, TransferFunction};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::sink::PictureFormat;
 use wavesplat::render::{Mode, Pixel, RenderConfig, Scene};
@@ -62,7 +62,7 @@ impl Cli {
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
         self.report_ranges(range, &ranges, (needed.0 && fixed.is_none(), of_errors));
-        let scale = |range, norm| Scale::new(&map, range, norm, self.colour.background);
+        let scale = |range, norm| Scale::new(&map, range, norm, self.background());
         let (of_pictures, of_errors_too) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
         let clear = (in_colours && self.may_be_clear(pixel)).then(|| self.colour.clear(&ranges, range, &self.common));
         let of_pictures = of_pictures.with_clear(clear.flatten());
@@ -72,6 +72,11 @@ impl Cli {
     /// Whether some values may show the background. Slices show them all.
     fn may_be_clear(&self, pixel: Pixel) -> bool {
         pixel == Pixel::Value && self.along.mode_name() != ModeName::Slice
+    }
+
+    /// The background: as given, or that of the theme.
+    fn background(&self) -> Rgb {
+        self.colour.background.unwrap_or_else(|| self.around.background())
     }
 
     fn report_ranges(&self, (lo, hi): (f64, f64), ranges: &Ranges, (of_pictures, of_errors): (bool, bool)) {

@@ -26,12 +26,9 @@ pub(crate) struct ColourArgs {
     /// value, or 0, if many pixels of small pictures are near it
     #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     clear: ClearSpec,
-    /// Draw a colour bar and the time of each frame into the pictures
-    #[arg(long, help_heading = "Colour")]
-    pub(crate) annotate: bool,
-    /// Background colour, like ffffff
-    #[arg(long, value_name = "RRGGBB", default_value = "000000", value_parser = parse_colour, help_heading = "Colour")]
-    pub(crate) background: Rgb,
+    /// Background colour, like ffffff [default: that of the theme]
+    #[arg(long, value_name = "RRGGBB", value_parser = parse_colour, help_heading = "Colour")]
+    pub(crate) background: Option<Rgb>,
 }
 
 /// Which values show the background.
@@ -102,7 +99,7 @@ impl ColourArgs {
     }
 
     /// An error if a format cannot hold colours or annotations.
-    pub(crate) fn check(&self, format: PictureFormat) -> Result<()> {
+    pub(crate) fn check(&self, format: PictureFormat, annotates: bool) -> Result<()> {
         if format == PictureFormat::Exr && self.is_asked() {
             return Err(Error::usage("--colormap: an .exr holds numbers, not colours; take png with --depth 16"));
         }
@@ -114,7 +111,7 @@ impl ColourArgs {
             }
             _ => return Ok(()),
         };
-        if self.annotate { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
+        if annotates { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
     }
 
     /// An error if colour options are given for samples that are colours.

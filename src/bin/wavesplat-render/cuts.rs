@@ -1,15 +1,16 @@
 //! Slices: planes through the volume.
 
 use crate::along::ModeName;
+use crate::annotations::AnnotationArgs;
 use crate::args::Cli;
 use crate::places::{Axes, Place};
 use clap::Args;
 use std::str::FromStr;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
-use wavesplat::render::annotate::colour_bar_width;
+use wavesplat::render::annotate::Margins;
 use wavesplat::render::{Mode, Plane, RenderConfig};
-use wavesplat::view::camera::{Camera, View};
+use wavesplat::view::camera::View;
 
 /// Options for slices.
 #[derive(Debug, Args)]
@@ -144,11 +145,11 @@ impl Cli {
         if self.scale.is_some() || center.is_some() || self.roll != 0.0 {
             return Ok(view);
         }
-        let margin = if self.colour.annotate { colour_bar_width(size) } else { 0 };
-        let [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
+        let around @ Margins { left, right, top, bottom } = self.around.margins(size);
+        let [across, up] = [[1, 2], [0, 2], [0, 1]][axis];
         let fit = |pixels: usize, along: usize| pixels as f64 / (grid.dims[along] as f64 * grid.spacing[along]);
-        let scale = Some(fit(size[0] - margin, right).min(fit(size[1], up)));
-        let camera = Camera::new(&View { scale, ..view }, grid)?;
-        Ok(View { scale, center: Some(camera.beside(margin as f64 / 2.0 * camera.scale.recip())), ..view })
+        let scale = fit(size[0] - left - right, across).min(fit(size[1] - top - bottom, up));
+        let views = AnnotationArgs::beside(vec![View { scale: Some(scale), ..view }], grid, around)?;
+        Ok(views.into_iter().next().unwrap_or(view))
     }
 }

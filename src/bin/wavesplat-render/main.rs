@@ -2,6 +2,7 @@
 #![allow(missing_docs)] // clap takes an option's comment as its help
 
 mod along;
+mod annotations;
 mod args;
 mod chart;
 mod colouring;
@@ -27,6 +28,7 @@ use scene::Opened;
 use std::process::ExitCode;
 use wavesplat::base::error::Result;
 use wavesplat::cli;
+use wavesplat::render::annotate::Annotation;
 use wavesplat::render::render;
 use wavesplat::render::sink::Provenance;
 
@@ -55,6 +57,7 @@ impl Cli {
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };
+        let annotation = Annotation { axes: Some(self.volume_axes(&axes, &whole)?), ..annotation };
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let progress = self.common.progress("render", unit(&config.mode));
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;

@@ -5,6 +5,7 @@ use wavesplat::base::description::{Attribute, Description, Values, coordinates};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::file::CoefficientFile;
+use wavesplat::render::annotate::AxisLabels;
 
 /// A place along an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +101,15 @@ impl Axes {
     /// A place along an axis, in voxels.
     pub(crate) fn voxel(&self, option: &str, axis: usize, place: &Place) -> Result<f64> {
         self.0[axis].voxel(place).map_err(|what| Error::usage(format!("{option}: {what}")))
+    }
+
+    /// Names, units and coordinates.
+    pub(crate) fn labels(&self) -> [AxisLabels; 3] {
+        self.0.each_ref().map(|axis| AxisLabels {
+            name: axis.names[0].clone(),
+            unit: axis.unit.clone(),
+            at: axis.at.clone(),
+        })
     }
 
     /// A place in voxels as the options accept it: `depth=120m`.

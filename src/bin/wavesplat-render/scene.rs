@@ -1,5 +1,6 @@
 //! The scene to render: a coefficient file, or frames.
 
+use crate::annotations::values_of;
 use crate::args::{Cli, Detail, Exaggeration, MethodName};
 use crate::places::Axes;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,7 @@ impl Cli {
             MethodName::Coefficients => SplatSource::Coefficients,
             MethodName::Direct => SplatSource::Samples,
         };
-        let annotation = Annotation { times: time_labels(file.metadata()) };
+        let annotation = self.annotation(values_of(&file)?, time_labels(file.metadata()));
         let colours = self.along.of_file(self.colour.range, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), what));
         let axes = Axes::of_file(&file)?;
@@ -111,7 +112,7 @@ impl Cli {
         self.refuse_for_frames()?;
         self.along.check(true, self.colour.is_asked())?;
         let mut source = self.input.open(&self.inputs, &self.common)?;
-        let annotation = Annotation { times: source.archive().time_labels() };
+        let annotation = self.annotation(String::new(), source.archive().time_labels());
         let missing_value = source.archive().missing_value(self.missing_value);
         let colours = match self.along.colours() {
             Some(name) => {

@@ -61,7 +61,7 @@ impl Cli {
             refuse_video(&self.inputs, &self.output)?;
         }
         let pictures = Targets::new(&self.output, self.format, config)?;
-        self.colour.check(pictures.format)?;
+        self.colour.check(pictures.format, self.around.is_asked())?;
         let errors = self.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
         if self.error_image.as_deref() == Some(Path::new(STANDARD)) {
             return Err(Error::usage("--error-image: needs a file, not standard output"));

@@ -1,22 +1,53 @@
-//! Annotations drawn into pictures: a colour bar with its values, and the time of the frame.
+//! Annotations drawn into pictures: the box of the volume, values along its edges, a colour bar, and the time of the frame.
 //!
-//! A part that does not fit is left out.
+//! The box lies behind the picture; everything else lies in the margins that [`margins`] gives. A part that does not fit
+//! is left out.
 
 mod text;
 mod ticks;
+mod canvas;
+mod layout;
+mod volume;
 
+pub use layout::{Margins, Parts, margins};
 pub use ticks::round_values;
+pub use volume::{AxisLabels, VolumeAxes};
 
-use crate::base::decimal;
 use crate::base::time_labels::TimeLabels;
 use crate::colour::{Rgb, Scale};
+use crate::render::ViewReport;
+use crate::view::camera::{Camera, View};
+use canvas::{Canvas, contrast, over};
+use layout::{BAR, has_axes, has_bar, line};
 use text::Letters;
 
 /// The annotations of a run's pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Annotation {
+    /// The parts that are drawn.
+    pub parts: Parts,
+    /// A title above the volume, or empty.
+    pub title: String,
+    /// Name and unit of the values, beside the colour bar; or empty.
+    pub values: String,
     /// The times of frames. Frames without a time show their number.
     pub times: TimeLabels,
+    /// The axes of the volume, for its box and the values along it.
+    pub axes: Option<VolumeAxes>,
+}
+
+/// A finished picture, in which annotations are drawn.
+pub(crate) struct Finished<'a> {
+    pub(crate) pixels: &'a mut [Rgb],
+    /// Width and height in pixels.
+    pub(crate) size: [usize; 2],
+    pub(crate) background: Rgb,
+    pub(crate) frame: usize,
+    pub(crate) view: Option<&'a ViewReport>,
+    /// The colours of values, for a colour bar.
+    pub(crate) scale: Option<&'a Scale>,
+    /// How opaque each pixel is, 0 to 1.
+    pub(crate) opacity: &'a dyn Fn(usize) -> f64,
 }
 
 impl Annotation {
@@ -32,120 +63,119 @@ impl Annotation {
         }
     }
 
-    /// Draws the time of `frame` at the top left and, if a `scale` is given, a colour bar at the right edge. A row has
-    /// `width` pixels.
-    pub(crate) fn draw(&self, pixels: &mut [Rgb], width: usize, frame: usize, background: Rgb, scale: Option<&Scale>) {
-        let mut sheet = Sheet::new(pixels, width, background);
-        let below = sheet.stamp(&self.stamps(frame));
-        if let Some(scale) = scale {
-            sheet.bar(scale, below);
+    /// Draws all parts.
+    pub(crate) fn draw(&self, picture: Finished<'_>) {
+        let Finished { pixels, size, background, frame, view, scale, opacity } = picture;
+        let ink = contrast(background);
+        let mut canvas = Canvas { pixels, width: size[0], ink, letters: Letters::new(line(size)) };
+        let drawn = self.axes.as_ref().and_then(|axes| Some((axes, camera(axes, size, view?)?)));
+        if let Some((axes, camera)) = &drawn {
+            self.draw_volume(&mut canvas, (axes, camera), opacity);
         }
-    }
-}
-
-/// Width in pixels of the colour bar and its values, at the right edge of a picture of this size; 0 if they do not fit.
-pub fn colour_bar_width([width, height]: [usize; 2]) -> usize {
-    const LETTERS: usize = 12;
-    let bar = LETTERS * Letters::for_side(width.min(height)).width;
-    if 2 * bar <= width { bar } else { 0 }
-}
-
-/// A picture to draw on.
-struct Sheet<'a> {
-    pixels: &'a mut [Rgb],
-    width: usize,
-    height: usize,
-    letters: Letters,
-    /// Distance of the parts from the picture's edges and from each other.
-    margin: usize,
-    /// Colour of text, in contrast to the background.
-    ink: Rgb,
-    /// Colour around the ink, in contrast to the ink.
-    rim: Rgb,
-}
-
-impl<'a> Sheet<'a> {
-    fn new(pixels: &'a mut [Rgb], width: usize, background: Rgb) -> Self {
-        let height = pixels.len() / width.max(1);
-        let letters = Letters::for_side(width.min(height));
-        let [r, g, b] = background.map(f64::from);
-        let bright = 0.299 * r + 0.587 * g + 0.114 * b > 127.5;
-        let (ink, rim) = if bright { ([0; 3], [255; 3]) } else { ([255; 3], [0; 3]) };
-        Self { pixels, width, height, margin: letters.width, letters, ink, rim }
-    }
-
-    fn set(&mut self, x: usize, y: usize, colour: Rgb) {
-        if x < self.width && y < self.height {
-            self.pixels[y * self.width + x] = colour;
+        self.draw_texts(&mut canvas, frame);
+        if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
+            self.draw_bar(&mut canvas, scale);
         }
     }
 
-    fn rectangle(&mut self, x: usize, y: usize, [width, height]: [usize; 2], colour: Rgb) {
-        (y..y + height).for_each(|y| (x..x + width).for_each(|x| self.set(x, y, colour)));
-    }
-
-    /// Writes text with a rim around each letter, so that it is legible over any picture.
-    fn write(&mut self, text: &str, x: usize, y: usize) {
-        let inked = self.letters.pixels(text);
-        for [u, v] in &inked {
-            self.rectangle((x + u).saturating_sub(1), (y + v).saturating_sub(1), [3, 3], self.rim);
+    /// The box behind the picture, and the axes beside it.
+    fn draw_volume(
+        &self,
+        canvas: &mut Canvas<'_>,
+        (axes, camera): (&VolumeAxes, &Camera),
+        opacity: &dyn Fn(usize) -> f64,
+    ) {
+        if self.parts.bounds {
+            let (size, ink, width) = (canvas.letters.size, canvas.ink, canvas.width);
+            let mut shares = vec![0.0_f64; canvas.pixels.len()];
+            axes.draw_box(camera, size, |x, y, share| {
+                let at = y as usize * width + x as usize;
+                shares[at] = shares[at].max(share);
+            });
+            for (at, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+                canvas.pixels[at] = over(canvas.pixels[at], ink, BOX * share * (1.0 - opacity(at)));
+            }
         }
-        for [u, v] in inked {
-            self.set(x + u, y + v, self.ink);
+        if self.parts.axes && has_axes(camera.size) {
+            axes.draw_axes(canvas, camera);
+        }
+        if self.parts.triad && has_axes(camera.size) {
+            axes.draw_triad(canvas, camera);
         }
     }
 
-    /// Writes the first of `texts` that fits at the top left. Returns the first free row below.
-    fn stamp(&mut self, texts: &[String]) -> usize {
-        let Self { margin, letters, .. } = *self;
-        let fits = |text: &&String| margin + letters.width * text.len() <= self.width;
-        let Some(text) = texts.iter().find(fits).filter(|_| margin + letters.height <= self.height) else {
-            return margin;
-        };
-        self.write(text, margin, margin / 2);
-        margin + letters.height
+    /// The title at the top, and the time at the top left.
+    fn draw_texts(&self, canvas: &mut Canvas<'_>, frame: usize) {
+        let (size, width) = (canvas.letters.size, canvas.size()[0]);
+        let left = |canvas: &Canvas<'_>, text: &str| [0.6 * size + canvas.letters.width(text) / 2.0, size];
+        let mut taken = 0.0;
+        if self.parts.time {
+            let stamps = self.stamps(frame);
+            let place = |text: &String| (text.clone(), left(canvas, text));
+            let fitting = stamps.iter().map(place).find(|(_, at)| 2.0 * at[0] <= width);
+            if let Some((text, at)) = fitting {
+                canvas.write(&text, at);
+                taken = 2.0 * at[0];
+            }
+        }
+        let half = canvas.letters.width(&self.title) / 2.0;
+        if !self.title.is_empty() && width / 2.0 - half > taken {
+            canvas.write(&self.title, [width / 2.0, size]);
+        }
     }
 
-    /// Draws the colour bar at the right edge, below row `below`, with its values to the left.
-    fn bar(&mut self, scale: &Scale, below: usize) {
-        let Self { margin, letters, width, height, .. } = *self;
-        let (thick, length) = (2 * letters.width, (height * 3 / 5).min(height.saturating_sub(below + 2 * margin)));
-        if length < 2 * letters.height || thick + 2 * margin > width {
+    /// The colour bar at the right, with its values to the left and their name to the right.
+    fn draw_bar(&self, canvas: &mut Canvas<'_>, scale: &Scale) {
+        let (size, [width, height]) = (canvas.letters.size, canvas.size());
+        let name = if self.values.is_empty() { 0.6 } else { 1.9 };
+        let thick = (1.1 * size).round();
+        let left = (width - name * size - thick).round();
+        let (top, length) = ((0.2 * height).max(2.5 * size).round(), (0.6 * height).round());
+        if top + length + size > height {
             return;
         }
-        let (left, top) = (width - margin - thick, (height.saturating_sub(length) / 2).max(below + margin));
-        self.rectangle(left - 2, top - 2, [thick + 4, length + 4], self.rim);
-        self.rectangle(left - 1, top - 1, [thick + 2, length + 2], self.ink);
-        for row in 0..length {
-            let share = 1.0 - row as f64 / (length - 1) as f64;
-            self.rectangle(left, top + row, [thick, 1], scale.colour_at(share));
+        let (x, y, w, h) = (left as i64, top as i64, thick as i64, length as i64);
+        canvas.fill([x - 1, y - 1], [w + 2, h + 2], canvas.ink);
+        for row in 0..h {
+            canvas.fill([x, y + row], [w, 1], scale.colour_at(1.0 - row as f64 / (h - 1).max(1) as f64));
         }
-        self.labels(scale, left, top, length);
+        for value in ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8)) {
+            let (at, text) = (top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5, volume::text(value));
+            canvas.line([left - 1.0 - 0.4 * size, at], [left - 1.0, at], 1.0);
+            let half = canvas.letters.width(&text) / 2.0;
+            if 2.0 * half <= (BAR - name - 1.7) * size + 1.0 {
+                canvas.write(&text, [left - 0.8 * size - half, at]);
+            }
+        }
+        let name = shortened(&self.values, |text| canvas.letters.width(text) <= 0.9 * height);
+        canvas.write_upwards(&name, [width - 0.9 * size, top + length / 2.0]);
     }
+}
 
-    /// Writes values beside the bar, if the longest fits.
-    fn labels(&mut self, scale: &Scale, left: usize, top: usize, length: usize) {
-        let Self { margin, letters, .. } = *self;
-        let ticks = ticks::ticks(scale, (length / (2 * letters.height)).clamp(2, 8));
-        let labels: Vec<(String, f64)> = ticks.iter().map(|v| (decimal::short(*v), scale.share(*v))).collect();
-        let tick = margin / 2;
-        let longest = labels.iter().map(|(text, _)| text.len() * letters.width).max().unwrap_or(0);
-        if longest + tick + margin > left {
-            return;
-        }
-        for (text, share) in labels {
-            let y = top + ((1.0 - share) * (length - 1) as f64).round() as usize;
-            self.rectangle(left - 1 - tick, y - 1, [tick, 3], self.rim);
-            self.rectangle(left - 1 - tick, y, [tick, 1], self.ink);
-            let x = left - 2 - tick - letters.width / 2 - text.len() * letters.width;
-            self.write(&text, x, y - letters.height / 2);
-        }
+/// How much lines of the box differ from the background.
+const BOX: f64 = 0.6;
+
+/// The longest beginning of a text that fits, with dots if something is left out.
+fn shortened(text: &str, fits: impl Fn(&str) -> bool) -> String {
+    if fits(text) {
+        return text.into();
     }
+    let letters: Vec<char> = text.chars().collect();
+    let beginning = |count: usize| letters[..count].iter().chain(['…'].iter()).collect::<String>();
+    (0..letters.len()).rev().map(beginning).find(|text| fits(text)).unwrap_or_default()
+}
+
+/// The camera of a view.
+fn camera(axes: &VolumeAxes, size: [usize; 2], view: &ViewReport) -> Option<Camera> {
+    let &ViewReport { azimuth, elevation, roll, scale, center, .. } = view;
+    let view = View { azimuth, elevation, roll, size, scale: Some(scale), center: Some(center) };
+    Camera::new(&view, &axes.grid).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::grid::Grid;
     use crate::colour::{Norm, TransferFunction};
 
     fn scale(range: (f64, f64), norm: Norm) -> Scale {
@@ -153,37 +183,71 @@ mod tests {
         Scale::new(&map, range, norm, [9; 3]).expect("a range")
     }
 
-    fn drawn(width: usize, height: usize, scale: Option<&Scale>) -> Vec<Rgb> {
-        let mut pixels = vec![[9; 3]; width * height];
-        Annotation::default().draw(&mut pixels, width, 12, [9; 3], scale);
+    fn annotation() -> Annotation {
+        let grid = Grid::unit([20, 10, 15]);
+        let axes = VolumeAxes { grid, region: grid.whole(), labels: Default::default() };
+        let (title, values) = ("a run".into(), "speed (m s⁻¹)".into());
+        Annotation { parts: Parts::ALL, title, values, axes: Some(axes), ..Annotation::default() }
+    }
+
+    fn drawn(annotation: &Annotation, size: [usize; 2], scale: Option<&Scale>) -> Vec<Rgb> {
+        let mut pixels = vec![[9; 3]; size[0] * size[1]];
+        let view = ViewReport { azimuth: 30.0, elevation: 20.0, scale: 0.02 * size[0] as f64, ..ViewReport::default() };
+        let (background, opacity) = ([9; 3], |_| 0.0);
+        let picture =
+            Finished { pixels: &mut pixels, size, background, frame: 12, view: Some(&view), scale, opacity: &opacity };
+        annotation.draw(picture);
         pixels
     }
 
     #[test]
     fn a_bar_has_the_last_colour_at_its_top_and_the_first_at_its_bottom() {
-        let pixels = drawn(200, 160, Some(&scale((0.0, 1.0), Norm::Linear)));
-        let column: Vec<Rgb> = (0..160).map(|y| pixels[y * 200 + 184]).collect();
-        let at = |colour: Rgb| column.iter().position(|c| *c == colour).expect("the colour");
-        assert!(at([255, 0, 0]) < at([0, 0, 255]) && pixels[159 * 200 + 199] == [9; 3]);
-        assert!(pixels[..100].iter().all(|p| *p == [9; 3]), "nothing touches the edge");
+        let pixels = drawn(&annotation(), [200, 160], Some(&scale((0.0, 1.0), Norm::Linear)));
+        let row = |colour: Rgb| pixels.iter().position(|pixel| *pixel == colour).expect("the colour") / 200;
+        assert!(row([255, 0, 0]) < row([0, 0, 255]));
     }
 
     #[test]
     fn pictures_of_any_size_take_what_fits() {
+        let (annotation, linear) = (annotation(), scale((-1e300, 1e300), Norm::Linear));
         for (width, height) in (1..90).flat_map(|w| [(w, 90), (90, w), (w, w), (w, 1), (1, w)]) {
-            for range in [(0.0, 1.0), (-1e300, 1e300), (2.0, 2.0), (1e6, 1e6 + 1.0)] {
-                drawn(width, height, Some(&scale(range, Norm::Linear)));
-            }
+            drawn(&annotation, [width, height], Some(&linear));
         }
-        assert!(drawn(16, 16, Some(&scale((1e-3, 1e3), Norm::Log))).iter().all(|p| *p == [9; 3]));
-        assert!(drawn(90, 30, None).contains(&[255; 3]), "the time alone");
+        for (range, norm) in [((2.0, 2.0), Norm::Linear), ((1e6, 1e6 + 1.0), Norm::Linear), ((1e-3, 1e3), Norm::Log)] {
+            assert!(drawn(&annotation, [300, 200], Some(&scale(range, norm))).iter().any(|pixel| *pixel != [9; 3]));
+        }
+        let none = Annotation { parts: Parts::NONE, title: String::new(), ..annotation };
+        assert!(drawn(&none, [300, 200], Some(&linear)).iter().all(|pixel| *pixel == [9; 3]), "nothing is drawn");
+    }
+
+    #[test]
+    fn the_box_lies_behind_the_picture() {
+        let annotation =
+            Annotation { parts: Parts { bounds: true, ..Parts::NONE }, title: String::new(), ..annotation() };
+        let size = [120, 100];
+        let view = ViewReport { azimuth: 30.0, elevation: 20.0, scale: 3.0, ..ViewReport::default() };
+        let changed = |opaque: f64| {
+            let (mut pixels, opacity) = (vec![[9; 3]; size[0] * size[1]], |_: usize| opaque);
+            let picture = Finished {
+                pixels: &mut pixels,
+                size,
+                background: [9; 3],
+                frame: 0,
+                view: Some(&view),
+                scale: None,
+                opacity: &opacity,
+            };
+            annotation.draw(picture);
+            pixels.iter().map(|pixel| usize::from(pixel[0] - 9)).sum::<usize>()
+        };
+        assert!(changed(1.0) == 0 && changed(0.5) > 0 && changed(0.0) > changed(0.5));
     }
 
     #[test]
     fn frames_show_their_time_or_their_number() {
         let stamps = |unit: Option<&str>| {
             let times = vec![0.0, 0.0125, 0.1 + 0.2, 1_051_956.0];
-            let timed = Annotation { times: TimeLabels::new(times, unit, None) };
+            let timed = Annotation { times: TimeLabels::new(times, unit, None), ..Annotation::default() };
             (0..5).map(|frame| timed.stamps(frame)).collect::<Vec<_>>()
         };
         let long = |unit| stamps(unit).into_iter().map(|[long, _]| long).collect::<Vec<_>>();
@@ -191,5 +255,10 @@ mod tests {
         assert_eq!(stamps(Some("s"))[1], ["t = 0.0125 s", "t = 0.0125"]);
         assert_eq!(stamps(Some("hours since 1900-01-01"))[3], ["2020-01-03 12:00:00", "2020-01-03"]);
         assert_eq!(long(Some("months since 1900-01-01"))[1], "t = 0.0125 months since 1900-01-01");
+    }
+
+    #[test]
+    fn long_names_are_shortened() {
+        assert_eq!([shortened("abcdef", |t| t.chars().count() <= 4), shortened("ab", |_| true)], ["abc…", "ab"]);
     }
 }

@@ -1,66 +1,92 @@
-//! Letters as pixels.
+//! Letters as shares of pixels, from DejaVu Sans. The file font.ttf has its Latin and Greek letters, superscripts and signs;
+//! font-licence.txt is its licence.
 
-use spleen_font::{FONT_8X16, FONT_12X24, FONT_16X32};
+use ab_glyph::{Font, FontRef, PxScaleFont, ScaleFont, point};
+
+const FONT: &[u8] = include_bytes!("font.ttf");
 
 /// Letters of one size.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Letters {
-    /// The rows of each ASCII character, one after another. Each row starts at a byte; the most significant bit is the
-    /// left pixel.
-    bits: &'static [u8],
-    /// Pixels from one letter to the next.
-    pub(super) width: usize,
-    /// Pixels from one line to the next.
-    pub(super) height: usize,
+    font: PxScaleFont<FontRef<'static>>,
+    /// The height of a line in pixels.
+    pub(super) size: f64,
 }
 
 impl Letters {
-    /// The letter size for a picture whose shorter side has `pixels` pixels.
-    pub(super) fn for_side(pixels: usize) -> Self {
-        // The tables are PSF files: a header, then the bits. The crate's own reader misreads the smallest font.
-        const OF_PSF_1: usize = 4;
-        const OF_PSF_2: usize = 32;
-        let (font, header, width) = match pixels {
-            0..600 => (FONT_8X16, OF_PSF_1, 8),
-            600..1400 => (FONT_12X24, OF_PSF_2, 12),
-            _ => (FONT_16X32, OF_PSF_2, 16),
-        };
-        Self { bits: &font[header..], width, height: 2 * width }
+    /// Letters for lines of `size` pixels.
+    pub(super) fn new(size: f64) -> Self {
+        let font = FontRef::try_from_slice(FONT).unwrap_or_else(|_| unreachable!("the program's own font"));
+        Self { font: font.into_scaled(size as f32), size }
     }
 
-    /// The set pixels of a text, as [x, y] from its upper left corner. Characters outside ASCII are skipped.
-    pub(super) fn pixels(&self, text: &str) -> Vec<[usize; 2]> {
-        let row = self.width.div_ceil(8);
-        let mut inked = Vec::new();
-        for (column, letter) in text.bytes().filter(u8::is_ascii).enumerate() {
-            let bits = &self.bits[usize::from(letter) * row * self.height..][..row * self.height];
-            let is_on = |x: usize, y: usize| bits[y * row + x / 8] << (x % 8) & 0x80 != 0;
-            let all = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
-            inked.extend(all.filter(|(x, y)| is_on(*x, *y)).map(|(x, y)| [column * self.width + x, y]));
-        }
-        inked
+    /// The width of a text in pixels.
+    pub(super) fn width(&self, text: &str) -> f64 {
+        text.chars().map(|letter| f64::from(self.font.h_advance(self.font.glyph_id(known(letter))))).sum()
     }
+
+    /// Calls `put(x, y, share)` for all pixels of a text whose middle is at `middle`.
+    pub(super) fn draw(&self, text: &str, middle: [f64; 2], mut put: impl FnMut(i64, i64, f64)) {
+        let (mut x, half) =
+            (middle[0] - self.width(text) / 2.0, f64::from(self.font.ascent() + self.font.descent()) / 2.0);
+        for letter in text.chars() {
+            let id = self.font.glyph_id(known(letter));
+            let glyph = id.with_scale_and_position(self.font.scale(), point(x as f32, (middle[1] + half) as f32));
+            x += f64::from(self.font.h_advance(id));
+            if let Some(outline) = self.font.outline_glyph(glyph) {
+                let corner = outline.px_bounds().min;
+                let (left, top) = (corner.x as i64, corner.y as i64);
+                outline
+                    .draw(|u, v, share| put(left + i64::from(u), top + i64::from(v), f64::from(share.clamp(0.0, 1.0))));
+            }
+        }
+    }
+}
+
+/// A letter of the font: others become a question mark.
+fn known(letter: char) -> char {
+    let is_known = matches!(letter, ' '..='~' | '\u{a0}'..='\u{ff}' | 'Α'..='ω' | '–' | '…' | '⁰'..='₎' | '−' | '′' | '″' | '√' | '∂' | '∇');
+    if is_known { letter } else { '?' }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::HashSet;
+
+    fn ink(text: &str, size: f64) -> Vec<(i64, i64)> {
+        let mut found = Vec::new();
+        Letters::new(size).draw(text, [100.0, 100.0], |x, y, share| {
+            if share > 0.5 {
+                found.push((x, y));
+            }
+        });
+        found
+    }
 
     #[test]
-    fn letters_stay_in_their_cell() {
-        for (side, height) in [(16, 16), (800, 24), (4000, 32)] {
-            let letters = Letters::for_side(side);
-            assert_eq!(letters.height, height);
-            let pixels = |c: u8| letters.pixels(std::str::from_utf8(&[c]).expect("ASCII"));
-            let all: HashSet<_> = (b' '..=b'~').map(pixels).collect();
-            assert_eq!(all.len(), 95, "all letters differ");
-            assert!(
-                all.iter().flatten().all(|[x, y]| *x < letters.width && *y < letters.height) && pixels(b' ').is_empty()
-            );
-            let left = pixels(b'L').iter().filter(|[x, _]| *x < letters.width / 2).count();
-            assert!(2 * left > pixels(b'L').len(), "the stem is at the left");
+    fn letters_stay_around_their_middle() {
+        for size in [9.0, 14.0, 60.0] {
+            let letters = Letters::new(size);
+            for text in ["frame 10", "−0.25", "kg m⁻³ µ °C Ω", "gj|Ü"] {
+                let (pixels, half) = (ink(text, size), letters.width(text) / 2.0 + 2.0);
+                assert!(pixels.len() > 5, "{text} at {size}");
+                assert!(
+                    pixels.iter().all(|(x, y)| {
+                        (*x as f64 - 100.0).abs() <= half && (*y as f64 - 100.0).abs() <= 0.75 * size
+                    })
+                );
+            }
+            assert!(letters.width("mm") > letters.width("m") && letters.width("") == 0.0);
         }
-        assert!(Letters::for_side(0).pixels(" 1").iter().all(|[x, _]| *x >= 8));
+    }
+
+    #[test]
+    fn all_letters_have_a_shape() {
+        for letter in (' '..='~').chain('α'..='ω').chain("⁻¹²³°µ×·−".chars()).filter(|letter| *letter != ' ')
+        {
+            assert!(!ink(&letter.to_string(), 30.0).is_empty(), "{letter}");
+        }
+        assert_eq!(ink("\u{4e2d}", 20.0), ink("?", 20.0), "unknown letters");
+        assert!(ink(" ", 20.0).is_empty());
     }
 }

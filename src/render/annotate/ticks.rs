@@ -20,7 +20,7 @@ pub fn round_values(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
         [1.0, 2.0, 5.0].map(|m| m * ten_to(power)).into_iter().find(|s| *s >= least).unwrap_or(ten_to(power + 1));
     let (first, last) = ((lo / step - 1e-9).ceil(), (hi / step + 1e-9).floor());
     let count = (last - first).max(0.0) as usize;
-    (0..=count.min(2 * wanted)).map(|i| ((first + i as f64) * step).clamp(lo, hi)).collect()
+    (0..=count.min(2 * wanted)).map(|i| (first + i as f64) * step).collect()
 }
 
 /// Powers of ten, thinned out to about `wanted`. If there are only one or two, also 2 and 5 times these.

@@ -9,7 +9,7 @@ mod stream;
 
 pub use provenance::{Provenance, Shows};
 
-use super::annotate::Annotation;
+use super::annotate::{Annotation, Finished};
 use super::config::RenderConfig;
 use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
@@ -164,11 +164,19 @@ impl SinkConfig {
     }
 
     /// A coloured picture with its annotations.
-    fn image(&self, frame: usize, picture: Picture<'_>) -> Vec<Rgb> {
+    fn image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<Rgb> {
         let mut image = self.plain(picture);
         if let Some(annotation) = &self.annotation {
-            let scale = (self.pixel != Pixel::Channels).then_some(&self.colours);
-            annotation.draw(&mut image, self.size[0], frame, self.colours.background(), scale);
+            let numbers = self.pixel.numbers();
+            annotation.draw(Finished {
+                pixels: &mut image,
+                size: self.size,
+                background: self.colours.background(),
+                frame: rendered.frame,
+                view: rendered.views.get(rendered.view),
+                scale: (self.pixel != Pixel::Channels).then_some(&self.colours),
+                opacity: &|at| self.colours.opacity_of_pixel(&picture[at * numbers..][..numbers]),
+            });
         }
         image
     }
@@ -179,11 +187,11 @@ impl SinkConfig {
     }
 
     /// The same as [`Self::image`], with 16 bits per channel; annotations have 8.
-    fn deep_image(&self, frame: usize, picture: Picture<'_>) -> Vec<[u16; 3]> {
+    fn deep_image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<[u16; 3]> {
         let deep = |pixel| self.colours.exact_colour_of_pixel(pixel).map(|c| (c * 65535.0).round() as u16);
         let mut image: Vec<[u16; 3]> = picture.chunks_exact(self.pixel.numbers()).map(deep).collect();
         if self.annotation.is_some() {
-            let (plain, drawn) = (self.plain(picture), self.image(frame, picture));
+            let (plain, drawn) = (self.plain(picture), self.image(rendered, picture));
             for (i, colour) in drawn.into_iter().enumerate().filter(|(i, colour)| plain[*i] != *colour) {
                 image[i] = colour.map(|c| u16::from(c) * 257);
             }

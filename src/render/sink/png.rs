@@ -54,12 +54,12 @@ impl Samples {
 }
 
 /// The bytes of a picture's pixels.
-pub(super) fn samples(config: &SinkConfig, frame: usize, picture: Picture<'_>) -> Vec<u8> {
+pub(super) fn samples(config: &SinkConfig, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<u8> {
     let bytes = |level: &u16| [(level >> 8) as u8, *level as u8];
     match Samples::of(config) {
-        Samples::Rgb8 => config.image(frame, picture).into_flattened(),
-        Samples::Rgb16 => config.deep_image(frame, picture).as_flattened().iter().flat_map(bytes).collect(),
-        Samples::Grey16 => config.deep_image(frame, picture).iter().flat_map(|[level, ..]| bytes(level)).collect(),
+        Samples::Rgb8 => config.image(rendered, picture).into_flattened(),
+        Samples::Rgb16 => config.deep_image(rendered, picture).as_flattened().iter().flat_map(bytes).collect(),
+        Samples::Grey16 => config.deep_image(rendered, picture).iter().flat_map(|[level, ..]| bytes(level)).collect(),
     }
 }
 
@@ -103,7 +103,7 @@ impl Animation {
     }
 
     pub(super) fn picture(&mut self, config: &SinkConfig, rendered: &Rendered<'_>, picture: Picture<'_>) -> Result<()> {
-        let written = self.write(config, rendered, &samples(config, rendered.frame, picture));
+        let written = self.write(config, rendered, &samples(config, rendered, picture));
         written.map_err(|e| Error::io(self.path(), format!("writing frame {}", rendered.frame), e))
     }
 

@@ -36,7 +36,7 @@ impl Sheet {
         }
         let first = self.placed / columns * height * across + self.placed % columns * width;
         let bytes = kind.bytes();
-        for (y, row) in png::samples(config, rendered.frame, picture).chunks_exact(width * bytes).enumerate() {
+        for (y, row) in png::samples(config, rendered, picture).chunks_exact(width * bytes).enumerate() {
             self.samples[(first + y * across) * bytes..][..row.len()].copy_from_slice(row);
         }
         self.placed += 1;

@@ -33,7 +33,6 @@ pub(super) fn write(
     picture: Picture<'_>,
     out: &mut impl Write,
 ) -> io::Result<()> {
-    let frame = rendered.frame;
     match config.format {
         PictureFormat::Npy if !config.coloured_array => {
             out.write_all(&picture.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
@@ -42,11 +41,11 @@ pub(super) fn write(
             let level = |v: &f32| ((config.colours.share(*v) * 65535.0).round() as u16).to_le_bytes();
             out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
         }
-        PictureFormat::Y4m => write_yuv(config.image(frame, picture), out),
-        PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(config.image(frame, picture).as_flattened()),
+        PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
+        PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(config.image(rendered, picture).as_flattened()),
         PictureFormat::Exr => exr::write(config, &config.texts_of(rendered), picture, out),
         PictureFormat::Png | PictureFormat::Apng | PictureFormat::Sheet => {
-            png::write(config, config.size, &config.texts_of(rendered), &png::samples(config, frame, picture), out)
+            png::write(config, config.size, &config.texts_of(rendered), &png::samples(config, rendered, picture), out)
         }
     }
 }

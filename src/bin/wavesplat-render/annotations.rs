@@ -1,0 +1,139 @@
+//! Options for what is drawn around the volume.
+
+use crate::args::Cli;
+use crate::places::{self, Axes};
+use clap::{Args, ValueEnum};
+use std::str::FromStr;
+use wavesplat::base::error::Result;
+use wavesplat::base::grid::Grid;
+use wavesplat::base::time_labels::TimeLabels;
+use wavesplat::colour::Rgb;
+use wavesplat::file::CoefficientFile;
+use wavesplat::file::setting;
+use wavesplat::render::annotate::{Annotation, Margins, Parts, VolumeAxes, margins};
+use wavesplat::view::camera::{Camera, View};
+
+/// Options for what is drawn around the volume.
+#[derive(Debug, Args)]
+pub(crate) struct AnnotationArgs {
+    /// Draw the box of the volume, values along its axes, a colour bar and the time of each frame; or only some of all,
+    /// none, box, axes, triad, bar and time
+    #[arg(
+        long,
+        value_name = "PARTS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "box,axes,bar,time",
+        help_heading = "Colour"
+    )]
+    annotate: Option<PartList>,
+    /// Draw a title above the volume
+    #[arg(long, value_name = "TEXT", help_heading = "Colour")]
+    title: Option<String>,
+    /// Colours of background and letters
+    #[arg(long, value_enum, default_value = "dark", help_heading = "Colour")]
+    theme: Theme,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Theme {
+    /// White on black
+    Dark,
+    /// Black on white
+    Light,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct PartList(Parts);
+
+impl FromStr for PartList {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let mut parts = Parts::NONE;
+        for name in text.split(',') {
+            match name.trim() {
+                "all" => parts = Parts::ALL,
+                "none" => parts = Parts::NONE,
+                "box" => parts.bounds = true,
+                "axes" => parts.axes = true,
+                "triad" => parts.triad = true,
+                "bar" => parts.bar = true,
+                "time" => parts.time = true,
+                other => return Err(format!("'{other}' is none of all, none, box, axes, triad, bar and time")),
+            }
+        }
+        Ok(Self(parts))
+    }
+}
+
+impl AnnotationArgs {
+    /// Whether anything is drawn.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.annotate.is_some() || self.title.is_some()
+    }
+
+    /// The parts that are drawn.
+    pub(crate) fn parts(&self) -> Parts {
+        self.annotate.map_or(Parts::NONE, |list| list.0)
+    }
+
+    pub(crate) fn title(&self) -> String {
+        self.title.clone().unwrap_or_default()
+    }
+
+    /// The background if none is given.
+    pub(crate) fn background(&self) -> Rgb {
+        match self.theme {
+            Theme::Dark => [0; 3],
+            Theme::Light => [255; 3],
+        }
+    }
+
+    /// The margins in a picture of this size.
+    pub(crate) fn margins(&self, size: [usize; 2]) -> Margins {
+        margins(size, self.parts(), self.title.is_some())
+    }
+
+    /// Views in one scale, in which the volume fits beside the margins.
+    pub(crate) fn beside(views: Vec<View>, grid: &Grid, around: Margins) -> Result<Vec<View>> {
+        let Margins { left, right, top, bottom } = around;
+        let camera = |view: &View| {
+            let size = [view.size[0] - left - right, view.size[1] - top - bottom];
+            Camera::new(&View { size, ..*view }, grid)
+        };
+        let cameras = views.iter().map(camera).collect::<Result<Vec<_>>>()?;
+        let scale = cameras.iter().map(|camera| camera.scale).fold(f64::INFINITY, f64::min);
+        let [across, up] = [[right, left], [top, bottom]].map(|[a, b]| (a as f64 - b as f64) / 2.0 / scale);
+        let is_moved = around != Margins::default();
+        let moved = |(view, camera): (View, &Camera)| View {
+            scale: Some(scale),
+            center: if is_moved { Some(camera.moved(across, up)) } else { view.center },
+            ..view
+        };
+        Ok(views.into_iter().zip(&cameras).map(moved).collect())
+    }
+}
+
+impl Cli {
+    /// The annotations of a run, but for the axes.
+    pub(crate) fn annotation(&self, values: String, times: TimeLabels) -> Annotation {
+        Annotation { parts: self.around.parts(), title: self.around.title(), values, times, axes: None }
+    }
+
+    /// The axes of the volume as it is drawn, with their true coordinates.
+    pub(crate) fn volume_axes(&self, axes: &Axes, whole: &Grid) -> Result<VolumeAxes> {
+        let region = self.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
+        Ok(VolumeAxes { grid: *whole, region, labels: axes.labels() })
+    }
+}
+
+/// The name and the unit of a file's values.
+pub(crate) fn values_of(file: &CoefficientFile) -> Result<String> {
+    let (m, description) = (file.metadata(), file.description()?);
+    let text = |name: &str| description.as_ref().and_then(|all| places::text(&all.attributes, name));
+    let name = text("long_name").or_else(|| text("standard_name").map(|name| name.replace('_', " ")));
+    let name = name.or_else(|| m.variable.clone()).unwrap_or_default();
+    let unit = setting(m, "units").map(ToString::to_string).or_else(|| text("units")).unwrap_or_default();
+    Ok(if unit.is_empty() || name.is_empty() { name + &unit } else { format!("{name} ({unit})") })
+}

@@ -1,0 +1,259 @@
+//! The box of the volume, and values along its edges.
+
+use super::canvas::{Canvas, line};
+use super::ticks::round_values;
+use crate::base::decimal;
+use crate::base::grid::{Grid, Region};
+use crate::view::camera::Camera;
+
+/// What an axis means.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AxisLabels {
+    /// Its name.
+    pub name: String,
+    /// The unit of its coordinates, or empty.
+    pub unit: String,
+    /// The coordinate of every voxel, ascending or descending.
+    pub at: Vec<f64>,
+}
+
+/// The axes of a volume as it is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VolumeAxes {
+    /// The lattice that is drawn.
+    pub grid: Grid,
+    /// The voxels that are drawn.
+    pub region: Region,
+    /// The axes x, y and z, with a coordinate for each voxel of the grid.
+    pub labels: [AxisLabels; 3],
+}
+
+/// The width of lines, in lines of letters.
+const THIN: f64 = 0.08;
+
+/// An edge of the box in a picture.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    axis: usize,
+    from: [f64; 2],
+    to: [f64; 2],
+    /// The direction away from the box.
+    out: [f64; 2],
+}
+
+impl VolumeAxes {
+    /// The point of the picture of a place in voxels.
+    fn pixel(&self, camera: &Camera, place: [f64; 3]) -> [f64; 2] {
+        let position = std::array::from_fn(|a| self.grid.origin[a] + place[a] * self.grid.spacing[a]);
+        let [x, y, _] = camera.project(position);
+        [x, y]
+    }
+
+    /// The first and the last place of the box along an axis: half a voxel beyond the voxels.
+    fn ends(&self, axis: usize) -> [f64; 2] {
+        [self.region.start[axis] as f64 - 0.5, self.region.end[axis] as f64 - 0.5]
+    }
+
+    /// A corner of the box: each bit of `corner` chooses an end.
+    fn corner(&self, camera: &Camera, corner: usize) -> [f64; 2] {
+        self.pixel(camera, std::array::from_fn(|a| self.ends(a)[corner >> a & 1]))
+    }
+
+    /// Draws all edges of the box by `put(x, y, share)`.
+    pub(super) fn draw_box(&self, camera: &Camera, size: f64, mut put: impl FnMut(i64, i64, f64)) {
+        let picture = camera.size.map(|n| n as f64);
+        for axis in 0..3 {
+            for corner in (0..8).filter(|corner| corner >> axis & 1 == 0) {
+                let ends = [corner, corner | 1 << axis].map(|corner| self.corner(camera, corner));
+                line(picture, ends[0], ends[1], (THIN * size).max(1.0), &mut put);
+            }
+        }
+    }
+
+    /// The edge along an axis that carries its values: on the outline of the box, below it or at its left.
+    fn edge(&self, camera: &Camera, axis: usize) -> Option<Edge> {
+        let viewer = camera.towards(0.0, 0.0);
+        let [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
+        let is_seen = |corner: usize, axis: usize| {
+            let facing = if corner >> axis & 1 == 1 { viewer[axis] } else { -viewer[axis] };
+            facing > 1e-9
+        };
+        let middle = self.pixel(camera, std::array::from_fn(|a| self.ends(a).iter().sum::<f64>() / 2.0));
+        let edges = (0..8).filter(|corner| corner >> axis & 1 == 0 && is_seen(*corner, b) != is_seen(*corner, c));
+        let edges = edges.map(|corner| {
+            let [from, to] = [corner, corner | 1 << axis].map(|corner| self.corner(camera, corner));
+            Edge { axis, from, to, out: away(from, to, middle) }
+        });
+        let low = |edge: &Edge| {
+            let (dx, dy) = (edge.to[0] - edge.from[0], edge.to[1] - edge.from[1]);
+            if dx.abs() >= dy.abs() { edge.from[1] + edge.to[1] } else { -(edge.from[0] + edge.to[0]) }
+        };
+        edges.max_by(|a, b| low(a).total_cmp(&low(b)))
+    }
+
+    /// Draws values and names along three edges of the box.
+    pub(super) fn draw_axes(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
+        for edge in (0..3).filter_map(|axis| self.edge(camera, axis)) {
+            self.draw_axis(canvas, &edge);
+        }
+    }
+
+    fn draw_axis(&self, canvas: &mut Canvas<'_>, edge: &Edge) {
+        let size = canvas.letters.size;
+        let length = (edge.to[0] - edge.from[0]).hypot(edge.to[1] - edge.from[1]);
+        if length < 4.0 * size {
+            return;
+        }
+        canvas.line(edge.from, edge.to, (THIN * size).max(1.0));
+        let mut widest: f64 = 0.0;
+        for (text, share) in self.ticks(edge.axis, (length / (3.2 * size)) as usize) {
+            let at = point(edge.from, edge.to, share);
+            canvas.line(at, moved(at, edge.out, 0.4 * size), (THIN * size).max(1.0));
+            let half = reach(edge.out, [canvas.letters.width(&text) / 2.0, size / 2.0]);
+            canvas.write(&text, moved(at, edge.out, 0.6 * size + half));
+            widest = widest.max(2.0 * half);
+        }
+        let name = self.labels[edge.axis].title();
+        let half = reach(edge.out, [canvas.letters.width(&name) / 2.0, size / 2.0]);
+        canvas.write(&name, moved(point(edge.from, edge.to, 0.5), edge.out, 0.9 * size + widest + half));
+    }
+
+    /// The values along an edge, and their places as shares of its length.
+    fn ticks(&self, axis: usize, wanted: usize) -> Vec<(String, f64)> {
+        let ([first, last], labels) = (self.ends(axis), &self.labels[axis]);
+        let [from, to] = [first, last].map(|voxel| labels.coordinate(voxel));
+        let values = round_values(from.min(to), from.max(to), wanted.clamp(1, 8));
+        let share = |value: f64| (labels.voxel(value) - first) / (last - first);
+        let within = |share: &f64| (-1e-9..=1.0 + 1e-9).contains(share);
+        values.into_iter().map(|value| (text(value), share(value))).filter(|(_, at)| within(at)).collect()
+    }
+
+    /// Draws arrows along x, y and z at the lower left.
+    pub(super) fn draw_triad(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
+        let size = canvas.letters.size;
+        let origin = [2.6 * size, canvas.size()[1] - 2.6 * size];
+        let at = |axis: usize, length: f64| {
+            let [x, y, _] = camera.step(axis, length / camera.scale);
+            [origin[0] + x, origin[1] + y]
+        };
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            canvas.line(origin, at(axis, 1.5 * size), (2.0 * THIN * size).max(1.0));
+            canvas.write(name, at(axis, 2.0 * size));
+        }
+    }
+}
+
+impl AxisLabels {
+    /// The name and the unit.
+    fn title(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }
+    }
+
+    /// The coordinate of a place in voxels, also beyond the ends.
+    fn coordinate(&self, voxel: f64) -> f64 {
+        match self.at.as_slice() {
+            [] => voxel,
+            [only] => only + voxel,
+            at => {
+                let below = (voxel.floor().max(0.0) as usize).min(at.len() - 2);
+                at[below] + (voxel - below as f64) * (at[below + 1] - at[below])
+            }
+        }
+    }
+
+    /// The place in voxels of a coordinate, also beyond the ends.
+    fn voxel(&self, coordinate: f64) -> f64 {
+        match self.at.as_slice() {
+            [] => coordinate,
+            [only] => coordinate - only,
+            at => {
+                let ascends = at[0] <= at[at.len() - 1];
+                let before = |value: &f64| if ascends { *value <= coordinate } else { *value >= coordinate };
+                let below = at.partition_point(before).saturating_sub(1).min(at.len() - 2);
+                below as f64 + (coordinate - at[below]) / (at[below + 1] - at[below])
+            }
+        }
+    }
+}
+
+/// A value with a minus sign.
+pub(super) fn text(value: f64) -> String {
+    decimal::short(value).replace('-', "−")
+}
+
+/// The direction from a line away from a point.
+fn away(from: [f64; 2], to: [f64; 2], point: [f64; 2]) -> [f64; 2] {
+    let along = [to[0] - from[0], to[1] - from[1]];
+    let length = along[0].hypot(along[1]).max(f64::MIN_POSITIVE);
+    let across = [-along[1] / length, along[0] / length];
+    let side = (from[0] - point[0]) * across[0] + (from[1] - point[1]) * across[1];
+    if side < 0.0 { across.map(|n| -n) } else { across }
+}
+
+fn point(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
+    std::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
+}
+
+fn moved(at: [f64; 2], direction: [f64; 2], by: f64) -> [f64; 2] {
+    std::array::from_fn(|i| at[i] + by * direction[i])
+}
+
+/// How far a rectangle of these half sides reaches in a direction.
+fn reach(direction: [f64; 2], half: [f64; 2]) -> f64 {
+    direction[0].abs() * half[0] + direction[1].abs() * half[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::camera::View;
+
+    fn axes(grid: Grid) -> VolumeAxes {
+        let at = |a: usize| (0..grid.dims[a]).map(|n| grid.origin[a] + n as f64 * grid.spacing[a]).collect();
+        let labels = |a: usize| AxisLabels { name: ["x", "y", "z"][a].into(), unit: "m".into(), at: at(a) };
+        VolumeAxes { grid, region: grid.whole(), labels: [0, 1, 2].map(labels) }
+    }
+
+    #[test]
+    fn values_are_those_of_the_voxels() {
+        let grid = Grid { dims: [11, 5, 4], spacing: [0.5, 1.0, 1.0], origin: [-1.0, 0.0, 0.0] };
+        let mut volume = axes(grid);
+        let ticks = volume.ticks(0, 5);
+        let place = |share: f64| -1.0 + (share * 11.0 - 0.5) * 0.5;
+        assert!(ticks.len() > 3 && ticks[0].0 == "−1", "{ticks:?}");
+        for (text, share) in &ticks {
+            let value: f64 = text.replace('−', "-").parse().expect("a number");
+            assert!((place(*share) - value).abs() < 1e-9, "{text} at {share}");
+        }
+        volume.labels[2].at = vec![0.0, -10.0, -100.0, -1000.0];
+        let depth = volume.ticks(2, 4);
+        assert!(depth.iter().any(|(text, share)| text == "−1000" && (share * 4.0 - 3.5).abs() < 1e-9), "{depth:?}");
+    }
+
+    #[test]
+    fn values_lie_outside_of_the_box() {
+        let volume = axes(Grid::unit([20, 10, 15]));
+        for (azimuth, elevation, roll) in [(30.0, 30.0, 0.0), (0.0, 0.0, 0.0), (180.0, 90.0, 0.0), (200.0, -50.0, 33.0)]
+        {
+            let view = View { roll, size: [200, 160], ..View::new(azimuth, elevation) };
+            let camera = Camera::new(&view, &volume.grid).expect("a view");
+            let corners: Vec<[f64; 2]> = (0..8).map(|corner| volume.corner(&camera, corner)).collect();
+            let edges: Vec<Edge> = (0..3).filter_map(|axis| volume.edge(&camera, axis)).collect();
+            assert!(edges.len() >= 2, "{azimuth} {elevation}");
+            for edge in edges {
+                let side = |p: &[f64; 2]| (p[0] - edge.from[0]) * edge.out[0] + (p[1] - edge.from[1]) * edge.out[1];
+                assert!(corners.iter().all(|corner| side(corner) < 1e-6), "{azimuth} {elevation}: {edge:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn coordinates_and_voxels_are_inverse() {
+        let labels = AxisLabels { at: vec![5.0, 4.0, 0.0, -1.0], ..AxisLabels::default() };
+        for voxel in [-0.5, 0.0, 0.25, 1.9, 3.0, 3.5] {
+            assert!((labels.voxel(labels.coordinate(voxel)) - voxel).abs() < 1e-12);
+        }
+        let single = AxisLabels { at: vec![7.0], ..AxisLabels::default() };
+        assert!((single.coordinate(0.5) - 7.5).abs() < 1e-12 && single.voxel(7.5) == 0.5);
+    }
+}
