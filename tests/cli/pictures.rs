@@ -144,11 +144,13 @@ fn a_sidecar_has_the_report_with_what_made_the_pictures() {
     assert!(written["views"][0]["center"].is_array() && picture["range"] == written["range"]);
     assert!(written["certified_sample_error"].as_f64().unwrap() <= picture["sample_error"].as_f64().unwrap());
     let refused = |more: &str, words: &[&str]| drop(work.render(&format!("{options} {more}")).fails(2, words));
-    refused("-o q_%d.png --sidecar p.json", &["p.json", "exists", "--force"]);
+    work.write("q.json", "{}");
+    refused("-o q_%d.png --sidecar q.json", &["q.json", "exists", "--force"]);
+    work.render(&format!("{options} -o p_%d.png --sidecar p.json")).ok();
     refused("-o q_%d.png --sidecar -", &["--sidecar", "file"]);
     refused("-o q_%d.png --sidecar q_2.png", &["q_2.png", "--sidecar"]);
     refused("-o q_%d.png --sidecar a.wspl --force", &["a.wspl"]);
-    assert_eq!(work.names(), ["a.npy", "a.wspl", "p.json", "p_2.png", "p_5.png"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "p.json", "p_2.png", "p_5.png", "q.json"]);
 }
 
 #[cfg(not(feature = "exr"))]

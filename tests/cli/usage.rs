@@ -133,10 +133,15 @@ fn an_existing_file_is_replaced_only_when_forced() {
     work.render("a.wspl --size 20x20 --frames 3 -o f_%02d.png").fails(2, &["f_03.png", "--force"]);
     assert!(work.read("b.npy") == b"mine" && work.read("f_03.png") == b"mine");
     work.render("a.wspl --size 20x20 --frames 3 -o f_%02d.png --force").ok();
+    let first = work.read("f_03.png");
+    work.render("a.wspl --size 20x20 --frames 3 --view top -o f_%02d.png").ok();
+    assert!(work.read("f_03.png") != first, "a picture of our own is replaced");
+    work.render("a.wspl --size 20x20 -o all.apng").ok();
+    work.render("a.wspl --size 20x20 --view 0,0 -o all.apng").ok();
     work.wavesplat("extract a.wspl -o b.npy --force").ok();
     assert!(work.read("b.npy").len() > 1000 && work.read("f_03.png").len() > 100);
     work.wavesplat("convert a.npy -o . --force").fails(2, &["folder"]);
-    assert_eq!(work.names(), ["a.npy", "a.wspl", "b.npy", "f_03.png"]);
+    assert_eq!(work.names(), ["a.npy", "a.wspl", "all.apng", "b.npy", "f_03.png"]);
 }
 
 #[test]

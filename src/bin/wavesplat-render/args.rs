@@ -5,9 +5,10 @@ use crate::annotations::AnnotationArgs;
 use crate::colours::ColourArgs;
 use crate::cuts::CutArgs;
 use crate::probes::ProbeArgs;
+use crate::view_names::ViewSpec;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
-use wavesplat::cli::{CommonArgs, FrameList, InputArgs, Pair, RegionSpec, Triple, Whole, share};
+use wavesplat::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, Triple, Whole, share};
 use wavesplat::render::Limit;
 use wavesplat::render::sink::{Depth, PictureFormat};
 
@@ -44,13 +45,15 @@ pub(crate) struct Cli {
     /// view; a file name without a pattern takes all views of one frame, one after another
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
     pub(crate) output: PathBuf,
-    /// Replace existing files
+    /// Replace any existing files. Without it, only pictures and reports that wavesplat-render made are replaced: .png,
+    /// .apng, .exr and .json say so
     #[arg(long, help_heading = "Output")]
     pub(crate) force: bool,
-    /// Azimuth and elevation in degrees; repeat for more views. The views of one run share its reading, and need %v in
-    /// the file name [default: 30,30; one --slice is seen face-on]
+    /// Azimuth and elevation in degrees, or a name: top, bottom, front, back, left, right, iso, north, south, east or
+    /// west; repeat for more views. The views of one run share its reading, and need %v in the file name [default:
+    /// 30,30; one --slice is seen face-on]
     #[arg(long = "view", value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) views: Vec<Pair>,
+    pub(crate) views: Vec<ViewSpec>,
     /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
     /// their scales
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]

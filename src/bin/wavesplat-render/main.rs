@@ -19,6 +19,7 @@ mod scene;
 mod sinks;
 mod surfaces;
 mod targets;
+mod view_names;
 mod views;
 
 use args::Cli;

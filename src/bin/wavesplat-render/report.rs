@@ -9,7 +9,7 @@ use std::path::Path;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli;
-use wavesplat::render::sink::Provenance;
+use wavesplat::render::sink::{Provenance, is_ours};
 use wavesplat::render::{Mode, RenderReport};
 
 /// The report of `--json`.
@@ -63,7 +63,7 @@ impl Cli {
     /// Writes the report of `--sidecar`, and prints that of `--json`.
     pub(crate) fn report(&self, reported: &Reported<'_>) -> Result<()> {
         if let Some(path) = &self.sidecar {
-            let mut out = Output::create(path, self.force)?;
+            let mut out = Output::create(path, self.force || is_ours(path))?;
             out.write_all(cli::report_text(reported)?.as_bytes()).map_err(|e| Error::io(path, "writing", e))?;
             out.commit()?;
         }

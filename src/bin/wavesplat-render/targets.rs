@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{Output, STANDARD, names_of_views};
 use wavesplat::cli::spare_inputs;
-use wavesplat::render::sink::{Depth, PictureFormat, Sink};
+use wavesplat::render::sink::{Depth, PictureFormat, Sink, is_ours};
 use wavesplat::render::{RenderConfig, Scene, least_memory};
 
 /// The files of pictures: one for each view, or one for all.
@@ -94,7 +94,7 @@ impl Cli {
             return Err(Error::usage("--sidecar: needs a file; --json prints the report"));
         }
         spare_inputs(&self.inputs, path)?;
-        Output::check(path, self.force)
+        Output::check(path, self.force || is_ours(path))
     }
 }
 

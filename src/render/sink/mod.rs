@@ -2,11 +2,13 @@
 //! fields also store the provenance.
 
 mod exr;
+mod ours;
 mod provenance;
 mod png;
 mod sheet;
 mod stream;
 
+pub use ours::is_ours;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::{Annotation, Finished};
@@ -131,7 +133,7 @@ pub struct SinkConfig {
     pub coloured_array: bool,
     /// Annotations drawn into coloured pictures. Default: none.
     pub annotation: Option<Annotation>,
-    /// Whether to replace existing files. Default: no.
+    /// Whether to replace any existing files, also those that are no pictures of this library ([`is_ours`]). Default: no.
     pub force: bool,
 }
 
@@ -153,6 +155,11 @@ impl SinkConfig {
             annotation: None,
             force: false,
         }
+    }
+
+    /// Whether an existing file may be replaced.
+    fn may_replace(&self, path: &Path) -> bool {
+        self.force || is_ours(path)
     }
 
     /// The picture or the error bounds of a rendering, whichever this sink shows.
@@ -223,13 +230,13 @@ impl Sink {
         if !config.format.takes_all(path) {
             let frames: Vec<usize> = config.shown.iter().map(|(_, frame)| *frame).collect();
             let paths = Self::paths(path, config.format, &frames)?;
-            paths.iter().try_for_each(|path| Output::check(path, config.force))?;
+            paths.iter().try_for_each(|path| Output::check(path, config.may_replace(path)))?;
             return Ok(Self { target: Target::Many(Numbered::new(path, frames.len())?), config });
         }
         if path != Path::new(STANDARD) && Numbered::new(path, 1)?.digits.is_some() {
             return Err(Error::path(path, "a pattern numbers .png and .exr files; others hold all frames"));
         }
-        let out = Output::create(path, config.force)?;
+        let out = Output::create(path, config.may_replace(path))?;
         let target = match config.format {
             PictureFormat::Apng => Target::Animation(Animation::new(out)),
             PictureFormat::Sheet => Target::Sheet(Box::new(Sheet::new(out, &config)?)),
@@ -264,7 +271,7 @@ impl Sink {
             }
             Target::Many(names) => {
                 let path = names.of(frame);
-                let mut out = Output::create(&path, config.force)?;
+                let mut out = Output::create(&path, config.may_replace(&path))?;
                 stream::write(config, rendered, picture, &mut out).map_err(|e| Error::io(&path, "writing", e))?;
                 out.commit()
             }
