@@ -26,7 +26,7 @@ Examples:
   wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
   wavesplat-render run.wspl --orbit 90 --frames 10 --annotate -o turntable.apng
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
-  wavesplat-render run.wspl -o - --format y4m | ffmpeg -i - run.mp4
+  wavesplat-render run.wspl --annotate -o run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render run.wspl --slice x=0.5,z=0.25 --frames 10 -o slices.png
   wavesplat-render run.wspl --probe 0.5,0.5,0.5 -o series.svg
@@ -128,8 +128,8 @@ pub(crate) struct Cli {
     /// Render from coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     pub(crate) method: MethodName,
-    /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), or exr if
-    /// it was built in [default: by the extension of OUT; png for -]
+    /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), mp4,
+    /// webm and gif (by ffmpeg, which must be installed), or exr if it was built in [default: by the extension of OUT; png for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     pub(crate) format: Option<PictureFormat>,
     /// Bits per channel of a PNG: 8, or 16 (with --colormap grey, a single channel)
@@ -138,7 +138,7 @@ pub(crate) struct Cli {
     /// Also write the --json report to a file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(crate) sidecar: Option<PathBuf>,
-    /// Frames per second of a y4m or apng
+    /// Frames per second of a movie, y4m or apng
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
     pub(crate) fps: u32,
     /// A value that means "missing" in frames, besides NaN and infinities
@@ -228,5 +228,5 @@ fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
 
 pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
     let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet exr".into())
+    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif exr".into())
 }

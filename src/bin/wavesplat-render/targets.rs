@@ -109,13 +109,13 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
             "" => "has no extension".into(),
             other => format!("no pictures are written as .{other}"),
         };
-        let formats = "take .png for a picture, .apng for a moving one, or npy y4m rgb24 gray16 exr";
+        let formats = "take .png for a picture, .apng or .mp4 for a moving one, or webm gif npy y4m rgb24 gray16 exr";
         Error::usage(format!("{}: {what}; {formats}", path.display()))
     })
 }
 
-/// Extensions of videos. ffmpeg makes them from a stream of pictures.
-const VIDEOS: [&str; 6] = ["mp4", "mov", "avi", "mkv", "webm", "gif"];
+/// Extensions of other videos. ffmpeg makes them from a stream of pictures.
+const VIDEOS: [&str; 3] = ["mov", "avi", "mkv"];
 
 /// If `output` is the name of a video, an error with the command that makes it.
 fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
@@ -123,8 +123,8 @@ fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     if !VIDEOS.contains(&ending.as_str()) {
         return Ok(());
     }
-    let (name, pixels) = (output.display(), if ending == "gif" { "" } else { " -pix_fmt yuv420p" });
+    let (name, pixels) = (output.display(), " -pix_fmt yuv420p");
     let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
     let pipe = format!("wavesplat-render {} -o - --format y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
-    Err(Error::usage(format!("{name}: ffmpeg makes videos; type: {pipe}")))
+    Err(Error::usage(format!("{name}: write .mp4, .webm or .gif, or type: {pipe}")))
 }

@@ -2,12 +2,14 @@
 //! fields also store the provenance.
 
 mod exr;
+mod movie;
 mod ours;
 mod provenance;
 mod png;
 mod sheet;
 mod stream;
 
+pub use movie::MovieFormat;
 pub use ours::is_ours;
 pub use provenance::{Provenance, Shows};
 
@@ -18,6 +20,7 @@ use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
 use crate::colour::{Rgb, Scale};
+use movie::Movie;
 use png::Animation;
 use sheet::Sheet;
 use std::path::{Path, PathBuf};
@@ -44,11 +47,13 @@ pub enum PictureFormat {
     Apng,
     /// One PNG with all pictures in rows.
     Sheet,
+    /// One movie of all pictures, made by ffmpeg.
+    Movie(MovieFormat),
 }
 
 impl PictureFormat {
     /// The formats by name. The names are also the file extensions, except for the sheet.
-    pub const NAMES: [(&'static str, Self); 8] = [
+    pub const NAMES: [(&'static str, Self); 11] = [
         ("png", Self::Png),
         ("npy", Self::Npy),
         ("y4m", Self::Y4m),
@@ -57,6 +62,9 @@ impl PictureFormat {
         ("apng", Self::Apng),
         ("sheet", Self::Sheet),
         ("exr", Self::Exr),
+        ("mp4", Self::Movie(MovieFormat::Mp4)),
+        ("webm", Self::Movie(MovieFormat::Webm)),
+        ("gif", Self::Movie(MovieFormat::Gif)),
     ];
 
     /// Whether all pictures go to one file or stream at `path`.
@@ -91,6 +99,7 @@ impl PictureFormat {
         let more = match (self, depth) {
             (Self::Sheet, Depth::Eight) => pixels(sheet::size(size, pictures)?) * size_of::<Rgb>(),
             (Self::Sheet, Depth::Sixteen) => pixels(sheet::size(size, pictures)?) * size_of::<[u16; 3]>(),
+            (Self::Movie(_), _) => pixels(size) * size_of::<Rgb>(),
             (Self::Png | Self::Apng, Depth::Sixteen) => pixels(size) * size_of::<[u16; 3]>(),
             (Self::Exr, _) => pixels(size) * Pixel::Light.numbers() * size_of::<f32>(),
             _ => 0,
@@ -220,6 +229,8 @@ enum Target {
     Animation(Animation),
     /// One file with all pictures in rows.
     Sheet(Box<Sheet>),
+    /// One movie; none after ffmpeg failed.
+    Movie(Option<Box<Movie>>),
     /// A file for each picture.
     Many(Numbered),
 }
@@ -240,6 +251,7 @@ impl Sink {
         let target = match config.format {
             PictureFormat::Apng => Target::Animation(Animation::new(out)),
             PictureFormat::Sheet => Target::Sheet(Box::new(Sheet::new(out, &config)?)),
+            PictureFormat::Movie(format) => Target::Movie(Some(Box::new(Movie::new(out, format, &config)?))),
             _ => Target::One { out: Box::new(out), begun: false },
         };
         Ok(Self { target, config })
@@ -269,6 +281,15 @@ impl Sink {
                 sheet.picture(config, rendered, picture);
                 Ok(())
             }
+            Target::Movie(movie) => {
+                let sent = movie.as_mut().map_or(Ok(()), |movie| movie.picture(config, rendered, picture));
+                match sent {
+                    Ok(()) => Ok(()),
+                    Err(e) => {
+                        Err(movie.take().map_or_else(|| Error::io(Path::new("ffmpeg"), "writing", e), |m| m.failed()))
+                    }
+                }
+            }
             Target::Many(names) => {
                 let path = names.of(frame);
                 let mut out = Output::create(&path, config.may_replace(&path))?;
@@ -284,6 +305,7 @@ impl Sink {
             Target::One { out, .. } => out.commit(),
             Target::Animation(animation) => animation.finish(),
             Target::Sheet(sheet) => sheet.finish(&self.config),
+            Target::Movie(movie) => movie.map_or(Ok(()), |movie| movie.finish()),
             Target::Many(_) => Ok(()),
         }
     }

@@ -1,14 +1,17 @@
 //! Recognises pictures that wavesplat made, which may be replaced.
 
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Bytes from the start of a file in which its mark must lie.
-const START: u64 = 1 << 16;
+/// Bytes at the start of a file, and at the end of a movie, in which its mark must lie.
+const PART: u64 = 1 << 16;
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const EXR: &[u8] = b"\x76\x2f\x31\x01";
+const WEBM: &[u8] = b"\x1a\x45\xdf\xa3";
+/// Behind the length of an MP4's first box.
+const MP4: &[u8] = b"ftyp";
 /// The beginning of the software's name in every file.
 const SOFTWARE: &[u8] = b"wavesplat";
 
@@ -17,9 +20,25 @@ pub fn is_ours(path: &Path) -> bool {
     if !fs::metadata(path).is_ok_and(|file| file.is_file()) {
         return false;
     }
-    let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(START).read_to_end(&mut start));
-    read.is_ok() && has_mark(&start)
+    let (mut start, mut end) = (Vec::new(), Vec::new());
+    let mut read = || -> io::Result<()> {
+        let mut file = File::open(path)?;
+        (&file).take(PART).read_to_end(&mut start)?;
+        file.seek(SeekFrom::Start(file.metadata()?.len().saturating_sub(PART)))?;
+        file.take(PART).read_to_end(&mut end).map(drop)
+    };
+    read().is_ok() && (has_mark(&start) || is_movie(&start) && (is_named(&start) || is_named(&end)))
+}
+
+/// Whether a file begins as a movie.
+fn is_movie(start: &[u8]) -> bool {
+    start.starts_with(WEBM) || start.get(4..).is_some_and(|start| start.starts_with(MP4))
+}
+
+/// Whether the comment of a movie names us.
+fn is_named(part: &[u8]) -> bool {
+    let comment = b"Software=wavesplat";
+    part.windows(comment.len()).any(|window| window == comment)
 }
 
 /// Whether the start of a file has the mark of its format.

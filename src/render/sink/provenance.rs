@@ -109,6 +109,11 @@ impl SinkConfig {
         self.texts(&self.shown, rendered.views)
     }
 
+    /// Names and values of all pictures of a run, before any is rendered.
+    pub(super) fn texts_of_run(&self) -> Vec<(String, String)> {
+        self.texts(&self.shown, &[])
+    }
+
     fn texts(&self, shown: &[(usize, usize)], views: &[ViewReport]) -> Vec<(String, String)> {
         let Ok(Value::Object(all)) = serde_json::to_value(self.provenance.as_ref()) else { return Vec::new() };
         let of_run = all.iter().filter(|(key, _)| !["software", "frames", "times", "dates"].contains(&key.as_str()));

@@ -42,7 +42,9 @@ pub(super) fn write(
             out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
         }
         PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
-        PictureFormat::Npy | PictureFormat::Rgb24 => out.write_all(config.image(rendered, picture).as_flattened()),
+        PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) => {
+            out.write_all(config.image(rendered, picture).as_flattened())
+        }
         PictureFormat::Exr => exr::write(config, &config.texts_of(rendered), picture, out),
         PictureFormat::Png | PictureFormat::Apng | PictureFormat::Sheet => {
             png::write(config, config.size, &config.texts_of(rendered), &png::samples(config, rendered, picture), out)
