@@ -101,7 +101,7 @@ fn the_time_and_the_colours_are_drawn_into_pictures() {
     assert!(changed[200 * 80 + 170..200 * 81].contains(&true), "the bar");
     assert!(!changed[200 * 80..200 * 80 + 100].contains(&true), "the rest");
     let light = render("--size 200x160 --annotate --background ffffff");
-    assert!(light[..200 * 30 * 3].contains(&0), "black on white");
+    assert!(light[..200 * 30 * 3].iter().any(|v| *v < 100), "black on white");
     assert!(render("--size 16x16 --annotate") == render("--size 16x16"), "there is no room");
     let array =
         format!("a.wspl {SIZE} --frames 2 --annotate --colormap grey -o a%v.npy --error-image e%v.npy --orbit 2");

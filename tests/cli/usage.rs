@@ -108,14 +108,13 @@ fn an_extension_without_a_format_is_refused_with_the_known_ones() {
 }
 
 #[test]
-fn a_video_is_refused_with_the_pipe_that_makes_it() {
+fn other_videos_are_refused_with_the_pipe_that_makes_them() {
     let work = Work::with_file("");
-    for ending in ["mp4", "mov", "avi", "mkv", "webm", "MP4"] {
+    for ending in ["mov", "avi", "mkv", "MKV"] {
         let pipe = format!("wavesplat-render a.wspl -o - --format y4m | ffmpeg -i - -pix_fmt yuv420p run.{ending}");
-        work.render(&format!("a.wspl -o run.{ending}")).fails(2, &["ffmpeg makes videos", &pipe]);
+        work.render(&format!("a.wspl -o run.{ending}")).fails(2, &[".mp4", &pipe]);
     }
-    work.render("a.wspl -o run.gif").fails(2, &["--format y4m | ffmpeg -i - run.gif"]);
-    work.render("a.wspl --size 20x20 -o run.mp4 --format y4m").ok();
+    work.render("a.wspl --size 20x20 -o run.mkv --format y4m").ok();
 }
 
 #[test]

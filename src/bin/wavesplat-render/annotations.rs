@@ -105,10 +105,9 @@ impl AnnotationArgs {
         let cameras = views.iter().map(camera).collect::<Result<Vec<_>>>()?;
         let scale = cameras.iter().map(|camera| camera.scale).fold(f64::INFINITY, f64::min);
         let [across, up] = [[right, left], [top, bottom]].map(|[a, b]| (a as f64 - b as f64) / 2.0 / scale);
-        let is_moved = around != Margins::default();
         let moved = |(view, camera): (View, &Camera)| View {
             scale: Some(scale),
-            center: if is_moved { Some(camera.moved(across, up)) } else { view.center },
+            center: Some(camera.moved(across, up)),
             ..view
         };
         Ok(views.into_iter().zip(&cameras).map(moved).collect())

@@ -218,7 +218,7 @@ mod tests {
     fn values_are_those_of_the_voxels() {
         let grid = Grid { dims: [11, 5, 4], spacing: [0.5, 1.0, 1.0], origin: [-1.0, 0.0, 0.0] };
         let mut volume = axes(grid);
-        let ticks = volume.ticks(0, 5);
+        let ticks = volume.ticks(0, 6);
         let place = |share: f64| -1.0 + (share * 11.0 - 0.5) * 0.5;
         assert!(ticks.len() > 3 && ticks[0].0 == "−1", "{ticks:?}");
         for (text, share) in &ticks {
