@@ -5,6 +5,7 @@ use super::{RENDER, Work};
 use std::process::Command;
 
 /// Whether ffmpeg is there; says so if it is not.
+#[allow(clippy::print_stderr)]
 fn has_ffmpeg() -> bool {
     let found = Command::new("ffmpeg").arg("-version").output().is_ok();
     if !found {
