@@ -167,3 +167,46 @@ fn one_frame_of_several_views_turns() {
     let several = work.render(&format!("a.wspl {SIZE} --frames 2,3 --orbit 3 -o all.y4m"));
     several.fails(2, &["all.y4m", "3 views", "%v"]);
 }
+
+#[test]
+fn parts_of_annotations_are_drawn_alone() {
+    let work = Work::with_file("");
+    let shown = |options: &str| {
+        decode_png(&work.render(&format!("a.wspl --frames 2 --size 320x240 --scale 6 -o - {options}")).ok().out)
+    };
+    let plain = shown("");
+    assert!(shown("--annotate=none") == plain);
+    let parts = ["box", "axes", "triad", "bar", "time"].map(|part| shown(&format!("--annotate={part}")));
+    for (n, one) in parts.iter().enumerate() {
+        assert!(*one != plain && parts.iter().skip(n + 1).all(|other| other != one), "part {n}");
+    }
+    assert!(
+        shown("--annotate") == shown("--annotate=box,axes,bar,time") && shown("--annotate") != shown("--annotate=all")
+    );
+    assert!(shown("--title Words") != plain);
+    let light = shown("--theme light --annotate=time");
+    assert!(light[light.len() - 3..] == [255; 3] && shown("--theme light --background 102030")[..3] == [16, 32, 48]);
+    let json = work.render("a.wspl --frames 2 -o t.png --title Words --annotate=bar --json").ok().json();
+    assert_eq!((json["picture"]["annotate"].as_str(), json["picture"]["title"].as_str()), (Some("bar"), Some("Words")));
+    work.render("a.wspl -o t.png --annotate=bars").fails(2, &["--annotate", "'bars'", "triad"]);
+    work.render("a.wspl -o t.npy --title Words").fails(2, &["--annotate"]);
+}
+
+#[test]
+fn annotations_keep_the_volume_free() {
+    let work = Work::with_file("");
+    for view in ["iso", "top", "front", "30,30", "200,-40"] {
+        let shown = |options: &str| {
+            let common = "--size 400x300 --frames 2 --clear none --background 0000ff --range 0,3";
+            decode_png(&work.render(&format!("a.wspl --view {view} {common} -o - {options}")).ok().out)
+        };
+        let json = work.render(&format!("a.wspl --view {view} --size 400x300 --frames 2 --annotate --json -o j.png"));
+        let of_view = &json.ok().json()["views"][0];
+        let center: Vec<String> = of_view["center"].as_array().unwrap().iter().map(ToString::to_string).collect();
+        let alone = shown(&format!("--scale {} --center={}", of_view["scale"], center.join(",")));
+        let annotated = shown("--annotate");
+        let changed = alone.chunks(3).zip(annotated.chunks(3)).filter(|(a, b)| **a != [0, 0, 255] && a != b).count();
+        assert!(changed < 40, "{view}: {changed} pixels of the volume are covered");
+        assert!(annotated != alone);
+    }
+}

@@ -78,6 +78,14 @@ impl AnnotationArgs {
         self.annotate.map_or(Parts::NONE, |list| list.0)
     }
 
+    /// The names of the parts that are drawn, as the option takes them.
+    pub(crate) fn words(&self) -> Option<String> {
+        let Parts { bounds, axes, triad, bar, time } = self.annotate?.0;
+        let all = [(bounds, "box"), (axes, "axes"), (triad, "triad"), (bar, "bar"), (time, "time")];
+        let names: Vec<&str> = all.into_iter().filter(|(is_drawn, _)| *is_drawn).map(|(_, name)| name).collect();
+        Some(if names.is_empty() { "none".into() } else { names.join(",") })
+    }
+
     pub(crate) fn title(&self) -> String {
         self.title.clone().unwrap_or_default()
     }

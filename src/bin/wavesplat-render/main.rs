@@ -55,6 +55,8 @@ impl Cli {
         let colouring = self.colouring(scene.as_mut(), &config, targets, colours.as_ref())?;
         let provenance = Provenance {
             slice: self.slice_texts(&axes)?,
+            annotate: self.around.words(),
+            title: Some(annotation.title.clone()).filter(|title| !title.is_empty()),
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };

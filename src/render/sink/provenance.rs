@@ -70,6 +70,10 @@ pub struct Provenance {
     pub background: Option<String>,
     /// The least and the largest value that show the background.
     pub clear: Option<[f64; 2]>,
+    /// The parts drawn around the volume.
+    pub annotate: Option<String>,
+    /// The title drawn above the volume.
+    pub title: Option<String>,
     /// Numbers of the frames.
     pub frames: Vec<usize>,
     /// Times of the frames, or empty.
