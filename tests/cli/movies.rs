@@ -25,7 +25,7 @@ fn movies_show_the_pictures() {
     let expected = decode_png(&work.read("seven.png"));
     for (ending, most) in [("mp4", 4.0), ("webm", 6.0), ("gif", 8.0)] {
         work.render(&format!("{shown} -o run.{ending}")).ok();
-        let select = "-vf select='eq(n,7)' -frames:v 1 -update 1";
+        let select = "-vf trim=start_frame=7 -frames:v 1 -update 1";
         work.shell(&format!("ffmpeg -v error -nostdin -y -i run.{ending} {select} -pix_fmt rgb24 seven_{ending}.png"))
             .ok();
         let found = decode_png(&work.read(&format!("seven_{ending}.png")));

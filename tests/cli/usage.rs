@@ -63,7 +63,7 @@ fn bad_values_of_convert_are_named() {
 fn bad_values_of_render_are_named() {
     let work = Work::with_file("");
     let cases: [(&str, &[&str]); 24] = [
-        ("--view x", &["--view", "2 numbers"]),
+        ("--view x", &["--view", "two angles"]),
         ("--size 0x5", &["--size", "1 to"]),
         ("--size 5", &["--size", "512x512"]),
         ("--size 90000x90000", &["pixels"]),
