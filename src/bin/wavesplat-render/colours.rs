@@ -78,7 +78,7 @@ impl ColourArgs {
 
     /// Whether clear values are looked for in small pictures.
     pub(crate) fn finds_clear(&self) -> bool {
-        self.clear == ClearSpec::Auto
+        self.clear == ClearSpec::Auto && self.norm == NormName::Linear
     }
 
     /// The values that show the background.
@@ -86,6 +86,8 @@ impl ColourArgs {
         match self.clear {
             ClearSpec::Nothing => None,
             ClearSpec::Values(pair) => Some(Clear::of_values(pair.0.into(), (lo, hi))),
+            // A logarithm is for values near empty space.
+            ClearSpec::Auto if self.norm == NormName::Log => None,
             ClearSpec::Auto => {
                 let (clear, empty) = ranges.clear((lo, hi))?;
                 let is_zero = empty.value.abs() < 1e-3 * (hi - lo);
