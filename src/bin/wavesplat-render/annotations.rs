@@ -11,6 +11,7 @@ use wavesplat::colour::Rgb;
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::setting;
 use wavesplat::render::annotate::{Annotation, Margins, Parts, VolumeAxes, margins};
+use wavesplat::render::{Mode, RenderConfig};
 use wavesplat::view::camera::{Camera, View};
 
 /// Options for what is drawn around the volume.
@@ -129,11 +130,16 @@ impl Cli {
     }
 
     /// The axes of the volume as it is drawn, with their true coordinates.
-    pub(crate) fn volume_axes(&self, axes: &Axes, whole: &Grid) -> Result<VolumeAxes> {
+    pub(crate) fn volume_axes(&self, axes: &Axes, whole: &Grid, config: &RenderConfig) -> Result<VolumeAxes> {
         let region = self.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
-        Ok(VolumeAxes { grid: *whole, region, labels: axes.labels() })
+        let has_kernel = !matches!(config.mode, Mode::Planes { .. });
+        let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
+        Ok(VolumeAxes { grid: *whole, region, rim, labels: axes.labels() })
     }
 }
+
+/// Standard deviations of the kernel up to which the outermost voxels are seen.
+const SEEN: f64 = 2.4;
 
 /// The name and the unit of a file's values.
 pub(crate) fn values_of(file: &CoefficientFile) -> Result<String> {

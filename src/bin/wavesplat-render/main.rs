@@ -60,7 +60,7 @@ impl Cli {
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };
-        let annotation = Annotation { axes: Some(self.volume_axes(&axes, &whole)?), ..annotation };
+        let annotation = Annotation { axes: Some(self.volume_axes(&axes, &whole, &config)?), ..annotation };
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
         let progress = self.common.progress("render", unit(&config.mode));
         let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;

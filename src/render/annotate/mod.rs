@@ -1,6 +1,6 @@
 //! Annotations drawn into pictures: the box of the volume, values along its edges, a colour bar, and the time of the frame.
 //!
-//! The box lies behind the picture; everything else lies in the margins that [`margins`] gives. A part that does not fit
+//! The box and the axes lie behind the picture; everything else lies in the margins that [`margins`] gives. A part that does not fit
 //! is left out.
 
 mod text;
@@ -96,11 +96,15 @@ impl Annotation {
                 canvas.pixels[at] = over(canvas.pixels[at], ink, BOX * share * (1.0 - opacity(at)));
             }
         }
-        if self.parts.axes && has_axes(camera.size) {
-            axes.draw_axes(canvas, camera);
-        }
-        if self.parts.triad && has_axes(camera.size) {
-            axes.draw_triad(canvas, camera);
+        if has_axes(camera.size) {
+            behind(canvas, opacity, |canvas| {
+                if self.parts.axes {
+                    axes.draw_axes(canvas, camera);
+                }
+                if self.parts.triad {
+                    axes.draw_triad(canvas, camera);
+                }
+            });
         }
     }
 
@@ -152,6 +156,17 @@ impl Annotation {
     }
 }
 
+/// Draws behind the picture, as far as that is transparent.
+fn behind(canvas: &mut Canvas<'_>, opacity: &dyn Fn(usize) -> f64, draw: impl FnOnce(&mut Canvas<'_>)) {
+    let before = canvas.pixels.to_vec();
+    draw(canvas);
+    for (at, (pixel, before)) in canvas.pixels.iter_mut().zip(before).enumerate() {
+        if *pixel != before {
+            *pixel = over(before, *pixel, 1.0 - opacity(at));
+        }
+    }
+}
+
 /// How much lines of the box differ from the background.
 const BOX: f64 = 0.6;
 
@@ -185,7 +200,7 @@ mod tests {
 
     fn annotation() -> Annotation {
         let grid = Grid::unit([20, 10, 15]);
-        let axes = VolumeAxes { grid, region: grid.whole(), labels: Default::default() };
+        let axes = VolumeAxes { grid, region: grid.whole(), rim: 0.0, labels: Default::default() };
         let (title, values) = ("a run".into(), "speed (m s⁻¹)".into());
         Annotation { parts: Parts::ALL, title, values, axes: Some(axes), ..Annotation::default() }
     }

@@ -24,6 +24,8 @@ pub struct VolumeAxes {
     pub grid: Grid,
     /// The voxels that are drawn.
     pub region: Region,
+    /// How far the picture reaches beyond the box, in world units.
+    pub rim: f64,
     /// The axes x, y and z, with a coordinate for each voxel of the grid.
     pub labels: [AxisLabels; 3],
 }
@@ -94,11 +96,12 @@ impl VolumeAxes {
     /// Draws values and names along three edges of the box.
     pub(super) fn draw_axes(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
         for edge in (0..3).filter_map(|axis| self.edge(camera, axis)) {
-            self.draw_axis(canvas, &edge);
+            self.draw_axis(canvas, &edge, self.rim * camera.scale);
         }
     }
 
-    fn draw_axis(&self, canvas: &mut Canvas<'_>, edge: &Edge) {
+    /// Draws an axis, whose values begin `rim` pixels from the box.
+    fn draw_axis(&self, canvas: &mut Canvas<'_>, edge: &Edge, rim: f64) {
         let size = canvas.letters.size;
         let length = (edge.to[0] - edge.from[0]).hypot(edge.to[1] - edge.from[1]);
         if length < 4.0 * size {
@@ -108,14 +111,14 @@ impl VolumeAxes {
         let mut widest: f64 = 0.0;
         for (text, share) in self.ticks(edge.axis, (length / (3.2 * size)) as usize) {
             let at = point(edge.from, edge.to, share);
-            canvas.line(at, moved(at, edge.out, 0.4 * size), (THIN * size).max(1.0));
+            canvas.line(at, moved(at, edge.out, rim + 0.4 * size), (THIN * size).max(1.0));
             let half = reach(edge.out, [canvas.letters.width(&text) / 2.0, size / 2.0]);
-            canvas.write(&text, moved(at, edge.out, 0.6 * size + half));
+            canvas.write(&text, moved(at, edge.out, rim + 0.6 * size + half));
             widest = widest.max(2.0 * half);
         }
         let name = self.labels[edge.axis].title();
         let half = reach(edge.out, [canvas.letters.width(&name) / 2.0, size / 2.0]);
-        canvas.write(&name, moved(point(edge.from, edge.to, 0.5), edge.out, 0.9 * size + widest + half));
+        canvas.write(&name, moved(point(edge.from, edge.to, 0.5), edge.out, rim + 0.9 * size + widest + half));
     }
 
     /// The values along an edge, and their places as shares of its length.
@@ -211,7 +214,7 @@ mod tests {
     fn axes(grid: Grid) -> VolumeAxes {
         let at = |a: usize| (0..grid.dims[a]).map(|n| grid.origin[a] + n as f64 * grid.spacing[a]).collect();
         let labels = |a: usize| AxisLabels { name: ["x", "y", "z"][a].into(), unit: "m".into(), at: at(a) };
-        VolumeAxes { grid, region: grid.whole(), labels: [0, 1, 2].map(labels) }
+        VolumeAxes { grid, region: grid.whole(), rim: 0.0, labels: [0, 1, 2].map(labels) }
     }
 
     #[test]
