@@ -84,7 +84,7 @@ fn bad_values_of_render_are_named() {
         ("--roll nan", &["--roll", "finite"]),
         ("--splat-error -1", &["--splat-error", "0 or more"]),
         ("--background red", &["--background", "ffffff"]),
-        ("--format gif", &["--format", "png npy y4m rgb24 gray16"]),
+        ("--format bmp", &["--format", "png npy y4m rgb24 gray16"]),
         ("--fps 0", &["--fps"]),
         ("--center 1,2", &["--center", "3 numbers"]),
     ];
