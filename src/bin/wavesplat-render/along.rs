@@ -27,7 +27,8 @@ pub(crate) struct AlongArgs {
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     opacity_unit: Option<f64>,
-    /// Isosurfaces, as V[:RRGGBB[:OPACITY]],... V is a value, or a share of the range such as 40% [default: 50%; colours of
+    /// Isosurfaces: V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between. V is a value, or a share of the range such as
+    /// 40% [default: 50%; colours of
     /// --transfer-function; opaque if there is one, else 0.6]
     #[arg(long, value_name = "V,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     iso: Option<SurfaceList>,

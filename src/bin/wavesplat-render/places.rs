@@ -1,5 +1,6 @@
 //! Places along an axis: as options name them, and in voxels.
 
+use crate::annotations::in_letters;
 use std::str::FromStr;
 use wavesplat::base::description::{Attribute, Description, Values, coordinates};
 use wavesplat::base::error::{Error, Result};
@@ -107,7 +108,7 @@ impl Axes {
     pub(crate) fn labels(&self) -> [AxisLabels; 3] {
         self.0.each_ref().map(|axis| AxisLabels {
             name: axis.names[0].clone(),
-            unit: axis.unit.clone(),
+            unit: in_letters(&axis.unit),
             at: axis.at.clone(),
         })
     }

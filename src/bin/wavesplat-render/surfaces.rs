@@ -6,7 +6,7 @@ use std::str::FromStr;
 use wavesplat::colour::{Colour, TransferFunction};
 use wavesplat::render::Surface;
 
-/// Surfaces as V[:RRGGBB[:OPACITY]],...
+/// Surfaces as V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceList(Vec<Named>);
 

@@ -69,11 +69,16 @@ pub(super) fn has_axes(size: [usize; 2]) -> bool {
     LINES_FOR_AXES * line(size) <= size[0].min(size[1]) as f64
 }
 
+/// Whether a picture is large enough for the time or a title.
+pub(super) fn has_time(size: [usize; 2]) -> bool {
+    4.0 * TIME * line(size) <= size[1] as f64
+}
+
 /// The margins that parts and a title take in a picture of this size.
 pub fn margins(size: [usize; 2], parts: Parts, title: bool) -> Margins {
     let pixels = |is_there: bool, lines: f64| if is_there { (lines * line(size)).ceil() as usize } else { 0 };
     let axes = parts.axes && has_axes(size);
-    let top = pixels((parts.time || title) && has_axes(size), TIME);
+    let top = pixels((parts.time || title) && has_time(size), TIME);
     Margins {
         left: pixels(axes, AXIS[0]),
         right: pixels(parts.bar && has_bar(size), BAR),
@@ -91,7 +96,10 @@ mod tests {
         for width in (1..2000).step_by(37) {
             for height in (1..2000).step_by(41) {
                 let Margins { left, right, top, bottom } = margins([width, height], Parts::ALL, true);
-                assert!(2 * (left + right) <= 2 * width * 4 / 5 && 2 * (top + bottom) <= height, "{width}x{height}");
+                assert!(
+                    2 * (left + right) <= 2 * width * 4 / 5 && 10 * (top + bottom) <= 7 * height,
+                    "{width}x{height}"
+                );
             }
         }
         assert_eq!(margins([512, 512], Parts::NONE, false), Margins::default());

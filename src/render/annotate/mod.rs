@@ -18,7 +18,7 @@ use crate::colour::{Rgb, Scale};
 use crate::render::ViewReport;
 use crate::view::camera::{Camera, View};
 use canvas::{Canvas, contrast, over};
-use layout::{BAR, has_axes, has_bar, line};
+use layout::{BAR, has_axes, has_bar, has_time, line};
 use text::Letters;
 
 /// The annotations of a run's pictures.
@@ -72,7 +72,9 @@ impl Annotation {
         if let Some((axes, camera)) = &drawn {
             self.draw_volume(&mut canvas, (axes, camera), opacity);
         }
-        self.draw_texts(&mut canvas, frame);
+        if has_time(size) {
+            self.draw_texts(&mut canvas, frame);
+        }
         if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
             self.draw_bar(&mut canvas, scale);
         }
@@ -139,13 +141,15 @@ impl Annotation {
             return;
         }
         let (x, y, w, h) = (left as i64, top as i64, thick as i64, length as i64);
-        canvas.fill([x - 1, y - 1], [w + 2, h + 2], canvas.ink);
+        let rim = (volume::THIN * size).round().max(1.0);
+        let edge = rim as i64;
+        canvas.fill([x - edge, y - edge], [w + 2 * edge, h + 2 * edge], canvas.ink);
         for row in 0..h {
             canvas.fill([x, y + row], [w, 1], scale.colour_at(1.0 - row as f64 / (h - 1).max(1) as f64));
         }
         for value in ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8)) {
             let (at, text) = (top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5, volume::text(value));
-            canvas.line([left - 1.0 - 0.4 * size, at], [left - 1.0, at], 1.0);
+            canvas.line([left - rim - 0.4 * size, at], [left - rim, at], rim);
             let half = canvas.letters.width(&text) / 2.0;
             if 2.0 * half <= (BAR - name - 1.7) * size + 1.0 {
                 canvas.write(&text, [left - 0.8 * size - half, at]);

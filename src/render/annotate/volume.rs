@@ -31,7 +31,7 @@ pub struct VolumeAxes {
 }
 
 /// The width of lines, in lines of letters.
-const THIN: f64 = 0.08;
+pub(super) const THIN: f64 = 0.08;
 
 /// An edge of the box in a picture.
 #[derive(Debug, Clone, Copy)]
@@ -103,7 +103,7 @@ impl VolumeAxes {
     /// Draws an axis, whose values begin `rim` pixels from the box.
     fn draw_axis(&self, canvas: &mut Canvas<'_>, edge: &Edge, rim: f64) {
         let size = canvas.letters.size;
-        let length = (edge.to[0] - edge.from[0]).hypot(edge.to[1] - edge.from[1]);
+        let length = length([edge.to[0] - edge.from[0], edge.to[1] - edge.from[1]]);
         if length < 4.0 * size {
             return;
         }
@@ -125,10 +125,14 @@ impl VolumeAxes {
     fn ticks(&self, axis: usize, wanted: usize) -> Vec<(String, f64)> {
         let ([first, last], labels) = (self.ends(axis), &self.labels[axis]);
         let [from, to] = [first, last].map(|voxel| labels.coordinate(voxel));
-        let values = round_values(from.min(to), from.max(to), wanted.clamp(1, 8));
         let share = |value: f64| (labels.voxel(value) - first) / (last - first);
         let within = |share: &f64| (-1e-9..=1.0 + 1e-9).contains(share);
-        values.into_iter().map(|value| (text(value), share(value))).filter(|(_, at)| within(at)).collect()
+        let values = |wanted: usize| -> Vec<(String, f64)> {
+            let values = round_values(from.min(to), from.max(to), wanted).into_iter();
+            values.map(|value| (text(value), share(value))).filter(|(_, at)| within(at)).collect()
+        };
+        // One value alone tells no scale.
+        (wanted.clamp(1, 8)..=8).map(values).find(|values| values.len() > 1).unwrap_or_default()
     }
 
     /// Draws arrows along x, y and z at the lower left.
@@ -184,10 +188,15 @@ pub(super) fn text(value: f64) -> String {
     decimal::short(value).replace('-', "−")
 }
 
+/// The length of a vector. The system's `hypot` may differ from machine to machine.
+fn length([x, y]: [f64; 2]) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
 /// The direction from a line away from a point.
 fn away(from: [f64; 2], to: [f64; 2], point: [f64; 2]) -> [f64; 2] {
     let along = [to[0] - from[0], to[1] - from[1]];
-    let length = along[0].hypot(along[1]).max(f64::MIN_POSITIVE);
+    let length = length(along).max(f64::MIN_POSITIVE);
     let across = [-along[1] / length, along[0] / length];
     let side = (from[0] - point[0]) * across[0] + (from[1] - point[1]) * across[1];
     if side < 0.0 { across.map(|n| -n) } else { across }
