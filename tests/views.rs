@@ -7,7 +7,9 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
-use wavesplat::render::{CoefficientScene, Limit, Quantity, RenderConfig, RenderReport, Scene, SplatSource, render};
+use wavesplat::render::{
+    CoefficientScene, Limit, Mode, Plane, Quantity, RenderConfig, RenderReport, Scene, SplatSource, check, render,
+};
 use wavesplat::view::camera::View;
 
 const GRID: Grid = Grid { dims: [20, 21, 90], spacing: [1.0, 0.9, 1.1], origin: [5.0, 0.0, -3.0] };
@@ -114,4 +116,37 @@ fn views_of_one_run_are_of_one_size() {
         let refused = by_view(&mut direct(&memory, None), &RenderConfig { views, ..config.clone() });
         assert!(matches!(refused, Err(Error::Setting { setting: "views", .. })));
     }
+}
+
+#[test]
+fn views_in_pairs_with_frames_show_these_alone() {
+    let samples = field(&GRID, FRAMES, 7);
+    let mut memory = archive(GRID, SampleType::F32, &samples);
+    let file = stored(&mut memory, &ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) });
+    let plain = looking(view(0.0, 0.0, [70, 66]), 0.0, Quantity::Mean, &GRID, FRAMES);
+    let surface = wavesplat::render::Surface { value: 0.3, colour: [1.0; 3], opacity: 0.5 };
+    let iso = Mode::Iso { surfaces: vec![surface], light: wavesplat::render::Light::default(), slices: None };
+    let planes = Mode::Planes { planes: vec![Plane { axis: 2, at: 20.5 }] };
+    let pairs = [1, 4, 4, 9, 10];
+    for mode in [Mode::Projection, Mode::Mip { slices: None }, iso, planes] {
+        let all = RenderConfig { views: views(), mode, ..plain.clone() };
+        let paired = RenderConfig { frames: pairs.to_vec(), paired: true, ..all.clone() };
+        let mut scene = CoefficientScene::new(file.open(), SplatSource::Samples);
+        let mut shown = Vec::new();
+        let mut found = Vec::new();
+        let report = render(&mut scene, &paired, &Silent, &mut |rendered| {
+            assert_eq!(rendered.views.len(), 5);
+            shown.push((rendered.view, rendered.frame));
+            found.push(rendered.picture.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            Ok(())
+        });
+        assert_eq!((report.unwrap().frames, &shown), (5, &paired.shown()));
+        for (view, frame) in shown {
+            let alone = RenderConfig { views: vec![all.views[view]], frames: vec![frame], ..all.clone() };
+            assert!(by_view(&mut scene, &alone).unwrap().0[0] == found[view], "view {view}, frame {frame}");
+        }
+    }
+    let scene = CoefficientScene::new(file.open(), SplatSource::Samples);
+    let four = RenderConfig { views: views(), frames: vec![0, 1, 2, 3], paired: true, ..plain };
+    assert!(matches!(check(&scene, &four), Err(Error::Setting { setting: "views", .. })));
 }

@@ -7,6 +7,8 @@ pub mod error;
 pub mod progress;
 pub(crate) mod memory;
 pub(crate) mod zeroed;
+#[doc(hidden)]
+pub mod text;
 pub(crate) mod spread;
 pub(crate) mod half;
 mod calendar;

@@ -2,12 +2,11 @@
 
 use super::{TransferFunction, paraview, table};
 use crate::base::error::{Error, Result};
-use std::fs::File;
-use std::io::Read;
+use crate::base::text;
 use std::path::Path;
 
-/// The largest size of a colour map file, so that an endless file cannot exhaust memory.
-const MOST_BYTES: u64 = 16 << 20;
+/// What a file is expected to be.
+const KIND: &str = "colour map";
 
 /// Splits `FILE.json#MAP` into the file and the name of the map.
 pub(super) fn split(name: &str) -> (&str, Option<&str>) {
@@ -20,8 +19,8 @@ pub(super) fn split(name: &str) -> (&str, Option<&str>) {
 pub(super) fn read(name: &str) -> Result<TransferFunction> {
     let (path, map) = split(name);
     let parsed = match ending(path).as_str() {
-        "json" => paraview::parse(&text(path)?, map),
-        "csv" => table::parse(&text(path)?),
+        "json" => paraview::parse(&text::read(Path::new(path), KIND)?, map),
+        "csv" => table::parse(&text::read(Path::new(path), KIND)?),
         _ => {
             let what = "takes the name of a colour map, or a file: ParaView's .json, or .csv";
             return Err(Error::path(path, what));
@@ -32,23 +31,6 @@ pub(super) fn read(name: &str) -> Result<TransferFunction> {
 
 fn ending(path: &str) -> String {
     Path::new(path).extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
-}
-
-/// The text of a file.
-fn text(path: &str) -> Result<String> {
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
-    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "reading", e))?;
-    text_of(bytes).map_err(|what| Error::input(path, what))
-}
-
-fn text_of(bytes: Vec<u8>) -> std::result::Result<String, String> {
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(format!("is larger than {} MiB, which no colour map is", MOST_BYTES >> 20));
-    }
-    let text = String::from_utf8(bytes).map_err(|_| "is not text, which a colour map is expected to be")?;
-    let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors write it
-    if text.trim().is_empty() { Err("is empty, where a colour map is expected".into()) } else { Ok(text) }
 }
 
 #[cfg(test)]
@@ -67,7 +49,7 @@ mod tests {
     #[test]
     fn files_that_are_not_colour_maps_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
-        let long = vec![b' '; MOST_BYTES as usize + 1];
+        let long = vec![b' '; text::MOST_BYTES as usize + 1];
         let cases: [(&str, &[u8], &str); 5] = [
             ("a.json", b"", "is empty"),
             ("b.csv", b" \n\t\n", "is empty"),
@@ -137,7 +119,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_bytes_make_a_reader_panic(bytes in texts()) {
-            let Ok(text) = text_of(bytes) else { return Ok(()) };
+            let Ok(text) = text::of(bytes, KIND) else { return Ok(()) };
             for map in [paraview::parse(&text, None), table::parse(&text)].into_iter().flatten() {
                 let (lo, hi) = map.range();
                 prop_assert!(lo < hi);

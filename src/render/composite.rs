@@ -19,19 +19,19 @@ use crate::base::grid::Grid;
 use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::colour::TransferFunction;
+use std::ops::Range;
 
-/// Renders all frames from all views. Progress counts slices of frames.
+/// Renders all frames from some of the views. Progress counts slices of frames.
 pub(super) fn composite(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    views: &[SlicedView],
+    (views, which): (&[SlicedView], Range<usize>),
     progress: &dyn Progress,
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    let all: usize = views.iter().map(SlicedView::slices).sum();
-    progress.start(Some((all * config.frames.len()) as u64));
-    for (number, view) in views.iter().enumerate() {
+    for number in which {
+        let view = &views[number];
         let mut sink =
             |frame, picture: &[f32]| sink(Rendered { views: &[], view: number, frame, picture, error: None });
         match &config.mode {

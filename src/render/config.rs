@@ -6,6 +6,7 @@ use crate::base::grid::{Grid, Region};
 use crate::colour::TransferFunction;
 use crate::view::camera::View;
 use crate::view::footprint::{Kernel, Method};
+use std::ops::Range;
 
 /// A pixel is background if its weights sum to less than this share of the view's largest sum.
 pub(super) const BACKGROUND: f64 = 0.01;
@@ -143,6 +144,9 @@ pub struct RenderConfig {
     pub quantity: Quantity,
     /// Frame numbers, ascending. Default: all frames.
     pub frames: Vec<usize>,
+    /// Whether each view shows one frame alone: the first view the first of `frames`, and so on. A frame may be there
+    /// several times then. Default: every view shows all frames.
+    pub paired: bool,
     /// The voxels to render; `None`, the default, means all.
     pub region: Option<Region>,
     /// The error that splatting may add. For an emission it is relative to the image of the largest |v| at the
@@ -182,6 +186,32 @@ impl RenderConfig {
         self.views[0].size
     }
 
+    /// View and frame of each picture, in the order of the views.
+    pub fn shown(&self) -> Vec<(usize, usize)> {
+        if self.paired {
+            return self.frames.iter().copied().enumerate().collect();
+        }
+        (0..self.views.len()).flat_map(|view| self.frames.iter().map(move |frame| (view, *frame))).collect()
+    }
+
+    /// The number of frames that a view shows.
+    pub(super) fn frames_of_view(&self) -> usize {
+        if self.paired { self.frames.len().min(1) } else { self.frames.len() }
+    }
+
+    /// Views that show the same frames, and settings with these frames alone.
+    pub(super) fn groups(&self) -> Vec<(Range<usize>, Self)> {
+        if !self.paired {
+            return vec![(0..self.views.len(), self.clone())];
+        }
+        let mut first = 0;
+        let group = |same: &[usize]| {
+            first += same.len();
+            (first - same.len()..first, Self { frames: vec![same[0]], ..self.clone() })
+        };
+        self.frames.chunk_by(|a, b| a == b).map(group).collect()
+    }
+
     /// The voxels of a grid to render.
     pub(super) fn clip(&self, grid: &Grid) -> Result<Region> {
         let clip = self.region.unwrap_or(grid.whole());
@@ -201,6 +231,9 @@ impl RenderConfig {
     pub(super) fn check(&self, scene_frames: Option<usize>) -> Result<()> {
         if self.views.is_empty() || self.views.iter().any(|view| view.size != self.size()) {
             return Err(Error::setting("views", "takes one view or more, with pictures of one size"));
+        }
+        if self.paired && self.views.len() != self.frames.len() {
+            return Err(Error::setting("views", "and frames in pairs need as many frames as views"));
         }
         if !self.frames.is_sorted() {
             return Err(Error::setting("frames", "takes ascending numbers"));

@@ -9,19 +9,20 @@ use super::scene::{FrameBatch, Scene};
 use crate::base::error::Result;
 use crate::base::memory;
 use crate::base::progress::Progress;
+use std::ops::Range;
 
-/// Renders all frames from all views. Progress counts pictures.
+/// Renders all frames from some of the views. Progress counts pictures.
 pub(super) fn cut(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    views: &[PlanesView],
+    (views, which): (&[PlanesView], Range<usize>),
     progress: &dyn Progress,
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    progress.start(Some((views.len() * config.frames.len()) as u64));
     let (blocks, at_a_time) = (scene.blocks(), blocks_at_a_time(scene, config, views));
-    for (number, view) in views.iter().enumerate() {
+    for number in which {
+        let view = &views[number];
         let config = RenderConfig { region: Some(view.needed()), ..config.clone() };
         let fits = |scene: &dyn Scene, frames| needed(scene, &config, view, (frames, at_a_time)) <= config.memory;
         let together = |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n)).unwrap_or(1);

@@ -31,6 +31,7 @@
 //! driver            the loop over frame batches
 //! project           the pictures of a batch as projections; composite: slice by slice; cut: planes through the volume
 //! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
+//! setups            the setups of all views, and which mode renders them
 //! ```
 //!
 //! ```text
@@ -72,6 +73,7 @@ mod cut;
 pub mod annotate;
 pub mod sink;
 mod pictures;
+mod setups;
 
 pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
@@ -87,17 +89,14 @@ pub use scene::{
 };
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
 
-use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::error::Result;
 use crate::base::progress::Progress;
-use crate::view::camera::View;
 use plan::Budget;
-use planes::PlanesView;
-use slices::SlicedView;
-use splat::ViewSetup;
-use splat::reference_weights::{with_backend, without_dim_voxels};
+use setups::Setups;
 use std::time::{Duration, Instant};
 
-/// Renders all frames from all views and gives each picture to `sink`. The frames of one view come in order.
+/// Renders all frames from all views, or each view's own frame ([`RenderConfig::paired`]), and gives each picture to
+/// `sink`. The frames of one view come in order.
 ///
 /// # Errors
 /// Invalid settings, too little memory, failed reads, or an error of `sink`.
@@ -120,13 +119,12 @@ pub fn render(
         sink_time += writing.elapsed();
         Ok(())
     };
-    match &setups {
-        Setups::Splatted(setups) => project::project(scene, config, setups, progress, &mut report, &mut sink)?,
-        Setups::Sliced(views) => composite::composite(scene, config, views, progress, &mut report, &mut sink)?,
-        Setups::Planes(views) => cut::cut(scene, config, views, progress, &mut report, &mut sink)?,
+    progress.start(Some(setups.steps(config)));
+    for (views, config) in config.groups() {
+        setups.render((scene, &config), views, progress, &mut report, &mut sink)?;
     }
     progress.finish();
-    report.sum_up_expected_errors();
+    report.sum_up_expected_errors(config.frames_of_view());
     report.seconds = (started.elapsed() - sink_time).as_secs_f64();
     Ok(report)
 }
@@ -145,71 +143,4 @@ pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
 /// The errors that [`check`] returns, but for too little memory.
 pub fn least_memory(scene: &dyn Scene, config: &RenderConfig) -> Result<usize> {
     Ok(Setups::new(scene, config)?.least(scene, config))
-}
-
-/// The setups of all views.
-enum Setups {
-    /// Of projections.
-    Splatted(Vec<ViewSetup>),
-    /// Of composites and maximum intensity projections.
-    Sliced(Vec<SlicedView>),
-    /// Of planes through the volume.
-    Planes(Vec<PlanesView>),
-}
-
-impl Setups {
-    fn new(scene: &dyn Scene, config: &RenderConfig) -> Result<Self> {
-        config.check(scene.frames())?;
-        let (grid, views) = (scene.grid(), config.views.iter());
-        if config.mode.is_projection() {
-            let volume = (*grid, scene.blocks());
-            let setup = |view: &View| {
-                let setup = with_backend(ViewSetup::new(volume, config, view)?, config)?;
-                without_dim_voxels(setup, config)
-            };
-            return views.map(setup).collect::<Result<_>>().map(Self::Splatted);
-        }
-        if scene.channels() > 1 {
-            let what = "the samples are colours already, and colours are rendered as projections only";
-            return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
-        }
-        if let Mode::Planes { planes } = &config.mode {
-            let clip = config.clip(grid)?;
-            return views
-                .map(|view| PlanesView::new(grid, clip, planes, view))
-                .collect::<Result<_>>()
-                .map(Self::Planes);
-        }
-        views.map(|view| SlicedView::new(grid, config, view)).collect::<Result<_>>().map(Self::Sliced)
-    }
-
-    /// The least memory with which any view can be rendered alone.
-    fn least(&self, scene: &dyn Scene, config: &RenderConfig) -> usize {
-        match self {
-            Self::Splatted(setups) => Budget::least(config, scene, setups),
-            Self::Sliced(views) => composite::least(scene, config, views),
-            Self::Planes(views) => cut::least(scene, config, views),
-        }
-    }
-
-    /// The report of each view, before anything is rendered.
-    fn reports(&self, config: &RenderConfig) -> Vec<ViewReport> {
-        let views = config.views.iter();
-        match self {
-            Self::Splatted(setups) => {
-                let of = |(view, setup): (&View, &ViewSetup)| ViewReport {
-                    splat_error_is_estimate: config.quick && setup.backend.is_lattice(),
-                    ..ViewReport::new(view, setup)
-                };
-                views.zip(setups).map(of).collect()
-            }
-            Self::Sliced(all) => {
-                let of = |(view, sliced): (&View, &SlicedView)| {
-                    ViewReport::of_slices(view, &sliced.camera, sliced.slices(), sliced.cells)
-                };
-                views.zip(all).map(of).collect()
-            }
-            Self::Planes(all) => views.zip(all).map(|(view, of)| ViewReport::of_planes(view, &of.camera)).collect(),
-        }
-    }
 }

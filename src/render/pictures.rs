@@ -26,7 +26,7 @@ pub fn render_png(
     super::check(scene, config)?;
     let sink = SinkConfig { force: true, ..SinkConfig::new(scene, config, colours.clone()) };
     let names = names_of_views(path.as_ref(), config.views.len(), false)?;
-    let shown = |view| config.frames.iter().map(|frame| (view, *frame)).collect();
+    let shown = |view| config.shown().into_iter().filter(|(of, _)| *of == view).collect();
     let open = |(view, name): (usize, _)| Sink::open(name, SinkConfig { shown: shown(view), ..sink.clone() });
     let mut sinks = names.iter().map(std::path::PathBuf::as_path).enumerate().map(open).collect::<Result<Vec<_>>>()?;
     let report = super::render(scene, config, &Silent, &mut |rendered| sinks[rendered.view].picture(&rendered))?;

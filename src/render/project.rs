@@ -14,25 +14,25 @@ use crate::base::error::Result;
 use crate::base::progress::Progress;
 use crate::base::zeroed::Zeroed;
 use std::borrow::Cow;
+use std::ops::Range;
 use std::time::Instant;
 
-/// Renders projections, as many views together as fit in memory.
+/// Renders projections from some of the views, as many together as fit in memory. Progress counts pictures.
 pub(super) fn project(
     scene: &mut dyn Scene,
     config: &RenderConfig,
-    setups: &[ViewSetup],
+    (setups, which): (&[ViewSetup], Range<usize>),
     progress: &dyn Progress,
     report: &mut RenderReport,
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<()> {
-    progress.start(Some((setups.len() * config.frames.len()) as u64));
     let mut sink = |rendered: Rendered<'_>| {
         progress.advance(1);
         sink(rendered)
     };
-    let mut first = 0;
-    while first < setups.len() {
-        let budget = Budget::of_most(config, scene, &setups[first..]);
+    let mut first = which.start;
+    while first < which.end {
+        let budget = Budget::of_most(config, scene, &setups[first..which.end]);
         render_views(scene, config, (&budget, first), report, &mut sink)?;
         first += budget.setups().len();
     }

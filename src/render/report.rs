@@ -29,7 +29,7 @@ pub struct Rendered<'a> {
 /// The counts, errors and times of a rendering.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RenderReport {
-    /// Number of frames rendered from every view.
+    /// Number of frames rendered from every view; of pictures if each view shows its own frame.
     pub frames: usize,
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
@@ -139,8 +139,8 @@ impl RenderReport {
     }
 
     /// Turns the sums over the frames of each view into root mean squares, and combines these into one for all views.
-    pub(super) fn sum_up_expected_errors(&mut self) {
-        let (frames, views) = (self.frames.max(1) as f64, self.views.len() as f64);
+    pub(super) fn sum_up_expected_errors(&mut self, frames: usize) {
+        let (frames, views) = (frames.max(1) as f64, self.views.len() as f64);
         self.views.iter_mut().for_each(|view| view.expected_error = (view.expected_error / frames).sqrt());
         let squares: f64 = self.views.iter().map(|view| view.expected_error * view.expected_error).sum();
         self.expected_error = (squares / views).sqrt();

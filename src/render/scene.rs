@@ -91,6 +91,7 @@ impl RenderConfig {
             kernel: Kernel::of_grid(scene.grid()),
             quantity: Quantity::Mean,
             frames: (0..scene.frames().unwrap_or(0)).collect(),
+            paired: false,
             region: None,
             splat_error: default_splat_error(scene.tolerance()),
             quick: false,

@@ -177,7 +177,7 @@ fn parts_of_annotations_are_drawn_alone() {
     };
     let plain = shown("");
     assert!(shown("--annotate=none") == plain);
-    let parts = ["box", "axes", "triad", "bar", "time"].map(|part| shown(&format!("--annotate={part}")));
+    let parts = ["box", "axes", "triad", "scale", "bar", "time"].map(|part| shown(&format!("--annotate={part}")));
     for (n, one) in parts.iter().enumerate() {
         assert!(*one != plain && parts.iter().skip(n + 1).all(|other| other != one), "part {n}");
     }

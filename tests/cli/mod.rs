@@ -25,6 +25,7 @@ mod manners;
 mod max_error;
 mod memory;
 mod modes;
+mod motion;
 mod movies;
 mod mutated;
 mod pictures;

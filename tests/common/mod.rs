@@ -128,6 +128,7 @@ pub(crate) fn looking(view: View, tau: f64, quantity: Quantity, grid: &Grid, fra
         kernel,
         quantity,
         frames,
+        paired: false,
         region: None,
         splat_error: 0.0,
         quick: false,

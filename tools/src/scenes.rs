@@ -36,6 +36,7 @@ pub(crate) fn projection(
         kernel: Kernel::new(None, tau, grid)?,
         quantity: Quantity::Mean,
         frames,
+        paired: false,
         region: None,
         splat_error,
         quick: false,

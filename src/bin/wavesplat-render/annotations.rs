@@ -18,7 +18,7 @@ use wavesplat::view::camera::{Camera, View};
 #[derive(Debug, Args)]
 pub(crate) struct AnnotationArgs {
     /// Draw the box of the volume, values along its axes, a colour bar and the time of each frame; or only some of all,
-    /// none, box, axes, triad, bar and time
+    /// none, box, axes, triad (arrows along x, y and z), scale (a line of a round length), bar and time
     #[arg(
         long,
         value_name = "PARTS",
@@ -59,9 +59,10 @@ impl FromStr for PartList {
                 "box" => parts.bounds = true,
                 "axes" => parts.axes = true,
                 "triad" => parts.triad = true,
+                "scale" => parts.scale = true,
                 "bar" => parts.bar = true,
                 "time" => parts.time = true,
-                other => return Err(format!("'{other}' is none of all, none, box, axes, triad, bar and time")),
+                other => return Err(format!("'{other}' is none of all, none, box, axes, triad, scale, bar and time")),
             }
         }
         Ok(Self(parts))
@@ -81,9 +82,9 @@ impl AnnotationArgs {
 
     /// The names of the parts that are drawn, as the option takes them.
     pub(crate) fn words(&self) -> Option<String> {
-        let Parts { bounds, axes, triad, bar, time } = self.annotate?.0;
-        let all = [(bounds, "box"), (axes, "axes"), (triad, "triad"), (bar, "bar"), (time, "time")];
-        let names: Vec<&str> = all.into_iter().filter(|(is_drawn, _)| *is_drawn).map(|(_, name)| name).collect();
+        let Parts { bounds, axes, triad, scale, bar, time } = self.annotate?.0;
+        let named = [(bounds, "box"), (axes, "axes"), (triad, "triad"), (scale, "scale"), (bar, "bar"), (time, "time")];
+        let names: Vec<&str> = named.into_iter().filter(|(is_drawn, _)| *is_drawn).map(|(_, name)| name).collect();
         Some(if names.is_empty() { "none".into() } else { names.join(",") })
     }
 
@@ -104,8 +105,8 @@ impl AnnotationArgs {
         margins(size, self.parts(), self.title.is_some())
     }
 
-    /// Views in one scale, in which the volume fits beside the margins.
-    pub(crate) fn beside(views: Vec<View>, grid: &Grid, around: Margins) -> Result<Vec<View>> {
+    /// Views in one scale, in which the volume fits beside the margins, but for the zoom of each.
+    pub(crate) fn beside((views, zooms): (Vec<View>, &[f64]), grid: &Grid, around: Margins) -> Result<Vec<View>> {
         let Margins { left, right, top, bottom } = around;
         let camera = |view: &View| {
             let size = [view.size[0] - left - right, view.size[1] - top - bottom];
@@ -113,13 +114,12 @@ impl AnnotationArgs {
         };
         let cameras = views.iter().map(camera).collect::<Result<Vec<_>>>()?;
         let scale = cameras.iter().map(|camera| camera.scale).fold(f64::INFINITY, f64::min);
-        let [across, up] = [[right, left], [top, bottom]].map(|[a, b]| (a as f64 - b as f64) / 2.0 / scale);
-        let moved = |(view, camera): (View, &Camera)| View {
-            scale: Some(scale),
-            center: Some(camera.moved(across, up)),
-            ..view
+        let moved = |((view, camera), zoom): ((View, &Camera), &f64)| {
+            let scale = scale * zoom;
+            let [across, up] = [[right, left], [top, bottom]].map(|[a, b]| (a as f64 - b as f64) / 2.0 / scale);
+            View { scale: Some(scale), center: Some(camera.moved(across, up)), ..view }
         };
-        Ok(views.into_iter().zip(&cameras).map(moved).collect())
+        Ok(views.into_iter().zip(&cameras).zip(zooms).map(moved).collect())
     }
 }
 
@@ -134,7 +134,11 @@ impl Cli {
         let region = self.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
         let has_kernel = !matches!(config.mode, Mode::Planes { .. });
         let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
-        Ok(VolumeAxes { grid: *whole, region, rim, labels: axes.labels() })
+        let volume = VolumeAxes { grid: *whole, region, rim, labels: axes.labels() };
+        if self.around.parts().scale && volume.length_unit().is_none() {
+            self.common.note("no scale is drawn, since lengths differ from axis to axis");
+        }
+        Ok(volume)
     }
 }
 

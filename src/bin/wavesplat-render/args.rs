@@ -4,6 +4,7 @@ use crate::along::AlongArgs;
 use crate::annotations::AnnotationArgs;
 use crate::colours::ColourArgs;
 use crate::cuts::CutArgs;
+use crate::motion::MotionArgs;
 use crate::probes::ProbeArgs;
 use crate::view_names::ViewSpec;
 use clap::{Parser, ValueEnum};
@@ -25,6 +26,7 @@ Examples:
   wavesplat-render run.wspl -o values.npy --size 800x600 --sidecar values.json
   wavesplat-render run.wspl --orbit 36 --frames 10 -o turn_%02v.png
   wavesplat-render run.wspl --orbit 90 --frames 10 --annotate -o turntable.apng
+  wavesplat-render run.wspl --orbit 120 --over-time -o turning.mp4
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
   wavesplat-render run.wspl --annotate -o run.mp4
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
@@ -116,6 +118,8 @@ pub(crate) struct Cli {
     #[arg(long, value_enum, default_value = "mean", help_heading = "Along the ray")]
     pub(crate) quantity: QuantityName,
     #[command(flatten)]
+    pub(crate) motion: MotionArgs,
+    #[command(flatten)]
     pub(crate) colour: ColourArgs,
     #[command(flatten)]
     pub(crate) around: AnnotationArgs,
@@ -138,9 +142,6 @@ pub(crate) struct Cli {
     /// Also write the --json report to a file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(crate) sidecar: Option<PathBuf>,
-    /// Frames per second of a movie, y4m or apng
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Output")]
-    pub(crate) fps: u32,
     /// A value that means "missing" in frames, besides NaN and infinities
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = "Input")]
     pub(crate) missing_value: Option<f64>,

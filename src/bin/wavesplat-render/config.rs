@@ -44,15 +44,17 @@ impl Cli {
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(share_tolerance));
         let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
-        let all = scene.frames().unwrap_or(0);
+        let frames = self.frames_of(scene.frames().unwrap_or(0))?;
+        let views = self.views(&whole, &frames)?;
         Ok(RenderConfig {
-            views: if lod == 0 { self.views(grid)? } else { fixed(&self.views(&whole)?, &whole)? },
+            frames: self.frames_of_views(frames, views.len())?,
+            paired: self.is_moving(),
+            views: if lod == 0 { views } else { fixed(&views, &whole)? },
             kernel: Kernel::new(self.sigma, self.tau, grid)?,
             quantity: match self.quantity {
                 QuantityName::Mean => Quantity::Mean,
                 QuantityName::Emission => Quantity::Emission,
             },
-            frames: self.frames.as_ref().map_or(Ok((0..all).collect()), |f| f.resolve(all))?,
             region: self.region_of(&whole, lod)?,
             splat_error,
             quick: self.fast,
@@ -62,6 +64,11 @@ impl Cli {
             mode: of_whole(self.along.mode(colours)?, &whole),
             memory: self.common.memory.0,
         })
+    }
+
+    /// The frames to render, of `all`.
+    pub(crate) fn frames_of(&self, all: usize) -> Result<Vec<usize>> {
+        self.frames.as_ref().map_or(Ok((0..all).collect()), |frames| frames.resolve(all))
     }
 
     /// The voxels to render, of those that a level of detail has.

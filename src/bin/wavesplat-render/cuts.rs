@@ -129,11 +129,15 @@ impl Cli {
     /// The axis of the only slice, if it is to be seen face-on.
     pub(crate) fn face(&self, axes: &Axes) -> Result<Option<usize>> {
         match self.cuts.planes.as_slice() {
-            [only] if self.views.is_empty() && self.orbit == 1 && self.along.mode_name() == ModeName::Slice => {
+            [only] if self.has_no_view() && self.along.mode_name() == ModeName::Slice => {
                 axes.find(OPTION, &only.axis).map(Some)
             }
             _ => Ok(None),
         }
+    }
+
+    fn has_no_view(&self) -> bool {
+        self.views.is_empty() && self.orbit == 1 && !self.is_moving()
     }
 
     /// A plane across an axis, face-on: x to the right if possible, else y; z up if possible, else y. It fills the
@@ -149,7 +153,7 @@ impl Cli {
         let [across, up] = [[1, 2], [0, 2], [0, 1]][axis];
         let fit = |pixels: usize, along: usize| pixels as f64 / (grid.dims[along] as f64 * grid.spacing[along]);
         let scale = fit(size[0] - left - right, across).min(fit(size[1] - top - bottom, up));
-        let views = AnnotationArgs::beside(vec![View { scale: Some(scale), ..view }], grid, around)?;
+        let views = AnnotationArgs::beside((vec![View { scale: Some(scale), ..view }], &[1.0]), grid, around)?;
         Ok(views.into_iter().next().unwrap_or(view))
     }
 }

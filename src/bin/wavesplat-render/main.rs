@@ -10,6 +10,7 @@ mod colours;
 mod config;
 mod cuts;
 mod generate;
+mod motion;
 mod places;
 mod probes;
 mod provenance;

@@ -20,11 +20,14 @@ use wavesplat::file::{CoefficientFile, setting, time_labels};
 use wavesplat::render::planes::Taps;
 
 /// Options of pictures, which time series do not have.
-const OF_PICTURES: [&str; 31] = [
+const OF_PICTURES: [&str; 34] = [
     "planes",
     "slices",
     "views",
     "orbit",
+    "over_time",
+    "key_frames",
+    "speed",
     "roll",
     "size",
     "scale",

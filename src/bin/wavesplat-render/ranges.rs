@@ -34,6 +34,9 @@ const LEAST_FRAMES: usize = 4;
 const MOST_FRAMES: usize = 16;
 const MOST_SAMPLES: usize = 5 << 20;
 
+/// The largest number of views to look at.
+const MOST_VIEWS: usize = 16;
+
 /// Bytes of memory for each sample of an overview: it takes at most a quarter.
 const MEMORY_SHARE: usize = 32;
 
@@ -71,8 +74,8 @@ fn robust_range(values: &[f32]) -> (f64, f64) {
 
 /// The settings of small pictures.
 fn small(config: &RenderConfig) -> RenderConfig {
-    let mut small = config.clone();
-    small.certify = false;
+    let views = spread_over(config.views.len(), MOST_VIEWS).into_iter().map(|view| config.views[view]).collect();
+    let mut small = RenderConfig { views, paired: false, certify: false, ..config.clone() };
     if matches!(config.mode, Mode::Planes { .. }) {
         return small; // planes are small already: their blocks are the work, and not their pixels
     }
@@ -98,10 +101,14 @@ fn rough(small: &RenderConfig) -> RenderConfig {
 
 /// At most `count` frames, spread over the archive.
 fn spread(scene: &dyn Scene, count: usize) -> Vec<usize> {
-    let last = scene.frames().unwrap_or(1).saturating_sub(1);
-    let mut frames: Vec<usize> = (0..count).map(|i| i * last / (count - 1)).collect();
-    frames.dedup();
-    frames
+    spread_over(scene.frames().unwrap_or(1), count)
+}
+
+/// At most `count` of the numbers below `all`, from the first to the last.
+fn spread_over(all: usize, count: usize) -> Vec<usize> {
+    let mut chosen: Vec<usize> = (0..count).map(|i| i * all.saturating_sub(1) / (count - 1)).collect();
+    chosen.dedup();
+    chosen
 }
 
 /// The number of samples to take.

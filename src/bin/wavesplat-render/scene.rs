@@ -100,8 +100,9 @@ impl Cli {
             return Ok(level);
         }
         let grid = file.whole_grid();
-        let scales =
-            self.views(&grid)?.iter().map(|view| Ok(Camera::new(view, &grid)?.scale)).collect::<Result<Vec<_>>>()?;
+        let frames = self.frames_of(file.metadata().windows.iter().map(|window| window.frames as usize).sum())?;
+        let views = self.views(&grid, &frames)?;
+        let scales = views.iter().map(|view| Ok(Camera::new(view, &grid)?.scale)).collect::<Result<Vec<_>>>()?;
         let voxel = scales.into_iter().fold(0.0, f64::max) * grid.largest_spacing();
         let fits = |lod: &u32| voxel * f64::from(1_u32 << lod) <= 1.0;
         Ok((0..=file.coarsest_detail()).take_while(fits).last().unwrap_or(0))

@@ -47,7 +47,7 @@ impl Cli {
             size: self.size.0,
             shown: Vec::new(),
             provenance: Arc::new(provenance.clone()),
-            fps: self.fps,
+            fps: self.fps(config, &annotation.times)?,
             pixel: *pixel,
             colours: of_pictures.clone(),
             depth: self.depth,

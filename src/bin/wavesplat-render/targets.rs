@@ -19,19 +19,23 @@ impl Targets {
     pub(crate) fn new(path: &Path, format: Option<PictureFormat>, config: &RenderConfig) -> Result<Self> {
         let format = format.map_or_else(|| format_of(path), Ok)?;
         format.check(path)?;
-        let joined = config.frames.len() == 1 && format.takes_all(path);
+        let joined = match format.takes_all(path) {
+            true => config.frames.len() == 1 || config.paired,
+            false => config.paired && config.frames.is_sorted_by(|a, b| a < b),
+        };
         Ok(Self { format, names: names_of_views(path, config.views.len(), joined)? })
     }
 
     /// The view and the frame of each picture in the file of this number.
     pub(crate) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
-        let views = if self.names.len() == 1 { 0..config.views.len() } else { name..name + 1 };
-        views.flat_map(|view| config.frames.iter().map(move |frame| (view, *frame))).collect()
+        let mut shown = config.shown();
+        shown.retain(|(view, _)| self.names.len() == 1 || *view == name);
+        shown
     }
 
     /// Bytes of memory that writing takes.
     pub(crate) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
-        let each = config.frames.len() * config.views.len() / self.names.len();
+        let each = config.shown().len() / self.names.len();
         Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())
     }
 }
@@ -77,9 +81,10 @@ impl Cli {
             written.insert(path.clone());
         }
         for targets in [Some(&pictures), errors.as_ref()].into_iter().flatten() {
-            for name in &targets.names {
+            for (n, name) in targets.names.iter().enumerate() {
                 spare_inputs(&self.inputs, name)?;
-                let paths = Sink::paths(name, targets.format, &config.frames)?;
+                let frames: Vec<usize> = targets.shown(n, config).into_iter().map(|(_, frame)| frame).collect();
+                let paths = Sink::paths(name, targets.format, &frames)?;
                 if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
                     let what = "would be written twice; give the pictures, --error-image and --sidecar different names";
                     return Err(Error::usage(format!("{}: {what}", twice.display())));

@@ -9,6 +9,16 @@ pub(super) struct Canvas<'a> {
     pub(super) width: usize,
     pub(super) ink: Rgb,
     pub(super) letters: Letters,
+    /// The rectangles of all texts, and of the colour bar. Nothing else is drawn there.
+    pub(super) taken: Vec<Rectangle>,
+}
+
+/// The left upper and the right lower corner.
+pub(super) type Rectangle = [[f64; 2]; 2];
+
+/// Whether two rectangles have a point in common.
+fn overlap(a: &Rectangle, b: &Rectangle) -> bool {
+    (0..2).all(|i| a[0][i] < b[1][i] && b[0][i] < a[1][i])
 }
 
 /// Black or white, whichever stands out from a colour.
@@ -47,14 +57,28 @@ impl Canvas<'_> {
         line(size, from, to, thickness, |x, y, share| self.put(x, y, ink, share));
     }
 
-    /// Writes a text around a point, if it fits in the picture. Returns whether it does.
+    /// Whether a rectangle is in the picture and free.
+    fn is_free(&self, rectangle: &Rectangle) -> bool {
+        let size = self.size();
+        (0..2).all(|i| rectangle[0][i] >= 0.0 && rectangle[1][i] <= size[i])
+            && !self.taken.iter().any(|taken| overlap(taken, rectangle))
+    }
+
+    /// Whether a pixel is taken.
+    pub(super) fn is_taken(&self, at: usize) -> bool {
+        let pixel = [(at % self.width) as f64, (at / self.width) as f64];
+        self.taken.iter().any(|taken| overlap(taken, &[pixel, pixel.map(|n| n + 1.0)]))
+    }
+
+    /// Writes a text around a point, if it fits in the picture and the place is free. Returns whether it does.
     pub(super) fn write(&mut self, text: &str, middle: [f64; 2]) -> bool {
         let half = [self.letters.width(text) / 2.0, self.letters.size / 2.0];
-        let size = self.size();
-        let fits = (0..2).all(|i| middle[i] - half[i] >= 0.0 && middle[i] + half[i] <= size[i]);
+        let place = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
+        let fits = !text.is_empty() && self.is_free(&place);
         if fits {
             let (letters, ink) = (self.letters.clone(), self.ink);
             letters.draw(text, middle, |x, y, share| self.put(x, y, ink, share));
+            self.taken.push(place);
         }
         fits
     }

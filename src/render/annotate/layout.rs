@@ -9,6 +9,8 @@ pub struct Parts {
     pub axes: bool,
     /// Arrows along x, y and z.
     pub triad: bool,
+    /// A line of a round length, in the unit of the coordinates.
+    pub scale: bool,
     /// The colour bar.
     pub bar: bool,
     /// The time or the number of the frame.
@@ -17,11 +19,11 @@ pub struct Parts {
 
 impl Parts {
     /// No part.
-    pub const NONE: Self = Self { bounds: false, axes: false, triad: false, bar: false, time: false };
+    pub const NONE: Self = Self { bounds: false, axes: false, triad: false, scale: false, bar: false, time: false };
     /// The parts that most pictures need.
-    pub const USUAL: Self = Self { bounds: true, axes: true, triad: false, bar: true, time: true };
+    pub const USUAL: Self = Self { bounds: true, axes: true, triad: false, scale: false, bar: true, time: true };
     /// All parts.
-    pub const ALL: Self = Self { triad: true, ..Self::USUAL };
+    pub const ALL: Self = Self { triad: true, scale: true, ..Self::USUAL };
 }
 
 impl Default for Parts {
@@ -81,7 +83,7 @@ pub fn margins(size: [usize; 2], parts: Parts, title: bool) -> Margins {
     let top = pixels((parts.time || title) && has_time(size), TIME);
     Margins {
         left: pixels(axes, AXIS[0]),
-        right: pixels(parts.bar && has_bar(size), BAR),
+        right: pixels((parts.bar || parts.scale) && has_bar(size), BAR),
         top,
         bottom: pixels(axes, AXIS[1]),
     }

@@ -17,7 +17,7 @@ use crate::base::time_labels::TimeLabels;
 use crate::colour::{Rgb, Scale};
 use crate::render::ViewReport;
 use crate::view::camera::{Camera, View};
-use canvas::{Canvas, contrast, over};
+use canvas::{Canvas, Rectangle, contrast, over};
 use layout::{BAR, has_axes, has_bar, has_time, line};
 use text::Letters;
 
@@ -44,6 +44,8 @@ pub(crate) struct Finished<'a> {
     pub(crate) background: Rgb,
     pub(crate) frame: usize,
     pub(crate) view: Option<&'a ViewReport>,
+    /// Whether the picture says from where it is seen.
+    pub(crate) with_angles: bool,
     /// The colours of values, for a colour bar.
     pub(crate) scale: Option<&'a Scale>,
     /// How opaque each pixel is, 0 to 1.
@@ -51,6 +53,14 @@ pub(crate) struct Finished<'a> {
 }
 
 impl Annotation {
+    /// The labels of a picture, from the longest to the shortest: time and angles, or the time alone.
+    fn labels(&self, frame: usize, angles: Option<&ViewReport>) -> Vec<String> {
+        let times = if self.parts.time { self.stamps(frame).to_vec() } else { Vec::new() };
+        let angles = angles.map(|view| format!("{}°, {}°", volume::text(view.azimuth), volume::text(view.elevation)));
+        let both = angles.iter().flat_map(|angles| times.iter().map(move |time| format!("{time}   {angles}")));
+        both.chain(angles.clone()).chain(times.iter().cloned()).collect()
+    }
+
     /// The long and the short label of a frame.
     fn stamps(&self, frame: usize) -> [String; 2] {
         if let Some(date) = self.times.date(frame) {
@@ -63,21 +73,23 @@ impl Annotation {
         }
     }
 
-    /// Draws all parts.
-    pub(crate) fn draw(&self, picture: Finished<'_>) {
-        let Finished { pixels, size, background, frame, view, scale, opacity } = picture;
-        let ink = contrast(background);
-        let mut canvas = Canvas { pixels, width: size[0], ink, letters: Letters::new(line(size)) };
-        let drawn = self.axes.as_ref().and_then(|axes| Some((axes, camera(axes, size, view?)?)));
-        if let Some((axes, camera)) = &drawn {
-            self.draw_volume(&mut canvas, (axes, camera), opacity);
-        }
+    /// Draws all parts. Returns the places of texts and of the colour bar.
+    pub(crate) fn draw(&self, picture: Finished<'_>) -> Vec<Rectangle> {
+        let Finished { pixels, size, background, frame, view, with_angles, scale, opacity } = picture;
+        let (ink, taken) = (contrast(background), Vec::new());
+        let mut canvas = Canvas { pixels, width: size[0], ink, letters: Letters::new(line(size)), taken };
         if has_time(size) {
-            self.draw_texts(&mut canvas, frame);
+            self.draw_texts(&mut canvas, &self.labels(frame, view.filter(|_| with_angles)));
         }
         if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
             self.draw_bar(&mut canvas, scale);
         }
+        if let (Some(axes), Some(view)) = (&self.axes, view)
+            && let Some(camera) = camera(axes, size, view)
+        {
+            self.draw_volume(&mut canvas, (axes, &camera), opacity);
+        }
+        canvas.taken
     }
 
     /// The box behind the picture, and the axes beside it.
@@ -95,8 +107,14 @@ impl Annotation {
                 shares[at] = shares[at].max(share);
             });
             for (at, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+                if canvas.is_taken(at) {
+                    continue;
+                }
                 canvas.pixels[at] = over(canvas.pixels[at], ink, BOX * share * (1.0 - opacity(at)));
             }
+        }
+        if self.parts.scale && has_bar(camera.size) {
+            axes.draw_scale(canvas, camera);
         }
         if has_axes(camera.size) {
             behind(canvas, opacity, |canvas| {
@@ -110,24 +128,16 @@ impl Annotation {
         }
     }
 
-    /// The title at the top, and the time at the top left.
-    fn draw_texts(&self, canvas: &mut Canvas<'_>, frame: usize) {
+    /// The title at the top, and the longest of the labels that fits at the top left.
+    fn draw_texts(&self, canvas: &mut Canvas<'_>, labels: &[String]) {
         let (size, width) = (canvas.letters.size, canvas.size()[0]);
-        let left = |canvas: &Canvas<'_>, text: &str| [0.6 * size + canvas.letters.width(text) / 2.0, size];
-        let mut taken = 0.0;
-        if self.parts.time {
-            let stamps = self.stamps(frame);
-            let place = |text: &String| (text.clone(), left(canvas, text));
-            let fitting = stamps.iter().map(place).find(|(_, at)| 2.0 * at[0] <= width);
-            if let Some((text, at)) = fitting {
-                canvas.write(&text, at);
-                taken = 2.0 * at[0];
+        for text in labels {
+            let half = canvas.letters.width(text) / 2.0;
+            if canvas.write(text, [0.6 * size + half, size]) {
+                break;
             }
         }
-        let half = canvas.letters.width(&self.title) / 2.0;
-        if !self.title.is_empty() && width / 2.0 - half > taken {
-            canvas.write(&self.title, [width / 2.0, size]);
-        }
+        canvas.write(&self.title, [width / 2.0, size]);
     }
 
     /// The colour bar at the right, with its values to the left and their name to the right.
@@ -140,6 +150,7 @@ impl Annotation {
         if top + length + size > height {
             return;
         }
+        let texts = canvas.taken.len();
         let (x, y, w, h) = (left as i64, top as i64, thick as i64, length as i64);
         let rim = (volume::THIN * size).round().max(1.0);
         let edge = rim as i64;
@@ -157,18 +168,23 @@ impl Annotation {
         }
         let name = shortened(&self.values, |text| canvas.letters.width(text) <= 0.9 * height);
         canvas.write_upwards(&name, [width - 0.9 * size, top + length / 2.0]);
+        canvas.taken.truncate(texts);
+        canvas.taken.push([[width - BAR * size, top - size], [width, top + length + size]]);
     }
 }
 
 /// Draws behind the picture, as far as that is transparent.
 fn behind(canvas: &mut Canvas<'_>, opacity: &dyn Fn(usize) -> f64, draw: impl FnOnce(&mut Canvas<'_>)) {
-    let before = canvas.pixels.to_vec();
+    let (before, texts) = (canvas.pixels.to_vec(), canvas.taken.clone());
     draw(canvas);
-    for (at, (pixel, before)) in canvas.pixels.iter_mut().zip(before).enumerate() {
-        if *pixel != before {
-            *pixel = over(before, *pixel, 1.0 - opacity(at));
+    let drawn = std::mem::replace(&mut canvas.taken, texts);
+    for (at, before) in before.into_iter().enumerate() {
+        if canvas.pixels[at] != before {
+            let share = if canvas.is_taken(at) { 0.0 } else { 1.0 - opacity(at) };
+            canvas.pixels[at] = over(before, canvas.pixels[at], share);
         }
     }
+    canvas.taken = drawn;
 }
 
 /// How much lines of the box differ from the background.
@@ -213,8 +229,16 @@ mod tests {
         let mut pixels = vec![[9; 3]; size[0] * size[1]];
         let view = ViewReport { azimuth: 30.0, elevation: 20.0, scale: 0.02 * size[0] as f64, ..ViewReport::default() };
         let (background, opacity) = ([9; 3], |_| 0.0);
-        let picture =
-            Finished { pixels: &mut pixels, size, background, frame: 12, view: Some(&view), scale, opacity: &opacity };
+        let picture = Finished {
+            pixels: &mut pixels,
+            size,
+            background,
+            frame: 12,
+            view: Some(&view),
+            with_angles: false,
+            scale,
+            opacity: &opacity,
+        };
         annotation.draw(picture);
         pixels
     }
@@ -239,6 +263,43 @@ mod tests {
         assert!(drawn(&none, [300, 200], Some(&linear)).iter().all(|pixel| *pixel == [9; 3]), "nothing is drawn");
     }
 
+    /// Angles and sizes that differ from case to case.
+    fn cases() -> impl Iterator<Item = ([usize; 2], ViewReport)> {
+        (0..400_u32).map(|n| {
+            let part = |step: f64| (f64::from(n) * step).fract();
+            let size = [part(0.618), part(0.755)].map(|share| 60 + (share * 700.0) as usize);
+            let scale = (0.005 + 0.06 * part(0.569)) * size[0] as f64;
+            let (azimuth, elevation) = (360.0 * part(0.324), 180.0 * part(0.471) - 90.0);
+            (size, ViewReport { azimuth, elevation, scale, ..ViewReport::default() })
+        })
+    }
+
+    #[test]
+    fn texts_never_overlap() {
+        let (annotation, scale) = (annotation(), scale((-3e-5, 2e-5), Norm::Linear));
+        for (size, view) in cases() {
+            let mut pixels = vec![[9; 3]; size[0] * size[1]];
+            let (background, opacity) = ([9; 3], |_: usize| 0.0);
+            let (view, scale) = (Some(&view), Some(&scale));
+            let picture = Finished {
+                pixels: &mut pixels,
+                size,
+                background,
+                frame: 1234,
+                view,
+                with_angles: true,
+                scale,
+                opacity: &opacity,
+            };
+            let taken = annotation.draw(picture);
+            for (n, a) in taken.iter().enumerate() {
+                let within = (0..2).all(|i| a[0][i] >= 0.0 && a[1][i] <= size[i] as f64);
+                let alone = taken[n + 1..].iter().all(|b| (0..2).any(|i| a[1][i] <= b[0][i] || b[1][i] <= a[0][i]));
+                assert!(within && alone, "{size:?} {view:?}: {taken:?}");
+            }
+        }
+    }
+
     #[test]
     fn the_box_lies_behind_the_picture() {
         let annotation =
@@ -253,6 +314,7 @@ mod tests {
                 background: [9; 3],
                 frame: 0,
                 view: Some(&view),
+                with_angles: false,
                 scale: None,
                 opacity: &opacity,
             };

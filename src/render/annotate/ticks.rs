@@ -23,6 +23,12 @@ pub fn round_values(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
     (0..=count.min(2 * wanted)).map(|i| (first + i as f64) * step).collect()
 }
 
+/// The largest of 1, 2 and 5 times a power of ten that a positive number reaches.
+pub(super) fn round_below(most: f64) -> f64 {
+    let power = ten_to(exponent(most));
+    [5.0, 2.0].map(|m| m * power).into_iter().find(|value| *value <= most).unwrap_or(power)
+}
+
 /// Powers of ten, thinned out to about `wanted`. If there are only one or two, also 2 and 5 times these.
 fn decades(lo: f64, hi: f64, wanted: usize) -> Vec<f64> {
     let (first, last) = (exponent(lo), exponent(hi));
@@ -67,6 +73,11 @@ mod tests {
         assert_eq!(even(1e6, 1e6 + 1.0, 2), ["1e6", "1.0000005e6", "1.000001e6"]);
         assert_eq!(even(7.0, 7.0, 4), ["7"]);
         assert_eq!(even(-1e308, 1e308, 4), ["-1e308"], "too far apart to divide");
+    }
+
+    #[test]
+    fn lengths_are_round() {
+        assert_eq!([1.0, 1.99, 2.0, 4.7, 5.2, 0.03, 990.0].map(round_below), [1.0, 1.0, 2.0, 2.0, 5.0, 0.02, 500.0]);
     }
 
     #[test]

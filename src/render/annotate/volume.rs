@@ -1,7 +1,8 @@
 //! The box of the volume, and values along its edges.
 
 use super::canvas::{Canvas, line};
-use super::ticks::round_values;
+use super::layout::BAR;
+use super::ticks::{round_below, round_values};
 use crate::base::decimal;
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
@@ -32,6 +33,9 @@ pub struct VolumeAxes {
 
 /// The width of lines, in lines of letters.
 pub(super) const THIN: f64 = 0.08;
+
+/// By how much lengths may differ that count as the same.
+const EVEN: f64 = 1e-3;
 
 /// An edge of the box in a picture.
 #[derive(Debug, Clone, Copy)]
@@ -135,6 +139,35 @@ impl VolumeAxes {
         (wanted.clamp(1, 8)..=8).map(values).find(|values| values.len() > 1).unwrap_or_default()
     }
 
+    /// Coordinates per world unit and their unit, if they are the same along all axes.
+    pub fn length_unit(&self) -> Option<(f64, &str)> {
+        let mut found = None;
+        for (axis, labels) in self.labels.iter().enumerate().filter(|(_, labels)| labels.at.len() > 1) {
+            let per_unit = labels.step()? / self.grid.spacing[axis];
+            let unit = labels.unit.as_str();
+            match found {
+                None => found = Some((per_unit, unit)),
+                Some((first, same)) if same == unit && (per_unit / first - 1.0).abs() < EVEN => {}
+                Some(_) => return None,
+            }
+        }
+        found
+    }
+
+    /// Draws a line of a round length at the lower right, if lengths are the same along all axes.
+    pub(super) fn draw_scale(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
+        let Some((per_unit, unit)) = self.length_unit() else { return };
+        let (size, [width, height]) = (canvas.letters.size, canvas.size());
+        let most = (BAR - 1.5) * size;
+        let value = round_below(most / camera.scale * per_unit);
+        let half = value / per_unit * camera.scale / 2.0;
+        let (middle, y) = (width - BAR * size / 2.0, height - 2.2 * size);
+        let label = if unit.is_empty() { text(value) } else { format!("{} {unit}", text(value)) };
+        if half.is_finite() && half > 0.0 && canvas.write(&label, [middle, y + 1.2 * size]) {
+            canvas.line([middle - half, y], [middle + half, y], (2.0 * THIN * size).max(1.0));
+        }
+    }
+
     /// Draws arrows along x, y and z at the lower left.
     pub(super) fn draw_triad(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
         let size = canvas.letters.size;
@@ -151,6 +184,13 @@ impl VolumeAxes {
 }
 
 impl AxisLabels {
+    /// The distance of neighbours, if it is the same everywhere.
+    fn step(&self) -> Option<f64> {
+        let steps = || self.at.windows(2).map(|pair| pair[1] - pair[0]);
+        let mean = steps().sum::<f64>() / steps().len() as f64;
+        steps().all(|step| (step / mean - 1.0).abs() < EVEN).then_some(mean.abs())
+    }
+
     /// The name and the unit.
     fn title(&self) -> String {
         if self.unit.is_empty() { self.name.clone() } else { format!("{} ({})", self.name, self.unit) }

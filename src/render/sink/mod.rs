@@ -131,7 +131,7 @@ pub struct SinkConfig {
     /// How the pictures were made. Default: by this library.
     pub provenance: Arc<Provenance>,
     /// Frames per second, for formats that store it. Default: 25.
-    pub fps: u32,
+    pub fps: f64,
     /// The kind of numbers in each pixel. Default: the kind of the scene and mode.
     pub pixel: Pixel,
     /// The map from values to colours.
@@ -156,7 +156,7 @@ impl SinkConfig {
             size,
             shown: config.frames.iter().map(|frame| (0, *frame)).collect(),
             provenance: Arc::new(Provenance { software, size, ..Provenance::default() }),
-            fps: 25,
+            fps: 25.0,
             pixel: if scene.channels() > 1 { Pixel::Channels } else { config.mode.pixel() },
             colours,
             depth: Depth::Eight,
@@ -169,6 +169,12 @@ impl SinkConfig {
     /// Whether an existing file may be replaced.
     fn may_replace(&self, path: &Path) -> bool {
         self.force || is_ours(path)
+    }
+
+    /// The frames per second as a fraction.
+    fn frames_and_seconds(&self) -> [u16; 2] {
+        let is_whole = self.fps.fract() == 0.0 || self.fps > 65.0;
+        if is_whole { [self.fps.round() as u16, 1] } else { [(self.fps * 1000.0).round() as u16, 1000] }
     }
 
     /// The picture or the error bounds of a rendering, whichever this sink shows.
@@ -190,6 +196,7 @@ impl SinkConfig {
                 background: self.colours.background(),
                 frame: rendered.frame,
                 view: rendered.views.get(rendered.view),
+                with_angles: self.format == PictureFormat::Sheet && self.shown.iter().any(|(view, _)| *view > 0),
                 scale: (self.pixel != Pixel::Channels).then_some(&self.colours),
                 opacity: &|at| self.colours.opacity_of_pixel(&picture[at * numbers..][..numbers]),
             });

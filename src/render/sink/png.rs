@@ -133,7 +133,8 @@ fn begin(
 ) -> std::result::Result<png::Writer<Shared>, png::EncodingError> {
     let mut encoder = encoder(config, config.size, &config.texts_of_all(rendered), out)?;
     encoder.set_animated(config.shown.len() as u32, 0)?;
-    encoder.set_frame_delay(1, config.fps as u16)?;
+    let [frames, seconds] = config.frames_and_seconds();
+    encoder.set_frame_delay(seconds, frames)?;
     encoder.write_header()
 }
 

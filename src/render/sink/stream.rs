@@ -20,7 +20,8 @@ pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()>
             npy::write_header(SampleType::F32, &shape[..axes], out)
         }
         PictureFormat::Y4m => {
-            writeln!(out, "YUV4MPEG2 W{width} H{height} F{}:1 Ip A1:1 C444 XCOLORRANGE=FULL", config.fps)
+            let [frames, seconds] = config.frames_and_seconds();
+            writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=FULL")
         }
         _ => Ok(()),
     }

@@ -196,6 +196,7 @@ mod tests {
             kernel: Kernel::of_grid(&grid),
             quantity,
             frames: vec![0],
+            paired: false,
             region: None,
             splat_error: 1e-3,
             quick: false,

@@ -1,0 +1,30 @@
+//! Small files of text.
+
+use super::error::{Error, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// The largest size of a file, so that an endless one cannot exhaust memory.
+pub(crate) const MOST_BYTES: u64 = 16 << 20;
+
+/// The text of a file, which is expected to be a `kind`.
+///
+/// # Errors
+/// A file that cannot be read, is empty, too large, or no UTF-8.
+pub fn read(path: &Path, kind: &str) -> Result<String> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "reading", e))?;
+    of(bytes, kind).map_err(|what| Error::input(path, what))
+}
+
+/// The text of the bytes of a file.
+pub(crate) fn of(bytes: Vec<u8>, kind: &str) -> std::result::Result<String, String> {
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(format!("is larger than {} MiB, which no {kind} is", MOST_BYTES >> 20));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| format!("is not text, which a {kind} is expected to be"))?;
+    let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors write it
+    if text.trim().is_empty() { Err(format!("is empty, where a {kind} is expected")) } else { Ok(text) }
+}
