@@ -62,8 +62,8 @@ fn key_frames_move_the_camera() {
     assert!(render(&format!("{at} -o - --format rgb24")).ok().out == found[4]);
     render("--key-frames keys.csv --annotate --frames :3 -o k%d.png").ok();
     work.write("bad.csv", "0,1,2\n0,1,2\n");
-    render("--key-frames bad.csv -o b.apng").fails(2, &["bad.csv", "line 2", "ascend"]);
-    render("--key-frames none.csv -o b.apng").fails(2, &["none.csv"]);
+    render("--key-frames bad.csv -o b.apng").fails(3, &["bad.csv", "line 2", "ascend"]);
+    render("--key-frames none.csv -o b.apng").fails(1, &["none.csv"]);
     render("--key-frames keys.csv --orbit 3 -o b.apng").fails(2, &["--key-frames", "--orbit"]);
 }
 
