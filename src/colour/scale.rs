@@ -211,6 +211,11 @@ impl Scale {
         self.map.is_grey() && r == g && g == b
     }
 
+    /// The map over shares of the range.
+    pub(crate) fn map(&self) -> &TransferFunction {
+        &self.map
+    }
+
     /// The colour of the background.
     pub fn background(&self) -> Rgb {
         self.background

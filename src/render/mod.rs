@@ -30,7 +30,7 @@
 //! reconstruct       planes to pixels: inverse transform, division, certificate
 //! driver            the loop over frame batches
 //! project           the pictures of a batch as projections; composite: slice by slice; cut: planes through the volume
-//! annotate/, sink/  text in pictures, and output files; pictures: a rendering into files
+//! annotate/, sink/  text in pictures, and output files, with page/ for web pages; pictures: a rendering into files
 //! setups            the setups of all views, and which mode renders them
 //! ```
 //!
@@ -71,6 +71,7 @@ mod project;
 mod composite;
 mod cut;
 pub mod annotate;
+mod page;
 pub mod sink;
 mod pictures;
 mod setups;

@@ -75,8 +75,8 @@ impl AnnotationArgs {
         self.annotate.is_some() || self.title.is_some()
     }
 
-    /// The parts that are drawn.
-    pub(crate) fn parts(&self) -> Parts {
+    /// The parts that are asked for.
+    fn parts(&self) -> Parts {
         self.annotate.map_or(Parts::NONE, |list| list.0)
     }
 
@@ -100,11 +100,6 @@ impl AnnotationArgs {
         }
     }
 
-    /// The margins in a picture of this size.
-    pub(crate) fn margins(&self, size: [usize; 2]) -> Margins {
-        margins(size, self.parts(), self.title.is_some())
-    }
-
     /// Views in one scale, in which the volume fits beside the margins, but for the zoom of each.
     pub(crate) fn beside((views, zooms): (Vec<View>, &[f64]), grid: &Grid, around: Margins) -> Result<Vec<View>> {
         let Margins { left, right, top, bottom } = around;
@@ -124,9 +119,20 @@ impl AnnotationArgs {
 }
 
 impl Cli {
+    /// The parts that are drawn into pictures. A web page itself has a title, a colour bar and the time.
+    fn parts(&self) -> Parts {
+        let parts = self.around.parts();
+        if self.is_page() { Parts { bar: false, time: false, ..parts } } else { parts }
+    }
+
+    /// The margins in a picture of this size.
+    pub(crate) fn margins(&self, size: [usize; 2]) -> Margins {
+        margins(size, self.parts(), self.around.title.is_some() && !self.is_page())
+    }
+
     /// The annotations of a run, but for the axes.
     pub(crate) fn annotation(&self, values: String, times: TimeLabels) -> Annotation {
-        Annotation { parts: self.around.parts(), title: self.around.title(), values, times, axes: None }
+        Annotation { parts: self.parts(), title: self.around.title(), values, times, axes: None }
     }
 
     /// The axes of the volume as it is drawn, with their true coordinates.
@@ -135,7 +141,7 @@ impl Cli {
         let has_kernel = !matches!(config.mode, Mode::Planes { .. });
         let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
         let volume = VolumeAxes { grid: *whole, region, rim, labels: axes.labels() };
-        if self.around.parts().scale && volume.length_unit().is_none() {
+        if self.parts().scale && volume.length_unit().is_none() {
             self.common.note("no scale is drawn, since lengths differ from axis to axis");
         }
         Ok(volume)

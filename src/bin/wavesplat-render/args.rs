@@ -29,6 +29,7 @@ Examples:
   wavesplat-render run.wspl --orbit 120 --over-time -o turning.mp4
   wavesplat-render run.wspl --frames ::8 --format sheet --colormap maps.json#Fast -o sheet.png
   wavesplat-render run.wspl --annotate -o run.mp4
+  wavesplat-render run.wspl --annotate --orbit 4 -o run.html
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render run.wspl --slice x=0.5,z=0.25 --frames 10 -o slices.png
   wavesplat-render run.wspl --probe 0.5,0.5,0.5 -o series.svg
@@ -133,7 +134,8 @@ pub(crate) struct Cli {
     #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     pub(crate) method: MethodName,
     /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), mp4,
-    /// webm and gif (by ffmpeg, which must be installed), or exr if it was built in [default: by the extension of OUT; png for -]
+    /// webm and gif (by ffmpeg, which must be installed), html (a web page with all pictures, colours and a time slider, to
+    /// open from disk or to send), or exr if it was built in [default: by the extension of OUT; png for -]
     #[arg(long, value_parser = parse_format, help_heading = "Output")]
     pub(crate) format: Option<PictureFormat>,
     /// Bits per channel of a PNG: 8, or 16 (with --colormap grey, a single channel)
@@ -229,5 +231,5 @@ fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
 
 pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
     let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif exr".into())
+    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif html exr".into())
 }

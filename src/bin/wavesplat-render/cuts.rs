@@ -149,7 +149,7 @@ impl Cli {
         if self.scale.is_some() || center.is_some() || self.roll != 0.0 {
             return Ok(view);
         }
-        let around @ Margins { left, right, top, bottom } = self.around.margins(size);
+        let around @ Margins { left, right, top, bottom } = self.margins(size);
         let [across, up] = [[1, 2], [0, 2], [0, 1]][axis];
         let fit = |pixels: usize, along: usize| pixels as f64 / (grid.dims[along] as f64 * grid.spacing[along]);
         let scale = fit(size[0] - left - right, across).min(fit(size[1] - top - bottom, up));

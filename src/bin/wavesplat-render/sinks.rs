@@ -52,7 +52,7 @@ impl Cli {
             colours: of_pictures.clone(),
             depth: self.depth,
             coloured_array: self.colour.is_asked(),
-            annotation: self.around.is_asked().then_some(annotation),
+            annotation: (self.around.is_asked() || self.is_page()).then_some(annotation),
             force: self.force,
         };
         let Some(errors) = errors else {

@@ -20,7 +20,7 @@ impl Targets {
         let format = format.map_or_else(|| format_of(path), Ok)?;
         format.check(path)?;
         let joined = match format.takes_all(path) {
-            true => config.frames.len() == 1 || config.paired,
+            true => config.frames.len() == 1 || config.paired || format == PictureFormat::Page,
             false => config.paired && config.frames.is_sorted_by(|a, b| a < b),
         };
         Ok(Self { format, names: names_of_views(path, config.views.len(), joined)? })
@@ -103,6 +103,13 @@ impl Cli {
     }
 }
 
+impl Cli {
+    /// Whether pictures go to a web page.
+    pub(crate) fn is_page(&self) -> bool {
+        self.format.or_else(|| format_of(&self.output).ok()) == Some(PictureFormat::Page)
+    }
+}
+
 fn format_of(path: &Path) -> Result<PictureFormat> {
     if path == Path::new(STANDARD) {
         return Ok(PictureFormat::Png);
@@ -114,7 +121,7 @@ fn format_of(path: &Path) -> Result<PictureFormat> {
             "" => "has no extension".into(),
             other => format!("no pictures are written as .{other}"),
         };
-        let formats = "take .png for a picture, .apng or .mp4 for a moving one, or webm gif npy y4m rgb24 gray16 exr";
+        let formats = "take .png for a picture, .apng or .mp4 for a moving one, .html for a page, or webm gif npy y4m rgb24 gray16 exr";
         Error::usage(format!("{}: {what}; {formats}", path.display()))
     })
 }

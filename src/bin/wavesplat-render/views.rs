@@ -36,7 +36,7 @@ impl Cli {
         let view =
             |&Stand { azimuth, elevation, .. }| View { azimuth, elevation, roll, size, scale: self.scale, center };
         let fits = self.scale.is_none() && center.is_none();
-        let around = if fits { self.around.margins(size) } else { Margins::default() };
+        let around = if fits { self.margins(size) } else { Margins::default() };
         if let [only @ Stand { zoom: 1.0, .. }] = stands
             && around == Margins::default()
         {

@@ -1,5 +1,6 @@
 //! A picture to draw lines and letters on.
 
+use super::layout;
 use super::text::Letters;
 use crate::colour::Rgb;
 
@@ -13,6 +14,14 @@ pub(super) struct Canvas<'a> {
     pub(super) taken: Vec<Rectangle>,
 }
 
+impl<'a> Canvas<'a> {
+    /// A picture without texts, with letters of the size that suits it.
+    pub(super) fn new(pixels: &'a mut [Rgb], size: [usize; 2], background: Rgb) -> Self {
+        let (ink, letters) = (contrast(background), Letters::new(layout::line(size)));
+        Self { pixels, width: size[0], ink, letters, taken: Vec::new() }
+    }
+}
+
 /// The left upper and the right lower corner.
 pub(super) type Rectangle = [[f64; 2]; 2];
 
@@ -22,7 +31,7 @@ fn overlap(a: &Rectangle, b: &Rectangle) -> bool {
 }
 
 /// Black or white, whichever stands out from a colour.
-pub(super) fn contrast([r, g, b]: Rgb) -> Rgb {
+fn contrast([r, g, b]: Rgb) -> Rgb {
     let bright = 299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b) > 127_500;
     if bright { [0; 3] } else { [255; 3] }
 }

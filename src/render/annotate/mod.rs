@@ -17,9 +17,8 @@ use crate::base::time_labels::TimeLabels;
 use crate::colour::{Rgb, Scale};
 use crate::render::ViewReport;
 use crate::view::camera::{Camera, View};
-use canvas::{Canvas, Rectangle, contrast, over};
-use layout::{BAR, has_axes, has_bar, has_time, line};
-use text::Letters;
+use canvas::{Canvas, Rectangle, over};
+use layout::{BAR, has_axes, has_bar, has_time};
 
 /// The annotations of a run's pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -56,9 +55,15 @@ impl Annotation {
     /// The labels of a picture, from the longest to the shortest: time and angles, or the time alone.
     fn labels(&self, frame: usize, angles: Option<&ViewReport>) -> Vec<String> {
         let times = if self.parts.time { self.stamps(frame).to_vec() } else { Vec::new() };
-        let angles = angles.map(|view| format!("{}°, {}°", volume::text(view.azimuth), volume::text(view.elevation)));
+        let angles = angles.map(angles_of);
         let both = angles.iter().flat_map(|angles| times.iter().map(move |time| format!("{time}   {angles}")));
         both.chain(angles.clone()).chain(times.iter().cloned()).collect()
+    }
+
+    /// The time of a frame, or its number.
+    pub(crate) fn stamp(&self, frame: usize) -> String {
+        let [long, _] = self.stamps(frame);
+        long
     }
 
     /// The long and the short label of a frame.
@@ -76,8 +81,7 @@ impl Annotation {
     /// Draws all parts. Returns the places of texts and of the colour bar.
     pub(crate) fn draw(&self, picture: Finished<'_>) -> Vec<Rectangle> {
         let Finished { pixels, size, background, frame, view, with_angles, scale, opacity } = picture;
-        let (ink, taken) = (contrast(background), Vec::new());
-        let mut canvas = Canvas { pixels, width: size[0], ink, letters: Letters::new(line(size)), taken };
+        let mut canvas = Canvas::new(pixels, size, background);
         if has_time(size) {
             self.draw_texts(&mut canvas, &self.labels(frame, view.filter(|_| with_angles)));
         }
@@ -90,6 +94,14 @@ impl Annotation {
             self.draw_volume(&mut canvas, (axes, &camera), opacity);
         }
         canvas.taken
+    }
+
+    /// Draws the box and the axes, which are the same for all frames of a view, as if nothing lay in front of them.
+    pub(crate) fn draw_still(&self, pixels: &mut [Rgb], (size, background): ([usize; 2], Rgb), view: &ViewReport) {
+        let mut canvas = Canvas::new(pixels, size, background);
+        if let Some((axes, camera)) = self.axes.as_ref().and_then(|axes| Some((axes, camera(axes, size, view)?))) {
+            self.draw_volume(&mut canvas, (axes, &camera), &|_| 0.0);
+        }
     }
 
     /// The box behind the picture, and the axes beside it.
@@ -171,6 +183,11 @@ impl Annotation {
         canvas.taken.truncate(texts);
         canvas.taken.push([[width - BAR * size, top - size], [width, top + length + size]]);
     }
+}
+
+/// From where a view is seen, in letters.
+pub(crate) fn angles_of(view: &ViewReport) -> String {
+    format!("{}°, {}°", volume::text(view.azimuth), volume::text(view.elevation))
 }
 
 /// Draws behind the picture, as far as that is transparent.

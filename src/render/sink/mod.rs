@@ -4,6 +4,7 @@
 mod exr;
 mod movie;
 mod ours;
+mod page;
 mod provenance;
 mod png;
 mod sheet;
@@ -21,6 +22,7 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
 use crate::colour::{Rgb, Scale};
 use movie::Movie;
+use page::Page;
 use png::Animation;
 use sheet::Sheet;
 use std::path::{Path, PathBuf};
@@ -49,11 +51,13 @@ pub enum PictureFormat {
     Sheet,
     /// One movie of all pictures, made by ffmpeg.
     Movie(MovieFormat),
+    /// One web page with all pictures, which opens without a server.
+    Page,
 }
 
 impl PictureFormat {
     /// The formats by name. The names are also the file extensions, except for the sheet.
-    pub const NAMES: [(&'static str, Self); 11] = [
+    pub const NAMES: [(&'static str, Self); 12] = [
         ("png", Self::Png),
         ("npy", Self::Npy),
         ("y4m", Self::Y4m),
@@ -65,6 +69,7 @@ impl PictureFormat {
         ("mp4", Self::Movie(MovieFormat::Mp4)),
         ("webm", Self::Movie(MovieFormat::Webm)),
         ("gif", Self::Movie(MovieFormat::Gif)),
+        ("html", Self::Page),
     ];
 
     /// Whether all pictures go to one file or stream at `path`.
@@ -101,6 +106,7 @@ impl PictureFormat {
             (Self::Sheet, Depth::Sixteen) => pixels(sheet::size(size, pictures)?) * size_of::<[u16; 3]>(),
             (Self::Movie(_), _) => pixels(size) * size_of::<Rgb>(),
             (Self::Png | Self::Apng, Depth::Sixteen) => pixels(size) * size_of::<[u16; 3]>(),
+            (Self::Page, _) => page::memory(size, pictures),
             (Self::Exr, _) => pixels(size) * Pixel::Light.numbers() * size_of::<f32>(),
             _ => 0,
         };
@@ -236,6 +242,7 @@ enum Target {
     Animation(Animation),
     /// One file with all pictures in rows.
     Sheet(Box<Sheet>),
+    Page(Box<Page>),
     /// One movie; none after ffmpeg failed.
     Movie(Option<Box<Movie>>),
     /// A file for each picture.
@@ -259,6 +266,7 @@ impl Sink {
             PictureFormat::Apng => Target::Animation(Animation::new(out)),
             PictureFormat::Sheet => Target::Sheet(Box::new(Sheet::new(out, &config)?)),
             PictureFormat::Movie(format) => Target::Movie(Some(Box::new(Movie::new(out, format, &config)?))),
+            PictureFormat::Page => Target::Page(Box::new(Page::new(out, &config)?)),
             _ => Target::One { out: Box::new(out), begun: false },
         };
         Ok(Self { target, config })
@@ -288,6 +296,7 @@ impl Sink {
                 sheet.picture(config, rendered, picture);
                 Ok(())
             }
+            Target::Page(page) => page.picture(config, rendered, picture),
             Target::Movie(movie) => {
                 let sent = movie.as_mut().map_or(Ok(()), |movie| movie.picture(config, rendered, picture));
                 match sent {
@@ -312,6 +321,7 @@ impl Sink {
             Target::One { out, .. } => out.commit(),
             Target::Animation(animation) => animation.finish(),
             Target::Sheet(sheet) => sheet.finish(&self.config),
+            Target::Page(page) => page.finish(&self.config),
             Target::Movie(movie) => movie.map_or(Ok(()), |movie| movie.finish()),
             Target::Many(_) => Ok(()),
         }

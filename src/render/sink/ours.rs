@@ -7,6 +7,7 @@ use std::path::Path;
 /// Bytes at the start of a file, and at the end of a movie, in which its mark must lie.
 const PART: u64 = 1 << 16;
 
+const HTML: &[u8] = b"<!doctype html>";
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const EXR: &[u8] = b"\x76\x2f\x31\x01";
 const WEBM: &[u8] = b"\x1a\x45\xdf\xa3";
@@ -47,6 +48,7 @@ fn has_mark(start: &[u8]) -> bool {
     match start {
         [b'{', ..] => holds(b"\"software\": \"wavesplat-render ") || holds(b"\"software\":\"wavesplat-render "),
         _ if start.starts_with(EXR) => exr_software(start),
+        _ if start.starts_with(HTML) => holds(b"name=\"generator\" content=\"wavesplat-render "),
         _ => start.strip_prefix(PNG).is_some_and(png_software),
     }
 }

@@ -43,7 +43,7 @@ pub(super) fn write(
             out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
         }
         PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
-        PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) => {
+        PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) | PictureFormat::Page => {
             out.write_all(config.image(rendered, picture).as_flattened())
         }
         PictureFormat::Exr => exr::write(config, &config.texts_of(rendered), picture, out),

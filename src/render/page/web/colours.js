@@ -1,0 +1,86 @@
+// From numbers to the colours of pixels, as src/colour/scale.rs does it.
+
+const SHARES = 4096;
+
+// The colours of a map at even shares of the range, from its colours at fewer shares, two bytes for each number.
+function tableOf(bytes) {
+  const numbers = Float64Array.from({ length: bytes.length / 2 }, (_, i) => (bytes[2 * i] + 256 * bytes[2 * i + 1]) / 257);
+  const last = numbers.length / 3 - 1, table = new Uint8Array(3 * (SHARES + 1));
+  for (let i = 0; i <= SHARES; i++) {
+    const at = i / SHARES * last, below = Math.min(Math.floor(at), last - 1), part = at - below;
+    for (let c = 0; c < 3; c++) {
+      const low = numbers[3 * below + c], high = numbers[3 * below + 3 + c];
+      table[3 * i + c] = Math.round(low + part * (high - low));
+    }
+  }
+  return table;
+}
+
+// The colours of values: a map over a range, which may be logarithmic and bent by gamma.
+class Scale {
+  constructor({ table, range, log = false, gamma = 1, clear = null }) {
+    Object.assign(this, { table, log: log && range[0] > 0, gamma, clear });
+    this.range = range;
+    this.ends = this.log ? range.map(Math.log) : range;
+  }
+
+  // The place of a value in the range, 0 to 1.
+  share(value) {
+    const [low, high] = this.ends;
+    const share = ((this.log ? Math.log(Math.max(value, Number.MIN_VALUE)) : value) - low) / (high - low);
+    const within = share > 0 ? Math.min(share, 1) : 0;
+    return this.gamma === 1 ? within : within ** this.gamma;
+  }
+
+  // The value at a share of the range.
+  value(share) {
+    const [low, high] = this.ends, at = low + share ** (1 / this.gamma) * (high - low);
+    return this.log ? Math.exp(at) : at;
+  }
+
+  // How much of its colour a value shows, 0 to 1. Values of empty space show the background.
+  presence(value) {
+    if (!this.clear) return 1;
+    const [low, high, fade] = this.clear, away = Math.max(low - value, value - high);
+    const share = fade > 0 ? Math.min(Math.max(away / fade, 0), 1) : Number(away > 0);
+    return share * share * (3 - 2 * share);
+  }
+}
+
+// Paints the planes of a picture over a background, both as RGBA bytes.
+function paint(planes, kind, scale, background, pixels) {
+  if (kind === 'value') return paintValues(planes[0], scale, background, pixels);
+  return kind === 'light' ? paintLight(planes, background, pixels) : paintChannels(planes, scale, background, pixels);
+}
+
+function paintValues(values, scale, background, pixels) {
+  const { table } = scale;
+  for (let i = 0, at = 0; i < values.length; i++, at += 4) {
+    const value = values[i], presence = value === value ? scale.presence(value) : 0;
+    const entry = presence && 3 * Math.round(scale.share(value) * SHARES);
+    for (let c = 0; c < 3; c++) {
+      const behind = background[at + c];
+      pixels[at + c] = presence ? behind + presence * (table[entry + c] - behind) : behind;
+    }
+  }
+}
+
+function paintLight(planes, background, pixels) {
+  const opacity = planes[3];
+  for (let i = 0, at = 0; i < opacity.length; i++, at += 4) {
+    const rest = 1 - opacity[i];
+    for (let c = 0; c < 3; c++) {
+      const behind = background[at + c];
+      pixels[at + c] = rest === rest ? 255 * planes[c][i] + rest * behind : behind;
+    }
+  }
+}
+
+function paintChannels(planes, scale, background, pixels) {
+  for (let c = 0; c < 3; c++) {
+    const plane = planes[c];
+    for (let i = 0, at = c; i < plane.length; i++, at += 4) {
+      pixels[at] = plane[i] === plane[i] ? 255 * scale.share(plane[i]) : background[at];
+    }
+  }
+}

@@ -1,0 +1,256 @@
+// Shows the pictures of a source: the time slider, the colours, and what lies under the pointer.
+//
+// A source has `about`, the description of its pictures; `sequences`, lists of pictures with their view and frame;
+// `picture(sequence, index)`, which promises the planes of a picture; and `backdrop(view)`, which promises RGBA bytes.
+
+const element = id => document.getElementById(id);
+const shortNumber = number => String(Number(number.toPrecision(4)));
+
+class Player {
+  constructor(source) {
+    this.source = source;
+    this.sequence = 0;
+    this.index = 0;
+    this.shown = null;
+    this.isPlaying = false;
+    this.context = element('picture').getContext('2d');
+    this.begin();
+    this.listen();
+    this.show();
+  }
+
+  get pictures() { return this.source.sequences[this.sequence].pictures; }
+
+  begin() {
+    const { about, sequences } = this.source;
+    document.documentElement.classList.toggle('light', about.background[1] > 127);
+    element('title').textContent = about.title || about.values || 'wavesplat';
+    [element('picture').width, element('picture').height] = about.size;
+    this.image = this.context.createImageData(...about.size);
+    this.image.data.fill(255);
+    element('sequence').replaceChildren(...sequences.map(({ label }, n) => new Option(label, n)));
+    element('views').hidden = sequences.length < 2;
+    element('provenance').textContent = JSON.stringify(about.settings, null, 1);
+    this.beginColours();
+    this.beginTime();
+  }
+
+  beginColours() {
+    const { about } = this.source;
+    element('colours').hidden = element('bar').hidden = element('reset').hidden = about.kind !== 'value';
+    element('colours').style.display = about.kind === 'value' ? '' : 'none';
+    const names = Object.keys(about.maps);
+    element('map').replaceChildren(...names.map(name => new Option(name)));
+    element('bar-name').textContent = about.values;
+    this.resetColours();
+  }
+
+  resetColours() {
+    const { about } = this.source;
+    element('map').value = about.map;
+    [element('low').value, element('high').value] = about.range.map(shortNumber);
+    this.range = about.range;
+    element('log').checked = about.log;
+    element('gamma').value = 0;
+    this.recolour();
+  }
+
+  beginTime() {
+    const last = this.pictures.length - 1;
+    element('frame').max = last;
+    element('time').style.visibility = last ? 'visible' : 'hidden';
+    this.index = Math.min(this.index, last);
+  }
+
+  listen() {
+    const on = (id, event, action) => element(id).addEventListener(event, action);
+    on('play', 'click', () => this.play(!this.isPlaying));
+    on('frame', 'input', () => this.show(Number(element('frame').value)));
+    on('sequence', 'change', () => this.choose(Number(element('sequence').value)));
+    for (const id of ['map', 'log', 'gamma']) on(id, 'input', () => this.recolour());
+    for (const id of ['low', 'high']) on(id, 'change', () => this.chooseRange());
+    on('reset', 'click', () => this.resetColours());
+    on('save', 'click', () => this.save());
+    on('picture', 'pointermove', event => this.read(event));
+    on('picture', 'pointerleave', () => { element('readout').textContent = ''; });
+    on('picture', 'click', event => this.plot(event));
+    document.addEventListener('keydown', event => this.key(event));
+  }
+
+  key(event) {
+    if (event.target.matches('input, select, textarea') || event.ctrlKey || event.metaKey || event.altKey) return;
+    const last = this.pictures.length - 1;
+    const actions = {
+      ' ': () => this.play(!this.isPlaying),
+      ArrowRight: () => this.show(Math.min(this.index + 1, last)),
+      ArrowLeft: () => this.show(Math.max(this.index - 1, 0)),
+      Home: () => this.show(0),
+      End: () => this.show(last),
+      v: () => this.choose((this.sequence + 1) % this.source.sequences.length),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  }
+
+  choose(sequence) {
+    this.sequence = sequence;
+    element('sequence').value = sequence;
+    this.beginTime();
+    this.show();
+  }
+
+  chooseRange() {
+    const range = ['low', 'high'].map(id => element(id).valueAsNumber);
+    if (range.every(Number.isFinite) && range[0] < range[1]) this.range = range;
+    [element('low').value, element('high').value] = this.range.map(shortNumber);
+    this.recolour();
+  }
+
+  // Makes the colours anew, and draws with them.
+  recolour() {
+    const { about } = this.source, log = element('log');
+    log.disabled = this.range[0] <= 0;
+    const table = tableOf(about.maps[element('map').value]), gamma = 2 ** -element('gamma').value;
+    this.scale = new Scale({ table, range: this.range, log: log.checked, gamma, clear: about.clear });
+    this.drawBar();
+    this.draw();
+  }
+
+  drawBar() {
+    const bar = element('bar-colours'), context = bar.getContext('2d'), image = context.createImageData(1, bar.height);
+    const values = Float32Array.from({ length: bar.height }, (_, i) => this.scale.value(1 - i / (bar.height - 1)));
+    image.data.fill(255);
+    paint([values], 'value', this.scale, this.plainBackground(bar.height), image.data);
+    context.putImageData(image, 0, 0);
+    const tick = value => {
+      const span = document.createElement('span');
+      span.textContent = shortNumber(value);
+      span.style.top = `${100 * (1 - this.scale.share(value))}%`;
+      return span;
+    };
+    element('bar-ticks').replaceChildren(...ticks(this.scale).map(tick));
+  }
+
+  plainBackground(pixels) {
+    const rgba = new Uint8ClampedArray(4 * pixels);
+    for (let i = 0; i < rgba.length; i++) rgba[i] = i % 4 < 3 ? this.source.about.background[i % 4] : 255;
+    return rgba;
+  }
+
+  // Shows a picture as soon as it is there. Only the last request counts.
+  async show(index = this.index) {
+    this.index = index;
+    element('frame').value = index;
+    const asked = [this.sequence, index], { view, frame } = this.pictures[index];
+    element('label').textContent = this.source.about.labels[frame] ?? `frame ${frame}`;
+    const loaded = await Promise.all([this.source.picture(...asked), this.source.backdrop(view)]).catch(problem);
+    if (!loaded || asked[0] !== this.sequence || asked[1] !== this.index) return;
+    const [planes, backdrop] = loaded;
+    this.shown = { planes, backdrop: backdrop ?? this.plainBackground(planes[0].length) };
+    this.draw();
+    if (this.pointer) this.read(this.pointer);
+  }
+
+  draw() {
+    if (!this.shown) return;
+    paint(this.shown.planes, this.source.about.kind, this.scale, this.shown.backdrop, this.image.data);
+    this.context.putImageData(this.image, 0, 0);
+    document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;
+  }
+
+  play(isPlaying) {
+    this.isPlaying = isPlaying;
+    element('play').textContent = isPlaying ? 'Pause' : 'Play';
+    if (isPlaying) this.run();
+  }
+
+  // Shows one picture after another, none before the one before it is there.
+  async run() {
+    let due = performance.now();
+    while (this.isPlaying) {
+      const last = this.pictures.length - 1;
+      if (this.index === last && !element('loop').checked) return this.play(false);
+      await this.show(this.index === last ? 0 : this.index + 1);
+      due = Math.max(due + 1000 / (this.source.about.fps * element('speed').value), performance.now());
+      await new Promise(next => setTimeout(next, due - performance.now()));
+    }
+  }
+
+  // The pixel under the pointer.
+  pixel(event) {
+    const canvas = element('picture'), box = canvas.getBoundingClientRect();
+    const scale = Math.min(box.width / canvas.width, box.height / canvas.height);
+    const at = (pointer, start, length, pixels) => Math.floor((pointer - start - (length - pixels * scale) / 2) / scale);
+    const x = at(event.clientX, box.left, box.width, canvas.width), y = at(event.clientY, box.top, box.height, canvas.height);
+    return x >= 0 && y >= 0 && x < canvas.width && y < canvas.height ? { x, y, i: y * canvas.width + x } : null;
+  }
+
+  read(event) {
+    this.pointer = event;
+    const at = this.pixel(event), { about } = this.source;
+    if (!at || !this.shown) return;
+    const value = this.shown.planes[0][at.i];
+    const text = Number.isNaN(value) ? 'no value' : `${shortNumber(value)}${about.values ? `  ${about.values}` : ''}`;
+    const place = `pixel ${at.x}, ${at.y}`;
+    element('readout').textContent = about.kind === 'value' ? `${text}   at ${place}` : place;
+  }
+
+  // Plots the values of a pixel over time.
+  async plot(event) {
+    const at = this.pixel(event), { about } = this.source;
+    if (!at || about.kind !== 'value' || this.pictures.length < 2) return;
+    const sequence = this.sequence, values = [];
+    this.plotted = at.i;
+    for (let n = 0; n < this.pictures.length; n++) {
+      values.push((await this.source.picture(sequence, n))[0][at.i]);
+      if (this.plotted !== at.i || sequence !== this.sequence) return;
+    }
+    drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
+  }
+
+  save() {
+    element('picture').toBlob(blob => {
+      const link = document.createElement('a');
+      link.href = URL.createObjectURL(blob);
+      link.download = `picture_${String(this.pictures[this.index].frame).padStart(4, '0')}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+  }
+}
+
+function problem(error) {
+  element('readout').textContent = `Cannot show this picture: ${error.message}`;
+}
+
+// Round values within the range, no more than about seven.
+function ticks(scale) {
+  const [low, high] = scale.range;
+  if (!(high > low)) return [low];
+  if (scale.log && high / low >= 100) {
+    const first = Math.ceil(Math.log10(low)), count = Math.floor(Math.log10(high)) - first + 1, every = Math.ceil(count / 7);
+    return Array.from({ length: Math.ceil(count / every) }, (_, n) => 10 ** (first + n * every));
+  }
+  const rough = (high - low) / 6, unit = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map(n => n * unit).find(step => step >= rough);
+  const first = Math.ceil(low / step - 1e-9);
+  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, n) => (first + n) * step);
+}
+
+// A line through values; it breaks where there is none.
+function drawSeries(values, name) {
+  const known = values.filter(Number.isFinite);
+  const low = Math.min(...known), high = Math.max(...known), height = high > low ? 180 / (high - low) : 0;
+  const point = (value, n) => `${600 * n / (values.length - 1)},${190 - (value - low) * height}`;
+  const runs = [[]];
+  values.forEach((value, n) => Number.isFinite(value) ? runs.at(-1).push(point(value, n)) : runs.push([]));
+  const line = points => {
+    const polyline = document.createElementNS('http://www.w3.org/2000/svg', 'polyline');
+    polyline.setAttribute('points', points.join(' '));
+    return polyline;
+  };
+  element('series-plot').replaceChildren(...runs.filter(run => run.length > 1).map(line));
+  element('series-name').textContent = known.length ? `${name}: ${shortNumber(low)} to ${shortNumber(high)}` : `${name}: no value`;
+  element('series').hidden = false;
+}

@@ -1,0 +1,61 @@
+// The source of a page that holds all its pictures.
+
+// Bytes of pictures that are kept unpacked.
+const KEPT_BYTES = 512 * 2 ** 20;
+
+const bytesOf = base64 => Uint8Array.from(atob(base64), letter => letter.charCodeAt(0));
+
+class Stored {
+  constructor() {
+    this.about = JSON.parse(element('about').textContent);
+    const { maps, sequences } = this.about;
+    for (const name in maps) maps[name] = bytesOf(maps[name]);
+    const pictures = list => list.map(([view, frame]) => ({ view, frame }));
+    this.sequences = sequences.map(({ label, pictures: list }) => ({ label, pictures: pictures(list) }));
+    this.blocks = Array.from(document.querySelectorAll('script.block'), script => ({
+      script, sequence: Number(script.dataset.sequence), first: Number(script.dataset.first), count: Number(script.dataset.count),
+    }));
+    this.unpacked = new Map(); // the block that was used last is at the end
+    this.backdrops = new Map();
+  }
+
+  async picture(sequence, index) {
+    const holds = block => block.sequence === sequence && block.first <= index && index < block.first + block.count;
+    const block = this.blocks.find(holds);
+    if (!block) throw new Error(`this page lacks picture ${index}`);
+    return (await this.unpack(block)).pictures[index - block.first];
+  }
+
+  unpack(block) {
+    const found = this.unpacked.get(block) ?? readBlock(bytesOf(block.script.textContent));
+    this.unpacked.delete(block);
+    this.unpacked.set(block, found);
+    const [width, height] = this.about.size, each = 4 * width * height * this.blocks[0].count;
+    for (const oldest of this.unpacked.keys()) {
+      if (this.unpacked.size <= 2 || this.unpacked.size * each <= KEPT_BYTES) break;
+      this.unpacked.delete(oldest);
+    }
+    return found;
+  }
+
+  // What lies behind the pictures of a view.
+  backdrop(view) {
+    const address = this.about.backdrops[view];
+    if (!address) return null;
+    if (!this.backdrops.has(view)) this.backdrops.set(view, this.pixelsOf(address));
+    return this.backdrops.get(view);
+  }
+
+  async pixelsOf(address) {
+    const image = new Image();
+    image.src = address;
+    await image.decode();
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = this.about.size;
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    return context.getImageData(0, 0, ...this.about.size).data;
+  }
+}
+
+if (element('about').textContent) window.player = new Player(new Stored());
