@@ -1,7 +1,7 @@
 //! The parts that the programs share: common options, values of options, progress and exit codes.
 //!
 //! Data or one JSON object goes to standard output; notes and progress go to standard error. `config` reads options
-//! from a file. `program` runs a program, and ends it with an exit code.
+//! from a file. `render` is all of `wavesplat-render`; `wavesplat view` uses it, too. `program` runs a program, and ends it with an exit code.
 //!
 //! With the feature `args` alone, other programs can use `input` and `values`: options that name and open frames.
 
@@ -23,6 +23,8 @@ mod messages;
 mod optional;
 #[cfg(feature = "cli")]
 mod program;
+#[cfg(feature = "cli")]
+pub mod render;
 #[cfg(feature = "cli")]
 mod terminal;
 mod times;

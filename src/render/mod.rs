@@ -71,7 +71,7 @@ mod project;
 mod composite;
 mod cut;
 pub mod annotate;
-mod page;
+pub(crate) mod page;
 pub mod sink;
 mod pictures;
 mod setups;

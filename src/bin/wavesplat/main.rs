@@ -8,6 +8,8 @@ mod info;
 mod recover;
 mod several;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -24,6 +26,7 @@ Examples:
   wavesplat convert frames/ -o run.wspl --tolerance 0.001
   wavesplat append run.wspl more/
   wavesplat info run.wspl
+  wavesplat view run.wspl
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
   wavesplat recover damaged.wspl -o saved.wspl
@@ -43,6 +46,8 @@ enum Command {
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),
     Recover(recover::RecoverArgs),
+    #[cfg(feature = "view")]
+    View(view::ViewArgs),
     /// Write completions for a shell, or man pages
     #[command(
         subcommand,
@@ -63,6 +68,8 @@ fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Extract(args) => extract::run(&args),
         Command::Recover(args) => recover::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
         Command::Generate(args) => args.run(cli::command::<Cli>()),
     })
 }

@@ -56,11 +56,8 @@ impl About {
     /// The description of pictures in these colours, still without pictures.
     pub(crate) fn new(pixel: Pixel, size: [usize; 2], colours: &Scale, annotation: &Annotation) -> Result<Self> {
         let map = colours.map().name().unwrap_or("own").to_string();
-        let mut maps = NAMES
-            .into_iter()
-            .map(|name| Ok((name.to_string(), table(&TransferFunction::open(name)?.over((0.0, 1.0))?, colours))))
-            .collect::<Result<BTreeMap<_, _>>>()?;
-        maps.insert(map.clone(), table(colours.map(), colours));
+        let mut maps = maps()?;
+        maps.insert(map.clone(), table(colours.map(), colours.background()));
         Ok(Self {
             title: annotation.title.clone(),
             values: annotation.values.clone(),
@@ -80,6 +77,14 @@ impl About {
         })
     }
 
+    /// The same for a page that knows the named maps.
+    #[cfg(feature = "view")]
+    pub(crate) fn without_maps(&self) -> Self {
+        let mut maps = self.maps.clone();
+        maps.retain(|name, _| !NAMES.contains(&name.as_str()));
+        Self { maps, ..self.clone() }
+    }
+
     /// Names the frames of the pictures by their times.
     pub(crate) fn with_times(mut self, annotation: &Annotation) -> Self {
         let frames = self.sequences.iter().flat_map(|sequence| &sequence.pictures).map(|(_, frame)| *frame);
@@ -88,9 +93,15 @@ impl About {
     }
 }
 
+/// The colours of all named maps.
+pub(crate) fn maps() -> Result<BTreeMap<String, String>> {
+    let named = |name: &str| Ok((name.to_string(), table(&TransferFunction::open(name)?.over((0.0, 1.0))?, [0; 3])));
+    NAMES.into_iter().map(named).collect()
+}
+
 /// Colours at even shares of the range, two bytes for each number, in base64.
-fn table(map: &TransferFunction, colours: &Scale) -> String {
-    let background = || colours.background().map(|number| f64::from(number) / 255.0);
+fn table(map: &TransferFunction, background: Rgb) -> String {
+    let background = || background.map(|number| f64::from(number) / 255.0);
     let at = |i| map.colour(f64::from(i) / f64::from(COLOURS)).unwrap_or_else(background);
     let deep = |number: f64| ((number * 65535.0).round() as u16).to_le_bytes();
     BASE64.encode((0..=COLOURS).flat_map(at).flat_map(deep).collect::<Vec<u8>>())

@@ -66,6 +66,7 @@ impl Planes {
         Head { size, numbers, pictures, log: self.log, step, lengths: Vec::new(), missing: 0 }
     }
 
+    #[cfg(any(feature = "view", test))]
     /// A block of the numbers as they are: little-endian floats of 32 bits.
     pub(crate) fn raw(&self) -> io::Result<Vec<u8>> {
         let mut bytes = headed(&self.head(0.0))?;
@@ -79,7 +80,8 @@ impl Planes {
         let is_known = self.is_known();
         self.fill();
         haar(&mut self.planes, self.numbers);
-        let largest = self.planes.par_iter().flatten().fold(|| 0.0, |a: f32, b| a.max(b.abs())).reduce(|| 0.0, f32::max);
+        let largest =
+            self.planes.par_iter().flatten().fold(|| 0.0, |a: f32, b| a.max(b.abs())).reduce(|| 0.0, f32::max);
         let step = step.max(largest / MOST as f32 * 2.0);
         let known = |n: usize| &is_known[n % self.numbers];
         let planes = self.planes.par_iter().enumerate();
@@ -129,7 +131,11 @@ impl Planes {
 
 fn fill_from(planes: &mut [Vec<f32>], n: usize, from: usize) {
     let mut plane = std::mem::take(&mut planes[n]);
-    plane.iter_mut().zip(&planes[from]).filter(|(number, _)| number.is_nan()).for_each(|(number, from)| *number = *from);
+    plane
+        .iter_mut()
+        .zip(&planes[from])
+        .filter(|(number, _)| number.is_nan())
+        .for_each(|(number, from)| *number = *from);
     planes[n] = plane;
 }
 
@@ -170,7 +176,8 @@ fn code(plane: &[f32], is_known: &[bool], size: [usize; 2], step: f32) -> io::Re
     if rests.iter().all(|rest| *rest == 0) {
         return Ok(Vec::new());
     }
-    let bytes = (0..8 * CODE_BYTES).step_by(8).flat_map(|shift| rests.iter().map(move |rest| (folded(*rest) >> shift) as u8));
+    let bytes =
+        (0..8 * CODE_BYTES).step_by(8).flat_map(|shift| rests.iter().map(move |rest| (folded(*rest) >> shift) as u8));
     packed(&bytes.collect::<Vec<u8>>())
 }
 
@@ -223,7 +230,7 @@ fn packed(bytes: &[u8]) -> io::Result<Vec<u8>> {
 }
 
 /// The head behind its length, with spaces up to a multiple of four bytes.
-fn headed(head: &Head) -> io::Result<Vec<u8>> {
+pub(crate) fn headed(head: &impl Serialize) -> io::Result<Vec<u8>> {
     let mut text = serde_json::to_vec(head)?;
     text.resize(text.len().next_multiple_of(4), b' ');
     Ok([&(text.len() as u32).to_le_bytes()[..], &text].concat())
@@ -273,16 +280,18 @@ mod tests {
             for (n, at) in (0..numbers).flat_map(|n| (0..width * height).map(move |at| (n, at))) {
                 let plane = picture * numbers + n;
                 let sum: f64 = weights.iter().map(|(k, weight)| weight * codes[k * numbers + n][at]).sum();
-                is_missing[n * width * height + at] ^=
-                    !missing.is_empty() && missing[plane * width * height + at] == 1;
+                is_missing[n * width * height + at] ^= !missing.is_empty() && missing[plane * width * height + at] == 1;
                 found[plane][at] = if is_missing[n * width * height + at] { f32::NAN } else { sum as f32 };
             }
         }
         found
     }
 
+    /// A pixel, and the weights of the pixels that it is guessed from.
+    type Guessed = (usize, usize, Vec<(f64, usize, usize)>);
+
     /// The pixels in their order, each with the weights of the pixels that it is guessed from.
-    fn order(width: usize, height: usize) -> Vec<(usize, usize, Vec<(f64, usize, usize)>)> {
+    fn order(width: usize, height: usize) -> Vec<Guessed> {
         let level = |x: usize, y: usize| (x | y).trailing_zeros();
         let mut all: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
         let is_down = |x: usize, y: usize| (x, y) != (0, 0) && y >> level(x, y) & 1 == 1;
@@ -338,10 +347,10 @@ mod tests {
             for (picture, weights) in (0..pictures).map(|t| (t, weights(t, pictures))) {
                 let most = f64::from(step) / 2.0 * weights.iter().map(|(_, weight)| weight.abs()).sum::<f64>() + 1e-5;
                 assert!(most < 1.1 * f64::from(step) + 1e-5, "{pictures}");
-                for n in picture * numbers..(picture + 1) * numbers {
-                    for (a, b) in planes.planes[n].iter().zip(&found[n]) {
-                        assert!(a.is_nan() && b.is_nan() || f64::from((a - b).abs()) <= most, "{pictures}: {a} {b}");
-                    }
+                let own = picture * numbers..(picture + 1) * numbers;
+                let pairs = planes.planes[own.clone()].iter().flatten().zip(found[own].iter().flatten());
+                for (a, b) in pairs {
+                    assert!(a.is_nan() && b.is_nan() || f64::from((a - b).abs()) <= most, "{pictures}: {a} {b}");
                 }
             }
         }

@@ -8,6 +8,8 @@ mod block;
 
 pub(crate) use about::{About, Sequence};
 pub(crate) use block::Planes;
+#[cfg(feature = "view")]
+pub(crate) use {about::maps, block::headed};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -22,6 +24,13 @@ const SCRIPT: &str = concat!(
     include_str!("web/player.js"),
     include_str!("web/stored.js"),
 );
+/// What a page needs besides, if it asks a server for pictures.
+#[cfg(feature = "view")]
+const LIVE: &str = concat!(include_str!("web/camera.js"), include_str!("web/live.js"), include_str!("web/steer.js"));
+#[cfg(feature = "view")]
+const CONTROLS: &str = include_str!("web/controls.html");
+/// Begins to show pictures.
+const START: &str = include_str!("web/start.js");
 
 /// Where the blocks of pictures stand in the page.
 const BLOCKS: &str = "{blocks}";
@@ -36,8 +45,33 @@ pub(crate) fn begin(out: &mut dyn Write, (generator, nonce): (&str, &str), about
         "title" => Some(escaped(title)),
         "style" => Some(STYLE.into()),
         "nonce" => Some(nonce.into()),
+        "sources" | "controls" => Some(String::new()),
         _ => None,
     })
+}
+
+/// A page that asks its server for pictures. `facts` is a JSON object.
+#[cfg(feature = "view")]
+pub(crate) fn live(nonce: &str, facts: &str) -> io::Result<String> {
+    let mut out = Vec::new();
+    fill(&mut out, PAGE, &|name| match name {
+        "generator" => Some(concat!("wavesplat ", env!("CARGO_PKG_VERSION")).into()),
+        "title" => Some("wavesplat".into()),
+        "style" => Some(STYLE.into()),
+        "nonce" => Some(nonce.into()),
+        "sources" => Some("connect-src 'self'; ".into()),
+        "controls" => Some(CONTROLS.into()),
+        "blocks" => Some(String::new()),
+        "about" => Some(in_script(facts)),
+        "script" => Some(format!("{SCRIPT}{LIVE}{START}")),
+        _ => None,
+    })?;
+    String::from_utf8(out).map_err(io::Error::other)
+}
+
+/// A JSON text for a script element, where "<" could begin its end tag.
+fn in_script(json: &str) -> String {
+    json.replace('<', "\\u003c")
 }
 
 /// Writes a block of `count` pictures of a sequence, from the picture `first` on.
@@ -53,11 +87,10 @@ pub(crate) fn write_block(
 /// Ends the page.
 pub(crate) fn end(out: &mut dyn Write, nonce: &str, about: &About) -> io::Result<()> {
     let (_, end) = parts();
-    // Within a script, "<" could begin its end tag.
-    let text = serde_json::to_string(about)?.replace('<', "\\u003c");
+    let text = in_script(&serde_json::to_string(about)?);
     fill(out, end, &|name| match name {
         "about" => Some(text.clone()),
-        "script" => Some(SCRIPT.into()),
+        "script" => Some(format!("{SCRIPT}{START}")),
         "nonce" => Some(nonce.into()),
         _ => None,
     })

@@ -2,6 +2,7 @@
 //! fields also store the provenance.
 
 mod exr;
+mod film;
 mod movie;
 mod ours;
 mod page;
@@ -10,6 +11,8 @@ mod png;
 mod sheet;
 mod stream;
 
+#[cfg_attr(not(feature = "view"), allow(unused_imports, reason = "only the viewer needs it"))]
+pub(crate) use film::{Film, Place};
 pub use movie::MovieFormat;
 pub use ours::is_ours;
 pub use provenance::{Provenance, Shows};
@@ -106,7 +109,7 @@ impl PictureFormat {
             (Self::Sheet, Depth::Sixteen) => pixels(sheet::size(size, pictures)?) * size_of::<[u16; 3]>(),
             (Self::Movie(_), _) => pixels(size) * size_of::<Rgb>(),
             (Self::Png | Self::Apng, Depth::Sixteen) => pixels(size) * size_of::<[u16; 3]>(),
-            (Self::Page, _) => page::memory(size, pictures),
+            (Self::Page, _) => film::memory(size, pictures),
             (Self::Exr, _) => pixels(size) * Pixel::Light.numbers() * size_of::<f32>(),
             _ => 0,
         };
@@ -237,7 +240,10 @@ pub struct Sink {
 
 enum Target {
     /// One file or stream. The header is written with the first picture, so that a failed request leaves a pipe empty.
-    One { out: Box<Output>, begun: bool },
+    One {
+        out: Box<Output>,
+        begun: bool,
+    },
     /// One animated file.
     Animation(Animation),
     /// One file with all pictures in rows.
@@ -296,7 +302,7 @@ impl Sink {
                 sheet.picture(config, rendered, picture);
                 Ok(())
             }
-            Target::Page(page) => page.picture(config, rendered, picture),
+            Target::Page(page) => page.picture(rendered),
             Target::Movie(movie) => {
                 let sent = movie.as_mut().map_or(Ok(()), |movie| movie.picture(config, rendered, picture));
                 match sent {
@@ -321,7 +327,7 @@ impl Sink {
             Target::One { out, .. } => out.commit(),
             Target::Animation(animation) => animation.finish(),
             Target::Sheet(sheet) => sheet.finish(&self.config),
-            Target::Page(page) => page.finish(&self.config),
+            Target::Page(page) => page.finish(),
             Target::Movie(movie) => movie.map_or(Ok(()), |movie| movie.finish()),
             Target::Many(_) => Ok(()),
         }

@@ -1,7 +1,7 @@
 // Shows the pictures of a source: the time slider, the colours, and what lies under the pointer.
 //
-// A source has `about`, the description of its pictures; `sequences`, lists of pictures with their view and frame;
-// `picture(sequence, index)`, which promises the planes of a picture; and `backdrop(view)`, which promises RGBA bytes.
+// A source has `sequences`, lists of pictures with their view and frame; `about`, a first description of them; and
+// `picture(sequence, index)`, which promises the planes of a picture, its own description, and the RGBA bytes behind it.
 
 const element = id => document.getElementById(id);
 const shortNumber = number => String(Number(number.toPrecision(4)));
@@ -14,39 +14,45 @@ class Player {
     this.shown = null;
     this.isPlaying = false;
     this.context = element('picture').getContext('2d');
-    this.begin();
+    element('sequence').replaceChildren(...source.sequences.map(({ label }, n) => new Option(label, n)));
+    element('views').hidden = source.sequences.length < 2;
+    this.adopt(source.about);
+    this.beginTime();
     this.listen();
     this.show();
   }
 
   get pictures() { return this.source.sequences[this.sequence].pictures; }
 
-  begin() {
-    const { about, sequences } = this.source;
+  // Follows the description of pictures. The colours begin anew if these are of another kind.
+  adopt(about) {
+    const isOther = about.key !== this.about?.key || about.kind !== this.about?.kind;
+    this.about = about;
     document.documentElement.classList.toggle('light', about.background[1] > 127);
-    element('title').textContent = about.title || about.values || 'wavesplat';
-    [element('picture').width, element('picture').height] = about.size;
-    this.image = this.context.createImageData(...about.size);
-    this.image.data.fill(255);
-    element('sequence').replaceChildren(...sequences.map(({ label }, n) => new Option(label, n)));
-    element('views').hidden = sequences.length < 2;
+    document.title = element('title').textContent = about.title || about.values || 'wavesplat';
     element('provenance').textContent = JSON.stringify(about.settings, null, 1);
-    this.beginColours();
-    this.beginTime();
+    const picture = element('picture');
+    if (picture.width !== about.size[0] || picture.height !== about.size[1] || !this.image) {
+      [picture.width, picture.height] = about.size;
+      this.image = this.context.createImageData(...about.size);
+      this.image.data.fill(255);
+    }
+    if (isOther) this.beginColours();
   }
 
   beginColours() {
-    const { about } = this.source;
-    element('colours').hidden = element('bar').hidden = element('reset').hidden = about.kind !== 'value';
-    element('colours').style.display = about.kind === 'value' ? '' : 'none';
-    const names = Object.keys(about.maps);
-    element('map').replaceChildren(...names.map(name => new Option(name)));
+    const { about } = this, isOfValues = about.kind === 'value', chosen = element('map').value;
+    element('bar').style.visibility = isOfValues ? 'visible' : 'hidden';
+    element('colours').hidden = element('reset').hidden = !isOfValues;
+    element('map').replaceChildren(...Object.keys(about.maps).map(name => new Option(name)));
     element('bar-name').textContent = about.values;
     this.resetColours();
+    if (chosen in about.maps && about.key) element('map').value = chosen;
+    this.recolour();
   }
 
   resetColours() {
-    const { about } = this.source;
+    const { about } = this;
     element('map').value = about.map;
     [element('low').value, element('high').value] = about.range.map(shortNumber);
     this.range = about.range;
@@ -109,7 +115,7 @@ class Player {
 
   // Makes the colours anew, and draws with them.
   recolour() {
-    const { about } = this.source, log = element('log');
+    const { about } = this, log = element('log');
     log.disabled = this.range[0] <= 0;
     const table = tableOf(about.maps[element('map').value]), gamma = 2 ** -element('gamma').value;
     this.scale = new Scale({ table, range: this.range, log: log.checked, gamma, clear: about.clear });
@@ -134,7 +140,7 @@ class Player {
 
   plainBackground(pixels) {
     const rgba = new Uint8ClampedArray(4 * pixels);
-    for (let i = 0; i < rgba.length; i++) rgba[i] = i % 4 < 3 ? this.source.about.background[i % 4] : 255;
+    for (let i = 0; i < rgba.length; i++) rgba[i] = i % 4 < 3 ? this.about.background[i % 4] : 255;
     return rgba;
   }
 
@@ -142,19 +148,20 @@ class Player {
   async show(index = this.index) {
     this.index = index;
     element('frame').value = index;
-    const asked = [this.sequence, index], { view, frame } = this.pictures[index];
-    element('label').textContent = this.source.about.labels[frame] ?? `frame ${frame}`;
-    const loaded = await Promise.all([this.source.picture(...asked), this.source.backdrop(view)]).catch(problem);
-    if (!loaded || asked[0] !== this.sequence || asked[1] !== this.index) return;
-    const [planes, backdrop] = loaded;
-    this.shown = { planes, backdrop: backdrop ?? this.plainBackground(planes[0].length) };
+    const asked = [this.sequence, index], { frame } = this.pictures[index];
+    element('label').textContent = this.about.labels[frame] ?? `frame ${frame}`;
+    const shown = await this.source.picture(...asked).catch(problem);
+    if (!shown || asked[0] !== this.sequence || asked[1] !== this.index) return;
+    if (shown.about !== this.about) this.adopt(shown.about);
+    this.shown = shown;
     this.draw();
     if (this.pointer) this.read(this.pointer);
   }
 
   draw() {
-    if (!this.shown) return;
-    paint(this.shown.planes, this.source.about.kind, this.scale, this.shown.backdrop, this.image.data);
+    const { planes, backdrop, about } = this.shown ?? {};
+    if (!planes || planes[0].length * 4 !== this.image.data.length) return;
+    paint(planes, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
     this.context.putImageData(this.image, 0, 0);
     document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;
   }
@@ -172,7 +179,7 @@ class Player {
       const last = this.pictures.length - 1;
       if (this.index === last && !element('loop').checked) return this.play(false);
       await this.show(this.index === last ? 0 : this.index + 1);
-      due = Math.max(due + 1000 / (this.source.about.fps * element('speed').value), performance.now());
+      due = Math.max(due + 1000 / (this.about.fps * element('speed').value), performance.now());
       await new Promise(next => setTimeout(next, due - performance.now()));
     }
   }
@@ -188,7 +195,7 @@ class Player {
 
   read(event) {
     this.pointer = event;
-    const at = this.pixel(event), { about } = this.source;
+    const at = this.pixel(event), { about } = this;
     if (!at || !this.shown) return;
     const value = this.shown.planes[0][at.i];
     const text = Number.isNaN(value) ? 'no value' : `${shortNumber(value)}${about.values ? `  ${about.values}` : ''}`;
@@ -198,30 +205,34 @@ class Player {
 
   // Plots the values of a pixel over time.
   async plot(event) {
-    const at = this.pixel(event), { about } = this.source;
+    const at = this.pixel(event), { about } = this;
     if (!at || about.kind !== 'value' || this.pictures.length < 2) return;
     const sequence = this.sequence, values = [];
     this.plotted = at.i;
     for (let n = 0; n < this.pictures.length; n++) {
-      values.push((await this.source.picture(sequence, n))[0][at.i]);
+      values.push((await this.source.picture(sequence, n)).planes[0][at.i]);
       if (this.plotted !== at.i || sequence !== this.sequence) return;
     }
     drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
   }
 
   save() {
-    element('picture').toBlob(blob => {
-      const link = document.createElement('a');
-      link.href = URL.createObjectURL(blob);
-      link.download = `picture_${String(this.pictures[this.index].frame).padStart(4, '0')}.png`;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    });
+    const frame = String(this.pictures[this.index].frame).padStart(4, '0');
+    element('picture').toBlob(blob => download(blob, `picture_${frame}.png`));
   }
 }
 
+function download(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+// Says what went wrong. A picture that nobody wants any more is no problem.
 function problem(error) {
-  element('readout').textContent = `Cannot show this picture: ${error.message}`;
+  if (error.name !== 'AbortError' && error.constructor.name !== 'Stale') element('readout').textContent = `Cannot do this: ${error.message}`;
 }
 
 // Round values within the range, no more than about seven.

@@ -6,8 +6,8 @@ const KEPT_BYTES = 512 * 2 ** 20;
 const bytesOf = base64 => Uint8Array.from(atob(base64), letter => letter.charCodeAt(0));
 
 class Stored {
-  constructor() {
-    this.about = JSON.parse(element('about').textContent);
+  constructor(about) {
+    this.about = about;
     const { maps, sequences } = this.about;
     for (const name in maps) maps[name] = bytesOf(maps[name]);
     const pictures = list => list.map(([view, frame]) => ({ view, frame }));
@@ -23,7 +23,9 @@ class Stored {
     const holds = block => block.sequence === sequence && block.first <= index && index < block.first + block.count;
     const block = this.blocks.find(holds);
     if (!block) throw new Error(`this page lacks picture ${index}`);
-    return (await this.unpack(block)).pictures[index - block.first];
+    const { view } = this.sequences[sequence].pictures[index];
+    const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
+    return { planes: pictures[index - block.first], about: this.about, backdrop };
   }
 
   unpack(block) {
@@ -42,20 +44,19 @@ class Stored {
   backdrop(view) {
     const address = this.about.backdrops[view];
     if (!address) return null;
-    if (!this.backdrops.has(view)) this.backdrops.set(view, this.pixelsOf(address));
+    if (!this.backdrops.has(view)) this.backdrops.set(view, pixelsOf(address, this.about.size));
     return this.backdrops.get(view);
-  }
-
-  async pixelsOf(address) {
-    const image = new Image();
-    image.src = address;
-    await image.decode();
-    const canvas = document.createElement('canvas');
-    [canvas.width, canvas.height] = this.about.size;
-    const context = canvas.getContext('2d');
-    context.drawImage(image, 0, 0);
-    return context.getImageData(0, 0, ...this.about.size).data;
   }
 }
 
-if (element('about').textContent) window.player = new Player(new Stored());
+// The RGBA bytes of a picture at an address.
+async function pixelsOf(address, size) {
+  const image = new Image();
+  image.src = address;
+  await image.decode();
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = size;
+  const context = canvas.getContext('2d');
+  context.drawImage(image, 0, 0);
+  return context.getImageData(0, 0, ...size).data;
+}

@@ -1,10 +1,10 @@
 //! The isosurfaces that `--iso` names.
 
-use crate::colours::parse_colour;
+use super::colours::parse_colour;
 use std::str::FromStr;
 
-use wavesplat::colour::{Colour, TransferFunction};
-use wavesplat::render::Surface;
+use crate::colour::{Colour, TransferFunction};
+use crate::render::Surface;
 
 /// Surfaces as V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between.
 #[derive(Debug, Clone)]

@@ -1,16 +1,16 @@
 //! What a run reports: notes, the sidecar and `--json`.
 
-use crate::along::ModeName;
-use crate::args::Cli;
-use crate::colouring::ColouredPictures;
+use super::along::ModeName;
+use super::args::Cli;
+use super::colouring::ColouredPictures;
+use crate::base::error::{Error, Result};
+use crate::base::output::{Output, STANDARD};
+use crate::cli;
+use crate::render::sink::{Provenance, is_ours};
+use crate::render::{Mode, RenderReport};
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::cli;
-use wavesplat::render::sink::{Provenance, is_ours};
-use wavesplat::render::{Mode, RenderReport};
 
 /// The report of `--json`.
 #[derive(Serialize)]

@@ -1,13 +1,13 @@
 //! Options for the samples along a ray.
 
-use crate::surfaces::SurfaceList;
+use super::surfaces::SurfaceList;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
+use crate::cli::{Numbers, Opacities, Pair, open_colours, stretched};
+use crate::colour::TransferFunction;
+use crate::file::CoefficientFile;
+use crate::render::{Light, Mode};
 use clap::{Args, ValueEnum};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
-use wavesplat::cli::{Numbers, Opacities, Pair, open_colours, stretched};
-use wavesplat::colour::TransferFunction;
-use wavesplat::file::CoefficientFile;
-use wavesplat::render::{Light, Mode};
 
 /// Options for the samples along a ray.
 #[derive(Debug, Args)]

@@ -1,12 +1,12 @@
 //! Places along an axis: as options name them, and in voxels.
 
-use crate::annotations::in_letters;
+use super::annotations::in_letters;
+use crate::base::description::{Attribute, Description, Values, coordinates};
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
+use crate::file::CoefficientFile;
+use crate::render::annotate::AxisLabels;
 use std::str::FromStr;
-use wavesplat::base::description::{Attribute, Description, Values, coordinates};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
-use wavesplat::file::CoefficientFile;
-use wavesplat::render::annotate::AxisLabels;
 
 /// A place along an axis.
 #[derive(Debug, Clone, PartialEq)]

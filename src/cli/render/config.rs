@@ -1,15 +1,15 @@
 //! The settings of a run.
 
-use crate::args::{Cli, ErrorName, MethodName, QuantityName};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::{Grid, Region};
-use wavesplat::colour::TransferFunction;
-use wavesplat::convert::range_bound;
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::promise::{range_of_shares, share_tolerance};
-use wavesplat::render::{Mode, Quantity, RenderConfig, Scene, default_splat_error};
-use wavesplat::view::camera::{Camera, View};
-use wavesplat::view::footprint::Kernel;
+use super::args::{Cli, ErrorName, MethodName, QuantityName};
+use crate::base::error::{Error, Result};
+use crate::base::grid::{Grid, Region};
+use crate::colour::TransferFunction;
+use crate::convert::range_bound;
+use crate::file::CoefficientFile;
+use crate::file::promise::{range_of_shares, share_tolerance};
+use crate::render::{Mode, Quantity, RenderConfig, Scene, default_splat_error};
+use crate::view::camera::{Camera, View};
+use crate::view::footprint::Kernel;
 use wavesplat_format::Metadata;
 
 /// The views with the scale and the centre that they have for a grid.

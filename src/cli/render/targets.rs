@@ -1,13 +1,13 @@
 //! The files that pictures are written to.
 
-use crate::args::{Cli, parse_format};
+use super::args::{Cli, parse_format};
+use crate::base::error::{Error, Result};
+use crate::base::output::{Output, STANDARD, names_of_views};
+use crate::cli::spare_inputs;
+use crate::render::sink::{Depth, PictureFormat, Sink, is_ours};
+use crate::render::{RenderConfig, Scene, least_memory};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::{Output, STANDARD, names_of_views};
-use wavesplat::cli::spare_inputs;
-use wavesplat::render::sink::{Depth, PictureFormat, Sink, is_ours};
-use wavesplat::render::{RenderConfig, Scene, least_memory};
 
 /// The files of pictures: one for each view, or one for all.
 pub(crate) struct Targets {

@@ -1,16 +1,16 @@
 //! The default range of colours, taken from small pictures of an overview.
 
-use crate::report::unit;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::{Grid, Region};
-use wavesplat::base::progress::{Progress, Silent};
-use wavesplat::base::sample::SampleType;
-use wavesplat::cli::{CommonArgs, TerminalProgress};
-use wavesplat::colour::{Clear, Common, Distribution, Norm, TransferFunction};
-use wavesplat::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
-use wavesplat::render::{check, render, stride};
-use wavesplat::source::ArraySource;
-use wavesplat::view::footprint::Kernel;
+use super::report::unit;
+use crate::base::error::{Error, Result};
+use crate::base::grid::{Grid, Region};
+use crate::base::progress::{Progress, Silent};
+use crate::base::sample::SampleType;
+use crate::cli::{CommonArgs, TerminalProgress};
+use crate::colour::{Clear, Common, Distribution, Norm, TransferFunction};
+use crate::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
+use crate::render::{check, render, stride};
+use crate::source::ArraySource;
+use crate::view::footprint::Kernel;
 
 /// The largest number of pixels used to find a range.
 const MOST_PIXELS: usize = 1 << 20;

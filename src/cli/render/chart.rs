@@ -1,7 +1,7 @@
 //! Line charts as SVG.
 
+use crate::render::annotate::round_values;
 use std::fmt::Write;
-use wavesplat::render::annotate::round_values;
 
 /// Lines over a common axis.
 pub(crate) struct Chart {

@@ -1,18 +1,18 @@
 //! Options for what is drawn around the volume.
 
-use crate::args::Cli;
-use crate::places::{self, Axes};
+use super::args::Cli;
+use super::places::{self, Axes};
+use crate::base::error::Result;
+use crate::base::grid::Grid;
+use crate::base::time_labels::TimeLabels;
+use crate::colour::Rgb;
+use crate::file::CoefficientFile;
+use crate::file::setting;
+use crate::render::annotate::{Annotation, Margins, Parts, VolumeAxes, margins};
+use crate::render::{Mode, RenderConfig};
+use crate::view::camera::{Camera, View};
 use clap::{Args, ValueEnum};
 use std::str::FromStr;
-use wavesplat::base::error::Result;
-use wavesplat::base::grid::Grid;
-use wavesplat::base::time_labels::TimeLabels;
-use wavesplat::colour::Rgb;
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::setting;
-use wavesplat::render::annotate::{Annotation, Margins, Parts, VolumeAxes, margins};
-use wavesplat::render::{Mode, RenderConfig};
-use wavesplat::view::camera::{Camera, View};
 
 /// Options for what is drawn around the volume.
 #[derive(Debug, Args)]

@@ -1,20 +1,20 @@
 //! The scene to render: a coefficient file, or frames.
 
-use crate::annotations::values_of;
-use crate::args::{Cli, Detail, Exaggeration, MethodName};
-use crate::places::Axes;
+use super::annotations::values_of;
+use super::args::{Cli, Detail, Exaggeration, MethodName};
+use super::places::Axes;
+use crate::base::description::{coordinates, is_regular};
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
+use crate::base::output::STANDARD;
+use crate::cli::transfer_function;
+use crate::colour::TransferFunction;
+use crate::file::{CoefficientFile, time_labels};
+use crate::render::annotate::Annotation;
+use crate::render::{CoefficientScene, FrameScene, Scene, SplatSource};
+use crate::view::camera::Camera;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use wavesplat::base::description::{coordinates, is_regular};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
-use wavesplat::base::output::STANDARD;
-use wavesplat::cli::transfer_function;
-use wavesplat::colour::TransferFunction;
-use wavesplat::file::{CoefficientFile, time_labels};
-use wavesplat::render::annotate::Annotation;
-use wavesplat::render::{CoefficientScene, FrameScene, Scene, SplatSource};
-use wavesplat::view::camera::Camera;
 
 /// The scene to render.
 pub(crate) struct Opened {

@@ -1,18 +1,19 @@
 //! `--generate`: prints completions or the man page.
 
-use crate::args::Cli;
+use super::args::Cli;
+use crate::base::error::Result;
+use crate::cli::{self, Generated};
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
-use wavesplat::base::error::Result;
-use wavesplat::cli::{self, Generated};
 
 /// The two things that the program can do.
-pub(crate) enum Program {
+pub enum Program {
     Render(Box<Cli>),
     Generate(Generated),
 }
 
 impl Program {
-    pub(crate) fn run(self) -> Result<()> {
+    /// Does what the options ask for.
+    pub fn run(self) -> Result<()> {
         match self {
             Self::Render(mut cli) => {
                 cli.imply_mode()?;

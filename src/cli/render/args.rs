@@ -1,17 +1,17 @@
 //! The arguments of `wavesplat-render`.
 
-use crate::along::AlongArgs;
-use crate::annotations::AnnotationArgs;
-use crate::colours::ColourArgs;
-use crate::cuts::CutArgs;
-use crate::motion::MotionArgs;
-use crate::probes::ProbeArgs;
-use crate::view_names::ViewSpec;
+use super::along::AlongArgs;
+use super::annotations::AnnotationArgs;
+use super::colours::ColourArgs;
+use super::cuts::CutArgs;
+use super::motion::MotionArgs;
+use super::probes::ProbeArgs;
+use super::view_names::ViewSpec;
+use crate::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, Triple, Whole, share};
+use crate::render::Limit;
+use crate::render::sink::{Depth, PictureFormat};
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
-use wavesplat::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, Triple, Whole, share};
-use wavesplat::render::Limit;
-use wavesplat::render::sink::{Depth, PictureFormat};
 
 /// Render pictures of time-varying volumes.
 #[derive(Debug, Parser)]
@@ -40,7 +40,7 @@ holds uint8 colours. A PNG stores its render settings as text, an .exr as commen
 View 0,0 looks along -y with z up. Azimuth turns the camera about z, counter-clockwise seen from above: 90,0 looks \
 along x. A tau of about 1 / the volume's depth makes the near side stand out."
 )]
-pub(crate) struct Cli {
+pub struct Cli {
     /// Coefficient file; --method direct also takes frames
     #[arg(required = true)]
     pub(crate) inputs: Vec<PathBuf>,
@@ -231,5 +231,7 @@ fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
 
 pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
     let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, format)| format).ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif html exr".into())
+    found
+        .map(|(_, format)| format)
+        .ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif html exr".into())
 }

@@ -1,14 +1,14 @@
 //! The settings stored in the pictures of a run.
 
-use crate::along::ModeName;
-use crate::args::{Cli, ErrorName, MethodName, QuantityName};
-use crate::colouring::Colouring;
-use wavesplat::base::time_labels::TimeLabels;
-use wavesplat::colour::{Norm, Scale};
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::BoundReport;
-use wavesplat::render::sink::{Provenance, Shows};
-use wavesplat::render::{Limit, Mode, Pixel, RenderConfig, Scene, Surface};
+use super::along::ModeName;
+use super::args::{Cli, ErrorName, MethodName, QuantityName};
+use super::colouring::Colouring;
+use crate::base::time_labels::TimeLabels;
+use crate::colour::{Norm, Scale};
+use crate::file::CoefficientFile;
+use crate::file::report::BoundReport;
+use crate::render::sink::{Provenance, Shows};
+use crate::render::{Limit, Mode, Pixel, RenderConfig, Scene, Surface};
 
 impl Cli {
     /// The settings that pictures are rendered with.

@@ -1,23 +1,23 @@
 //! Time series of points and regions.
 
-use crate::args::Cli;
-use crate::chart::{Band, Chart, Line};
-use crate::places::{Axes, Place, text};
+use super::args::Cli;
+use super::chart::{Band, Chart, Line};
+use super::places::{Axes, Place, text};
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::output::{Output, STANDARD};
+use crate::base::sample::{is_missing, load};
+use crate::base::time_labels::TimeLabels;
+use crate::cli::{RegionSpec, spare_inputs};
+use crate::extract::{ExtractConfig, ExtractReport, extract_to};
+use crate::file::{CoefficientFile, setting, time_labels};
+use crate::render::planes::Taps;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 use std::str::FromStr;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Region;
-use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::base::sample::{is_missing, load};
-use wavesplat::base::time_labels::TimeLabels;
-use wavesplat::cli::{RegionSpec, spare_inputs};
-use wavesplat::extract::{ExtractConfig, ExtractReport, extract_to};
-use wavesplat::file::{CoefficientFile, setting, time_labels};
-use wavesplat::render::planes::Taps;
 
 /// Options of pictures, which time series do not have.
 const OF_PICTURES: [&str; 34] = [

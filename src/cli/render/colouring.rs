@@ -1,16 +1,16 @@
 //! The colours of the pictures of a run.
 
-use crate::along::ModeName;
-use crate::args::{Cli, QuantityName};
-use crate::cuts::{planes_of, with_planes};
-use crate::ranges::{self, Ranges};
-use crate::targets::Targets;
+use super::along::ModeName;
+use super::args::{Cli, QuantityName};
+use super::cuts::{planes_of, with_planes};
+use super::ranges::{self, Ranges};
+use super::targets::Targets;
+use crate::base::error::{Error, Result};
+use crate::colour::{Norm, Rgb, Scale, TransferFunction};
+use crate::file::CoefficientFile;
+use crate::render::sink::PictureFormat;
+use crate::render::{Mode, Pixel, RenderConfig, Scene};
 use serde::Serialize;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::colour::{Norm, Rgb, Scale, TransferFunction};
-use wavesplat::file::CoefficientFile;
-use wavesplat::render::sink::PictureFormat;
-use wavesplat::render::{Mode, Pixel, RenderConfig, Scene};
 
 /// The colours of pictures and of pictures of their errors.
 pub(crate) struct Colouring {

@@ -1,12 +1,12 @@
 //! The views of a run.
 
-use crate::annotations::AnnotationArgs;
-use crate::args::Cli;
-use crate::motion::{Stand, stands};
-use wavesplat::base::error::Result;
-use wavesplat::base::grid::Grid;
-use wavesplat::render::annotate::Margins;
-use wavesplat::view::camera::View;
+use super::annotations::AnnotationArgs;
+use super::args::Cli;
+use super::motion::{Stand, stands};
+use crate::base::error::Result;
+use crate::base::grid::Grid;
+use crate::render::annotate::Margins;
+use crate::view::camera::View;
 
 /// Azimuth and elevation of the view if none is given.
 const USUAL: [f64; 2] = [30.0, 30.0];

@@ -1,12 +1,12 @@
 //! How the camera and the time advance together.
 
-use crate::args::Cli;
+use super::args::Cli;
+use crate::base::error::{Error, Result};
+use crate::base::text;
+use crate::base::time_labels::TimeLabels;
+use crate::render::RenderConfig;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::text;
-use wavesplat::base::time_labels::TimeLabels;
-use wavesplat::render::RenderConfig;
 
 /// Options for the camera over time, and for the speed of movies.
 #[derive(Debug, Args)]

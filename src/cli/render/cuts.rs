@@ -1,16 +1,16 @@
 //! Slices: planes through the volume.
 
-use crate::along::ModeName;
-use crate::annotations::AnnotationArgs;
-use crate::args::Cli;
-use crate::places::{Axes, Place};
+use super::along::ModeName;
+use super::annotations::AnnotationArgs;
+use super::args::Cli;
+use super::places::{Axes, Place};
+use crate::base::error::{Error, Result};
+use crate::base::grid::Grid;
+use crate::render::annotate::Margins;
+use crate::render::{Mode, Plane, RenderConfig};
+use crate::view::camera::View;
 use clap::Args;
 use std::str::FromStr;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
-use wavesplat::render::annotate::Margins;
-use wavesplat::render::{Mode, Plane, RenderConfig};
-use wavesplat::view::camera::View;
 
 /// Options for slices.
 #[derive(Debug, Args)]

@@ -1,7 +1,7 @@
 //! Views by name or by angles.
 
+use crate::cli::Pair;
 use std::str::FromStr;
-use wavesplat::cli::Pair;
 
 /// Azimuth and elevation in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +40,8 @@ impl FromStr for ViewSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wavesplat::base::grid::Grid;
-    use wavesplat::view::camera::{Camera, View};
+    use crate::base::grid::Grid;
+    use crate::view::camera::{Camera, View};
 
     /// The pixels to the right and down, and the depth, of a step along each axis.
     fn steps(name: &str) -> [[f64; 3]; 3] {

@@ -1,14 +1,14 @@
 //! The sinks that write pictures.
 
-use crate::args::Cli;
-use crate::colouring::Colouring;
-use crate::provenance::error_provenance;
-use crate::targets::Targets;
+use super::args::Cli;
+use super::colouring::Colouring;
+use super::provenance::error_provenance;
+use super::targets::Targets;
+use crate::base::error::Result;
+use crate::render::annotate::Annotation;
+use crate::render::sink::{Provenance, Sink, SinkConfig};
+use crate::render::{Pixel, RenderConfig, Rendered};
 use std::sync::Arc;
-use wavesplat::base::error::Result;
-use wavesplat::render::annotate::Annotation;
-use wavesplat::render::sink::{Provenance, Sink, SinkConfig};
-use wavesplat::render::{Pixel, RenderConfig, Rendered};
 
 /// The sinks of pictures and of their errors: one for each view, or one for all.
 pub(crate) struct Sinks {
@@ -33,6 +33,29 @@ impl Sinks {
 }
 
 impl Cli {
+    /// The settings of the sinks of pictures, still without the pictures that they show.
+    pub(crate) fn sink_config(
+        &self,
+        config: &RenderConfig,
+        pictures: &Targets,
+        colouring: &Colouring,
+        (provenance, annotation): (&Provenance, Annotation),
+    ) -> Result<SinkConfig> {
+        Ok(SinkConfig {
+            format: pictures.format,
+            size: self.size.0,
+            shown: Vec::new(),
+            provenance: Arc::new(provenance.clone()),
+            fps: self.fps(config, &annotation.times)?,
+            pixel: colouring.pixel,
+            colours: colouring.of_pictures.clone(),
+            depth: self.depth,
+            coloured_array: self.colour.is_asked(),
+            annotation: (self.around.is_asked() || self.is_page()).then_some(annotation),
+            force: self.force,
+        })
+    }
+
     /// Opens the sinks of a run.
     pub(crate) fn sinks(
         &self,
@@ -41,20 +64,8 @@ impl Cli {
         colouring: &Colouring,
         (provenance, annotation): (&Provenance, Annotation),
     ) -> Result<Sinks> {
-        let Colouring { pixel, of_pictures, of_errors, .. } = colouring;
-        let of_pictures = SinkConfig {
-            format: pictures.format,
-            size: self.size.0,
-            shown: Vec::new(),
-            provenance: Arc::new(provenance.clone()),
-            fps: self.fps(config, &annotation.times)?,
-            pixel: *pixel,
-            colours: of_pictures.clone(),
-            depth: self.depth,
-            coloured_array: self.colour.is_asked(),
-            annotation: (self.around.is_asked() || self.is_page()).then_some(annotation),
-            force: self.force,
-        };
+        let of_pictures = self.sink_config(config, pictures, colouring, (provenance, annotation))?;
+        let Colouring { pixel, of_errors, .. } = colouring;
         let Some(errors) = errors else {
             return Ok(Sinks { pictures: open(pictures, &of_pictures, config)?, errors: Vec::new() });
         };

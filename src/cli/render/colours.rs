@@ -1,12 +1,12 @@
 //! The colours of values.
 
-use crate::ranges::Ranges;
+use super::ranges::Ranges;
+use crate::base::error::{Error, Result};
+use crate::cli::{CommonArgs, Pair, open_colours};
+use crate::colour::{Clear, Norm, Rgb, TransferFunction};
+use crate::render::sink::PictureFormat;
 use clap::{Args, ValueEnum};
 use std::str::FromStr;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, Pair, open_colours};
-use wavesplat::colour::{Clear, Norm, Rgb, TransferFunction};
-use wavesplat::render::sink::PictureFormat;
 
 /// Options for colours.
 #[derive(Debug, Args)]

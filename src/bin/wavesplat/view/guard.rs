@@ -1,0 +1,72 @@
+//! Who may ask: only pages of this server, which know its token.
+
+use axum::http::{HeaderMap, HeaderValue, header};
+use std::net::SocketAddr;
+use wavesplat::base::error::{Error, Result};
+
+/// A word that nobody can guess.
+pub(super) fn token() -> Result<String> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(|e| Error::usage(format!("no random numbers for the address: {e}")))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Whether a request comes from the page of this server. A host with a name could be another site's, whose name leads
+/// here; a foreign origin is another site's page.
+pub(super) fn is_own(headers: &HeaderMap) -> bool {
+    let text = |name| headers.get(name).map(HeaderValue::to_str);
+    let Some(Ok(host)) = text(header::HOST) else { return false };
+    let is_plain = host.parse::<SocketAddr>().is_ok() || host.parse::<std::net::IpAddr>().is_ok();
+    let is_local = host.split(':').next() == Some("localhost");
+    let is_same = match text(header::ORIGIN) {
+        None => true,
+        Some(origin) => origin.ok().and_then(|origin| origin.strip_prefix("http://")) == Some(host),
+    };
+    (is_plain || is_local) && is_same
+}
+
+/// What browsers may do with answers: show them in a page of their own, and nothing else.
+pub(super) const HEADERS: [(&str, &str); 5] = [
+    ("cache-control", "no-store"),
+    ("content-security-policy", "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),
+    ("cross-origin-resource-policy", "same-origin"),
+    ("referrer-policy", "no-referrer"),
+    ("x-content-type-options", "nosniff"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_pages_of_this_server_may_ask() {
+        let asks = |host: Option<&str>, origin: Option<&str>| {
+            let mut headers = HeaderMap::new();
+            let pairs = [(header::HOST, host), (header::ORIGIN, origin)];
+            for (name, value) in pairs.into_iter().filter_map(|(name, value)| Some((name, value?))) {
+                headers.insert(name, value.parse().expect("a value"));
+            }
+            is_own(&headers)
+        };
+        for host in ["127.0.0.1:80", "[::1]:8123", "localhost:8123", "192.168.0.7:9", "127.0.0.1"] {
+            assert!(asks(Some(host), None) && asks(Some(host), Some(&format!("http://{host}"))), "{host}");
+        }
+        for (host, origin) in [
+            (None, None),
+            (Some("evil.example:8123"), None),
+            (Some("127.0.0.1.evil.example"), None),
+            (Some("localhost.evil.example"), None),
+            (Some("127.0.0.1:80"), Some("http://evil.example")),
+            (Some("127.0.0.1:80"), Some("http://127.0.0.1:81")),
+            (Some("127.0.0.1:80"), Some("null")),
+        ] {
+            assert!(!asks(host, origin), "{host:?} {origin:?}");
+        }
+    }
+
+    #[test]
+    fn tokens_differ() {
+        let [a, b] = [token().expect("a token"), token().expect("a token")];
+        assert!(a != b && a.len() == 32);
+    }
+}
