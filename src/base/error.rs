@@ -58,6 +58,9 @@ pub enum Error {
         /// What helps besides another path.
         remedy: Option<Remedy>,
     },
+    /// The caller wants the result no longer, and said so by [`Progress`](super::progress::Progress).
+    #[error("cancelled")]
+    Cancelled,
     /// The arguments of a program are invalid. The library never returns this.
     #[error("{0}")]
     Usage(String),
@@ -152,7 +155,7 @@ impl Error {
             | Self::Input { remedy, .. }
             | Self::Changed { remedy, .. } => remedy.clone(),
             Self::CoefficientFile { path, source } => of_damage(path, source),
-            Self::Io { .. } | Self::Usage(_) | Self::BoundMissed { .. } => None,
+            Self::Io { .. } | Self::Cancelled | Self::Usage(_) | Self::BoundMissed { .. } => None,
         }
     }
 
@@ -170,7 +173,7 @@ impl Error {
             return if is_shorter { 4 } else { 1 };
         }
         match self {
-            Self::Io { .. } => 1,
+            Self::Io { .. } | Self::Cancelled => 1,
             Self::Setting { .. } | Self::Path { .. } | Self::Usage(_) => 2,
             Self::Input { .. } | Self::CoefficientFile { .. } => 3,
             Self::Changed { .. } | Self::BoundMissed { .. } => 4,

@@ -1,4 +1,6 @@
-//! Progress of long work. The library reports it, and programs show it.
+//! Progress of long work. The library reports it, programs show it, and both can end the work early.
+
+use super::error::{Error, Result};
 
 /// Receives the progress of one run.
 pub trait Progress: Sync {
@@ -12,6 +14,17 @@ pub trait Progress: Sync {
     fn advance(&self, steps: u64);
     /// All steps are done.
     fn finish(&self);
+    /// Whether the result is no longer wanted. Then the work ends soon, with [`Error::Cancelled`].
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+    /// Lets the work go on if its result is wanted.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn check(&self) -> Result<()> {
+        if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+    }
 }
 
 /// Shows nothing.

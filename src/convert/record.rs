@@ -76,6 +76,7 @@ impl<'a, W: Write> Recorder<'a, W> {
     pub(super) fn write(&mut self, batches: Receiver<EncodedBatch>, progress: &dyn Progress) -> Result<()> {
         for batch in batches {
             let started = Instant::now();
+            progress.check()?;
             self.append(&batch)?;
             progress.advance(batch.blocks.len() as u64);
             self.busy += started.elapsed();

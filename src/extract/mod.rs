@@ -122,6 +122,7 @@ pub fn extract_to(
     let mut bytes = Vec::new();
     let all = config.frames.len() * config.region.voxels() * file.sample().size();
     for piece in pieces.list(file, config) {
+        progress.check()?;
         read_piece(file, config, &piece, pieces.blocks, &mut bytes, &mut report)?;
         write(&bytes)?;
         report.bytes += bytes.len() as u64;

@@ -111,7 +111,7 @@ impl<B: Blend> Sliced<'_, B> {
         let together =
             |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n, at_a_time)).unwrap_or(1);
         let blocks = scene.blocks();
-        let job = Job { config: self.config, together: &together, views: &[] };
+        let job = Job { config: self.config, together: &together, views: &[], progress: self.progress };
         let advance = |slices: usize| self.progress.advance(slices as u64);
         let (number, view, blend) = (self.number, self.view, &self.blend);
         let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {

@@ -26,7 +26,7 @@ pub(super) fn cut(
         let config = RenderConfig { region: Some(view.needed()), ..config.clone() };
         let fits = |scene: &dyn Scene, frames| needed(scene, &config, view, (frames, at_a_time)) <= config.memory;
         let together = |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n)).unwrap_or(1);
-        let job = Job { config: &config, together: &together, views: &[] };
+        let job = Job { config: &config, together: &together, views: &[], progress };
         let render =
             |batch: &dyn FrameBatch, report: &mut RenderReport| Cut { view, blocks, batch, at_a_time }.pictures(report);
         for_each_batch(scene, job, report, render, |frames, channels, _| {

@@ -33,7 +33,7 @@ pub(super) fn project(
     let mut first = which.start;
     while first < which.end {
         let budget = Budget::of_most(config, scene, &setups[first..which.end]);
-        render_views(scene, config, (&budget, first), report, &mut sink)?;
+        render_views((scene, progress), config, (&budget, first), report, &mut sink)?;
         first += budget.setups().len();
     }
     Ok(())
@@ -41,7 +41,7 @@ pub(super) fn project(
 
 /// Renders all frames from the views of the budget. `first_view` is the index of the first of them.
 fn render_views(
-    scene: &mut dyn Scene,
+    (scene, progress): (&mut dyn Scene, &dyn Progress),
     config: &RenderConfig,
     (budget, first_view): (&Budget<'_>, usize),
     report: &mut RenderReport,
@@ -52,7 +52,7 @@ fn render_views(
     let expectations: Vec<_> = weighted.iter().map(|view| Expectation::new(view, config)).collect();
     lap(&mut clock, &mut report.weight_seconds);
     let together = |scene: &dyn Scene, most: usize| budget.frames(scene, config, most);
-    let job = Job { config, together: &together, views: &expectations };
+    let job = Job { config, together: &together, views: &expectations, progress };
     let render =
         |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &weighted, (config, budget), report);
     for_each_batch(scene, job, report, render, |frames, channels, report| {

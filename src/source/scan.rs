@@ -71,6 +71,7 @@ pub fn value_range(
     progress.start(Some(frames as u64));
     let mut range = Scan::NOTHING.range;
     for frame in 0..frames {
+        progress.check()?;
         let window = source.window(frame, 1)?;
         range = join_ranges(range, scan(window.as_ref(), &grid, ty, declared)?.range);
         window.check_unchanged()?;

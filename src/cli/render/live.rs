@@ -6,10 +6,11 @@ use super::generate::Program;
 use super::look::Look;
 use super::ranges;
 use super::scene::Opened;
+use super::work::Work;
 use crate::base::error::{Error, Result};
 use crate::render::page::{self, Planes};
-use crate::render::render;
 use crate::render::sink::{Film, Place};
+use crate::render::{Pixel, render};
 use clap::Parser;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -38,8 +39,10 @@ struct Facts {
     /// The point in the middle of the volume as it is drawn, and half of its diagonal.
     center: [f64; 3],
     radius: f64,
-    /// Voxels along x, y and z.
+    /// Voxels along x, y and z, the place of the first, and their distance.
     dims: [usize; 3],
+    origin: [f64; 3],
+    spacing: [f64; 3],
     /// The least and the largest sample, if the file says.
     range: Option<(f64, f64)>,
     /// The coarsest level of detail.
@@ -53,6 +56,8 @@ struct Answer<'a> {
     about: &'a page::About,
     /// The blocks behind this, and their lengths in bytes.
     blocks: Vec<(Place, usize)>,
+    /// The largest error of each pixel, as one more block of this many bytes behind the others.
+    errors: Option<usize>,
 }
 
 impl Scenery {
@@ -94,6 +99,8 @@ impl Scenery {
             center: [0, 1, 2].map(middle),
             radius: sides.iter().map(|side| side * side).sum::<f64>().sqrt() / 2.0,
             dims: grid.dims,
+            origin: grid.origin,
+            spacing: grid.spacing,
             range: file.as_ref().map(|file| file.source_range()),
             coarsest: file.as_ref().map_or(0, |file| file.coarsest_detail()),
             maps: page::maps()?,
@@ -101,32 +108,68 @@ impl Scenery {
     }
 
     /// The pictures of a request: their description, then blocks of their numbers. `web/live.js` reads it.
-    pub fn pictures(&self, look: &Look) -> Result<Vec<u8>> {
-        let cli = self.program(&look.options(), Path::new(PAGE))?;
-        let Prepared { mut scene, config, targets, colouring, provenance, annotation, .. } = cli.prepared()?;
+    ///
+    /// # Errors
+    /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
+    pub fn pictures(&self, look: &Look, work: &Work) -> Result<Vec<u8>> {
+        let cli = self.program(&look.options_of_colours(), Path::new(PAGE))?;
+        let Prepared { mut scene, mut config, targets, colouring, provenance, annotation, .. } = cli.prepared()?;
+        config.certify = look.certify;
+        config.frames.retain(|frame| look.wants(*frame));
+        if config.frames.is_empty() {
+            return Err(Error::usage("frames: the archive has none of these"));
+        }
         let mut sink = cli.sink_config(&config, &targets.0, &colouring, (&provenance, annotation))?;
         sink.shown = config.shown();
-        let (mut film, mut blocks) = (Film::new(sink)?, Vec::new());
+        look.check_memory(sink.pixel.numbers(), config.memory)?;
+        let (size, pixel, failed) = (sink.size, sink.pixel, |e| Error::io(Path::new("page"), "writing", e));
+        let (mut film, mut blocks, mut errors) = (Film::new(sink)?, Vec::new(), Planes::new(size, 1, false));
+        let step = film.step();
+        let packed = |planes: Planes| if look.packed { planes.coded(step) } else { planes.raw() }.map_err(failed);
         let mut give = |place: Place, planes: Planes| {
-            blocks.push((place, planes.raw().map_err(|e| Error::io(Path::new("page"), "writing", e))?));
+            blocks.push((place, packed(planes)?));
             Ok(())
         };
-        let progress = cli.common.progress("render", "pictures");
-        render(scene.as_mut(), &config, &progress, &mut |rendered| film.picture(&rendered, &mut give))?;
+        render(scene.as_mut(), &config, work, &mut |rendered| {
+            if let Some(error) = rendered.error.filter(|_| pixel == Pixel::Value) {
+                errors.push(error, |value| value);
+            }
+            film.picture(&rendered, &mut give)
+        })?;
         film.rest(&mut give)?;
+        let errors = (errors.pictures() > 0).then(|| errors.raw().map_err(failed)).transpose()?;
         let answer = Answer {
             about: &film.about().without_maps(),
             blocks: blocks.iter().map(|(place, block)| (*place, block.len())).collect(),
+            errors: errors.as_ref().map(Vec::len),
         };
-        let head = page::headed(&answer).map_err(|e| Error::io(Path::new("page"), "writing", e))?;
-        Ok(blocks.into_iter().fold(head, |mut all, (_, block)| {
+        let head = page::headed(&answer).map_err(failed)?;
+        Ok(blocks.into_iter().map(|(_, block)| block).chain(errors).fold(head, |mut all, block| {
             all.extend(block);
             all
         }))
     }
 
+    /// The time series of a point, as `--probe` writes it: lines of comma-separated values. X, Y and Z are shares of the
+    /// axes.
+    ///
+    /// # Errors
+    /// Inputs that are no coefficient file, or reads that fail.
+    pub fn series(&self, [x, y, z]: [f64; 3]) -> Result<Vec<u8>> {
+        let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
+        let path = folder.path().join("series.csv");
+        let pictures = |word: &OsString| word.to_string_lossy().starts_with("--method=");
+        let options = self.options.iter().filter(|word| !pictures(word)).cloned().collect();
+        let probe = Self { options, ..self.clone() };
+        probe.program(&[format!("--probe={x},{y},{z}")], &path)?.probe()?;
+        std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
+    }
+
     /// How many samples of some frames lie in each of 64 equal parts of the range of all.
-    pub fn histogram(&self) -> Result<Vec<usize>> {
+    ///
+    /// # Errors
+    /// Those of rendering.
+    pub fn histogram(&self, _: &Work) -> Result<Vec<usize>> {
         let cli = self.program(&[], Path::new(PAGE))?;
         let Prepared { mut scene, config, .. } = cli.prepared()?;
         let samples = ranges::distribution(scene.as_mut(), &config, &cli.common)?;
@@ -140,14 +183,13 @@ impl Scenery {
     }
 
     /// The file of the pictures of a request.
-    pub fn save(&self, look: &Look, saved: Saved) -> Result<Vec<u8>> {
+    pub fn save(&self, look: &Look, saved: Saved, work: &Work) -> Result<Vec<u8>> {
         let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
         let path = folder.path().join(saved.name());
         let cli = self.program(&look.options(), &path)?;
         let Prepared { mut scene, config, targets, colouring, provenance, annotation, .. } = cli.prepared()?;
         let mut sinks = cli.sinks(&config, (&targets.0, None), &colouring, (&provenance, annotation))?;
-        let progress = cli.common.progress("render", "pictures");
-        render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
+        render(scene.as_mut(), &config, work, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
     }
@@ -157,7 +199,9 @@ impl Scenery {
         let words =
             |words: &[OsString]| words.iter().map(|word| word.to_string_lossy().into_owned()).collect::<Vec<_>>();
         let mut all = words(&self.inputs);
-        all.extend(words(&self.options).into_iter().filter(|word| !IMPLIED.contains(&word.as_str())));
+        all.extend(
+            words(&self.options).into_iter().filter(|word| !IMPLIED.iter().any(|start| word.starts_with(start))),
+        );
         all.extend(look.options());
         all.extend(["-o".into(), saved.name().into()]);
         all.iter().fold("wavesplat-render".into(), |line, word| line + " " + &quoted(word))
@@ -193,7 +237,7 @@ impl Saved {
 const BARS: usize = 64;
 
 /// Options that a command need not repeat.
-const IMPLIED: [&str; 1] = ["--method=coefficients"];
+const IMPLIED: [&str; 2] = ["--method=", "--memory="];
 
 /// The format of the pictures of a page. No file of this name is written.
 const PAGE: &str = "live.html";

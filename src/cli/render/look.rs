@@ -50,6 +50,12 @@ pub struct Look {
     annotate: bool,
     #[serde(default)]
     light: bool,
+    /// Whether to bound the error of every pixel.
+    #[serde(default)]
+    pub(super) certify: bool,
+    /// Whether to answer in few bytes, for slow networks.
+    #[serde(default)]
+    pub(super) packed: bool,
 }
 
 /// How the samples along a ray make a pixel.
@@ -96,17 +102,45 @@ impl Look {
         }
     }
 
+    /// Refuses pictures of more numbers than half of the memory takes.
+    pub(super) fn check_memory(&self, numbers: usize, memory: usize) -> Result<()> {
+        let numbers = self.size[0] * self.size[1] * numbers * (self.frames[1] - self.frames[0]);
+        let bytes = numbers.saturating_mul(2 * size_of::<f32>());
+        if bytes <= memory / 2 {
+            return Ok(());
+        }
+        Err(Error::setting(
+            "memory",
+            format!("{memory} bytes are too few for this many frames at once: they take {bytes}"),
+        ))
+    }
+
+    /// Whether a frame is wanted.
+    pub(super) fn wants(&self, frame: usize) -> bool {
+        (self.frames[0]..self.frames[1]).contains(&frame)
+    }
+
+    /// The options of `wavesplat-render` that draw this, and all other frames too if their values determine the colours.
+    pub(super) fn options_of_colours(&self) -> Vec<String> {
+        let mut options = self.options();
+        if self.range.is_none() {
+            options.retain(|option| !option.starts_with("--frames="));
+        }
+        options
+    }
+
     /// The options of `wavesplat-render` that draw this.
     pub fn options(&self) -> Vec<String> {
         let [azimuth, elevation] = self.view;
         let [width, height] = self.size;
-        let [x, y, z] = self.center;
+        let [x, y, z] = self.center.map(short);
+        let [first, end] = self.frames;
         let mut options = vec![
             format!("--view={azimuth},{elevation}"),
-            format!("--scale={}", self.scale),
+            format!("--scale={}", short(self.scale)),
             format!("--center={x},{y},{z}"),
             format!("--size={width}x{height}"),
-            format!("--frames={}:{}", self.frames[0], self.frames[1]),
+            if end == first + 1 { format!("--frames={first}") } else { format!("--frames={first}:{end}") },
         ];
         options.extend(self.mode_options());
         options.extend(self.colour_options());
@@ -145,7 +179,7 @@ impl Look {
         let is_of_samples = matches!(self.mode, LookMode::Composite | LookMode::Iso);
         let option = if is_of_samples { "--transfer-function" } else { "--colormap" };
         let mut options: Vec<String> = self.map.iter().map(|map| format!("{option}={map}")).collect();
-        options.extend(self.range.map(|[lo, hi]| format!("--range={lo},{hi}")));
+        options.extend(self.range.map(|range| range.map(short)).map(|[lo, hi]| format!("--range={lo},{hi}")));
         if is_of_samples {
             let points = |points: &Vec<[f64; 2]>| {
                 points.iter().map(|[share, opacity]| format!("{share}:{opacity}")).collect::<Vec<_>>().join(",")
@@ -159,12 +193,17 @@ impl Look {
         }
         if self.mode != LookMode::Slice {
             options.extend(self.clear.as_ref().map(|clear| match clear[..] {
-                [lo, hi] => format!("--clear={lo},{hi}"),
+                [lo, hi] => format!("--clear={},{}", short(lo), short(hi)),
                 _ => "--clear=none".into(),
             }));
         }
         options
     }
+}
+
+/// A number with nine significant digits: a picture of 4096 pixels shows no more.
+fn short(number: f64) -> f64 {
+    format!("{number:.8e}").parse().unwrap_or(number)
 }
 
 impl Axis {

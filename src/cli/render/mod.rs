@@ -26,6 +26,8 @@ mod surfaces;
 mod targets;
 mod view_names;
 mod views;
+#[cfg(feature = "view")]
+mod work;
 
 use crate::base::error::Result;
 use crate::file::CoefficientFile;
@@ -35,12 +37,12 @@ use crate::render::{RenderConfig, Scene, render};
 use args::Cli;
 use colouring::Colouring;
 pub use generate::Program;
-#[cfg(feature = "view")]
-pub use look::Look;
 use report::{Reported, summary, unit};
 use scene::Opened;
 use std::sync::Arc;
 use targets::Targets;
+#[cfg(feature = "view")]
+pub use {look::Look, work::Work};
 
 /// Everything that rendering needs, opened and chosen.
 struct Prepared {

@@ -29,6 +29,8 @@ const SCRIPT: &str = concat!(
 const LIVE: &str = concat!(include_str!("web/camera.js"), include_str!("web/live.js"), include_str!("web/steer.js"));
 #[cfg(feature = "view")]
 const CONTROLS: &str = include_str!("web/controls.html");
+#[cfg(feature = "view")]
+const SAVING: &str = include_str!("web/saving.html");
 /// Begins to show pictures.
 const START: &str = include_str!("web/start.js");
 
@@ -45,7 +47,7 @@ pub(crate) fn begin(out: &mut dyn Write, (generator, nonce): (&str, &str), about
         "title" => Some(escaped(title)),
         "style" => Some(STYLE.into()),
         "nonce" => Some(nonce.into()),
-        "sources" | "controls" => Some(String::new()),
+        "sources" | "controls" | "saving" => Some(String::new()),
         _ => None,
     })
 }
@@ -61,6 +63,7 @@ pub(crate) fn live(nonce: &str, facts: &str) -> io::Result<String> {
         "nonce" => Some(nonce.into()),
         "sources" => Some("connect-src 'self'; ".into()),
         "controls" => Some(CONTROLS.into()),
+        "saving" => Some(SAVING.trim_end().into()),
         "blocks" => Some(String::new()),
         "about" => Some(in_script(facts)),
         "script" => Some(format!("{SCRIPT}{LIVE}{START}")),

@@ -97,6 +97,7 @@ impl Scene for FrameScene {
         let of_frame = request.samples() / request.frames.len();
         let frames = (0..channels).flat_map(|channel| request.frames.iter().map(move |frame| (channel, *frame)));
         for ((channel, frame), samples) in frames.zip(samples.chunks_exact_mut(of_frame)) {
+            progress.check()?;
             let window = self.source.window(frame, 1)?;
             let window = in_channel(window, self.colour_transform.as_ref(), channel);
             overview::Frames { window: window.as_ref(), sample, missing_value }.thin(0, request, samples)?;

@@ -48,6 +48,7 @@ fn of_window_and_channel(
     for entries in file.entries(window, channel, &request.region) {
         let entries = entries?;
         for some in entries.chunks(TOGETHER) {
+            progress.check()?;
             let decoded = some.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             some.iter().zip(decoded).for_each(|(entry, block)| put(request, entry.id.block as usize, &block, samples));
             progress.advance(some.len() as u64);

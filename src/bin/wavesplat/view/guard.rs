@@ -11,6 +11,19 @@ pub(super) fn token() -> Result<String> {
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
+/// The environment variable with the token of the address, for addresses that stay the same.
+pub(super) const TOKEN: &str = "WAVESPLAT_TOKEN";
+
+/// The token of the environment, or a new one.
+pub(super) fn chosen_token(environment: Option<String>) -> Result<String> {
+    let Some(chosen) = environment else { return token() };
+    let is_plain = chosen.bytes().all(|letter| letter.is_ascii_alphanumeric() || b"-_".contains(&letter));
+    if is_plain && chosen.len() >= 16 {
+        return Ok(chosen);
+    }
+    Err(Error::usage(format!("{TOKEN}: takes 16 or more letters, digits, - and _")))
+}
+
 /// Whether a request comes from the page of this server. A host with a name could be another site's, whose name leads
 /// here; a foreign origin is another site's page.
 pub(super) fn is_own(headers: &HeaderMap) -> bool {
@@ -62,6 +75,14 @@ mod tests {
         ] {
             assert!(!asks(host, origin), "{host:?} {origin:?}");
         }
+    }
+
+    #[test]
+    fn tokens_can_be_chosen() {
+        let chosen = |token: &str| chosen_token(Some(token.into())).ok();
+        assert_eq!(chosen("abcdefgh-0123_456"), Some("abcdefgh-0123_456".into()));
+        assert_eq!([chosen(""), chosen("0123456789abcde"), chosen("0123456789/abcdef")], [None, None, None]);
+        assert_eq!(chosen_token(None).expect("a token").len(), 32);
     }
 
     #[test]

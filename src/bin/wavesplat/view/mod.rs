@@ -16,7 +16,8 @@ use wavesplat::cli::{self, CommonArgs};
 /// Look around in a browser: turn, zoom, play, choose colours
 ///
 /// Prints the address of a page, and opens it. The page shows means, largest values, composites, isosurfaces and slices,
-/// and gives the wavesplat-render command of what it shows. Ctrl-C ends it.
+/// and gives the wavesplat-render command of what it shows. Ctrl-C ends it. The environment variable WAVESPLAT_TOKEN sets
+/// the last part of the address, which is else new every time.
 #[derive(Debug, Args)]
 #[command(before_help = "\
 Examples:
@@ -53,7 +54,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<()> {
     let listening = |e| Error::io(Path::new(&at), "listening", e);
     let listener = TcpListener::bind((args.listen, args.port)).map_err(listening)?;
     let address = listener.local_addr().map_err(listening)?;
-    let token = guard::token()?;
+    let token = guard::chosen_token(std::env::var(guard::TOKEN).ok())?;
     let page = format!("http://{address}/{token}/");
     if !args.listen.is_loopback() {
         args.common.note("other machines that know this address can look at these data:");

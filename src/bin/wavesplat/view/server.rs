@@ -1,26 +1,36 @@
-//! The server of the page: it renders what the page asks for, one request after another.
+//! The server of the page: it renders what the page asks for, one request after another, as long as the page waits.
 
 use super::guard;
 use axum::Router;
-use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Query, Request, State};
+use axum::body::{Body, Bytes, to_bytes};
+use axum::extract::{Query, Request, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::HashMap;
 use std::io;
 use std::net::TcpListener;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use tokio::sync::Semaphore;
+use tower_service::Service;
 use wavesplat::base::error::Result;
-use wavesplat::cli::render::Look;
 use wavesplat::cli::render::live::{Saved, Scenery};
+use wavesplat::cli::render::{Look, Work};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
 /// Most requests that are answered or wait at a time.
 const MOST_REQUESTS: usize = 64;
+/// Most connections at a time. More wait until one ends.
+const MOST_CONNECTIONS: usize = 256;
+/// The time that a client has to send the head of a request, and then its body.
+const PATIENCE: Duration = Duration::from_secs(10);
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// What all requests share.
 pub(super) struct Server {
@@ -30,10 +40,21 @@ pub(super) struct Server {
     token: String,
     /// One request renders at a time, with all threads.
     renders: Arc<Semaphore>,
+    /// What is rendered now, or was last.
+    work: Mutex<Arc<Work>>,
     requests: Semaphore,
 }
 
 type Shared = State<Arc<Server>>;
+
+/// Cancels work when nobody waits for it any more.
+struct Wait(Arc<Work>);
+
+impl Drop for Wait {
+    fn drop(&mut self) {
+        self.0.cancel();
+    }
+}
 
 /// What is wrong with a request, or with rendering it.
 struct Failed(StatusCode, String);
@@ -47,14 +68,14 @@ impl IntoResponse for Failed {
 impl Server {
     pub(super) fn new(scenery: Scenery, facts: String, token: String) -> Self {
         let (renders, requests) = (Arc::new(Semaphore::new(1)), Semaphore::new(MOST_REQUESTS));
-        Self { scenery: Arc::new(scenery), facts, token, renders, requests }
+        Self { scenery: Arc::new(scenery), facts, token, renders, work: Mutex::default(), requests }
     }
 
     /// Answers requests until the program ends.
     pub(super) fn run(self, listener: TcpListener) -> io::Result<()> {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        runtime.block_on(async { axum::serve(tokio::net::TcpListener::from_std(listener)?, self.router()).await })
+        runtime.block_on(async { serve(tokio::net::TcpListener::from_std(listener)?, self.router()).await })
     }
 
     fn router(self) -> Router {
@@ -63,23 +84,27 @@ impl Server {
         let pages = Router::new()
             .route(&at(""), get(page))
             .route(&at("pictures"), post(pictures))
+            .route(&at("progress"), get(progress))
             .route(&at("histogram"), get(histogram))
+            .route(&at("series"), post(series))
             .route(&at("command"), post(command))
             .route(&at("save"), post(save));
         let admitted = middleware::from_fn_with_state(shared.clone(), admit);
-        pages.with_state(shared).layer(DefaultBodyLimit::max(MOST_BYTES)).layer(admitted)
+        pages.with_state(shared).layer(admitted)
     }
 
-    /// Does work that renders, after the work before it. If the asker goes away while it waits, it is not done.
+    /// Does work that renders, after the work before it. If the asker goes away, it ends soon.
     async fn render<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Scenery) -> Result<T> + Send + 'static,
+        work: impl FnOnce(&Scenery, &Work) -> Result<T> + Send + 'static,
     ) -> std::result::Result<T, Failed> {
         let busy = |_| Failed(StatusCode::SERVICE_UNAVAILABLE, "the server ends".into());
         let turn = self.renders.clone().acquire_owned().await.map_err(busy)?;
-        let scenery = self.scenery.clone();
+        let (scenery, wait) = (self.scenery.clone(), Wait(Arc::default()));
+        let own = wait.0.clone();
+        self.work.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&own);
         let done = tokio::task::spawn_blocking(move || {
-            let done = work(&scenery);
+            let done = work(&scenery, &own);
             drop(turn);
             done
         });
@@ -91,17 +116,47 @@ impl Server {
     }
 }
 
+/// Answers connections side by side.
+async fn serve(listener: tokio::net::TcpListener, router: Router) -> io::Result<()> {
+    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    while let Ok(place) = places.clone().acquire_owned().await {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(PAUSE).await; // too many open files: some will close
+            continue;
+        };
+        let router = router.clone();
+        let answer = service_fn(move |request| router.clone().call(request));
+        let mut http = http1::Builder::new();
+        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
+        tokio::spawn(async move {
+            let _ = http.serve_connection(TokioIo::new(stream), answer).await; // the client's fault
+            drop(place);
+        });
+    }
+    Ok(())
+}
+
 /// Lets requests in that come from the server's own page, and not too many.
 async fn admit(State(server): Shared, request: Request, next: Next) -> Response {
     let mut answer = match server.requests.try_acquire() {
         _ if !guard::is_own(request.headers()) => StatusCode::FORBIDDEN.into_response(),
-        Ok(_place) => next.run(request).await,
+        Ok(_place) => match whole(request).await {
+            Some(request) => next.run(request).await,
+            None => StatusCode::BAD_REQUEST.into_response(),
+        },
         Err(_) => StatusCode::SERVICE_UNAVAILABLE.into_response(),
     };
     for (name, value) in guard::HEADERS {
         answer.headers_mut().insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
     answer
+}
+
+/// A request with its whole body, unless that is too long or too slow.
+async fn whole(request: Request) -> Option<Request> {
+    let (head, body) = request.into_parts();
+    let read = tokio::time::timeout(PATIENCE, to_bytes(body, MOST_BYTES)).await;
+    Some(Request::from_parts(head, Body::from(read.ok()?.ok()?)))
 }
 
 async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed> {
@@ -112,8 +167,20 @@ async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed
 
 async fn pictures(State(server): Shared, body: Bytes) -> std::result::Result<Response, Failed> {
     let look = look(&body)?;
-    let pictures = server.render(move |scenery| scenery.pictures(&look)).await?;
+    let pictures = server.render(move |scenery, work| scenery.pictures(&look, work)).await?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], pictures).into_response())
+}
+
+/// How much of the present work is done, 0 to 1.
+async fn progress(State(server): Shared) -> String {
+    server.work.lock().unwrap_or_else(PoisonError::into_inner).share().to_string()
+}
+
+/// The time series of a point, given as three shares of the axes.
+async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Vec<u8>, Failed> {
+    let refused = |e: serde_json::Error| Failed(StatusCode::BAD_REQUEST, format!("not a point: {e}"));
+    let point: [f64; 3] = serde_json::from_slice(&body).map_err(refused)?;
+    server.render(move |scenery, _| scenery.series(point)).await
 }
 
 async fn histogram(State(server): Shared) -> std::result::Result<Response, Failed> {
@@ -135,7 +202,7 @@ async fn save(
     body: Bytes,
 ) -> std::result::Result<Response, Failed> {
     let (look, saved) = (look(&body)?, saved(&query)?);
-    let file = server.render(move |scenery| scenery.save(&look, saved)).await?;
+    let file = server.render(move |scenery, work| scenery.save(&look, saved, work)).await?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], file).into_response())
 }
 

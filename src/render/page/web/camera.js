@@ -13,6 +13,12 @@ function screenAxes([azimuth, elevation]) {
   };
 }
 
+// The direction towards the eye.
+function nearness(view) {
+  const { right: [a, b, c], up: [d, e, f] } = screenAxes(view);
+  return [b * f - c * e, c * d - a * f, a * e - b * d];
+}
+
 // The view after a drag by so many pixels of a picture of this height: half a turn along it.
 function turned([azimuth, elevation], [dx, dy], height) {
   const degrees = 180 / height;

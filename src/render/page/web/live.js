@@ -3,8 +3,12 @@
 const FULL_PIXELS = 1024, MOVING_PIXELS = 288; // sides of pictures at rest, and while something moves
 const BLOCK_FRAMES = 32, BLOCK_NUMBERS = 2 ** 24; // frames of a request, and their numbers
 const REST = 250; // milliseconds without a change after which pictures are complete
+const PATIENCE = 600; // milliseconds after which a request says how far it is
+const SLOW = 30e6; // bytes per second below which answers are packed
 
 class Stale extends Error {}
+
+const pause = milliseconds => new Promise(next => setTimeout(next, milliseconds));
 
 class Live {
   constructor(facts) {
@@ -16,50 +20,67 @@ class Live {
     };
     this.about = this.first;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
-    this.look = { mode: 'mean', slices: [], iso: [], opacity: null, shade: false, annotate: true, light: false, zoom: 1, ...this.home() };
+    this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: true, light: false, ...this.home() };
     this.known = {}; // range and clear values of each mode, from its first answer
     this.kept = new Map(); // pictures of each look, the last one used at the end
     this.turn = Promise.resolve();
-    this.isMoving = false;
+    this.underWay = null; // the request that is asked
+    this.isMoving = this.isSlow = false;
   }
 
   home() { return { view: [30, 30], center: this.facts.center, zoom: 1 }; }
 
   // Pixels of a picture at rest: as many as the window has room for.
   fullSize() {
-    const room = [document.querySelector('main').clientWidth - 150, 0.7 * window.innerHeight].map(side => Math.max(side, 120));
-    const most = Math.min(1, FULL_PIXELS / Math.max(...room) / (window.devicePixelRatio || 1));
-    return room.map(side => Math.round(side * most * (window.devicePixelRatio || 1)));
+    const { clientWidth, clientHeight } = element('frame-of-picture'), room = [clientWidth, clientHeight].map(side => Math.max(side, 120));
+    const density = window.devicePixelRatio || 1, most = Math.min(density, FULL_PIXELS / Math.max(...room));
+    return room.map(side => Math.round(side * most));
   }
 
   // The request for the pictures of some frames.
   request(frames, isFull) {
-    const { mode, zoom, opacity, ...look } = this.look, full = this.fullSize();
+    const { mode, zoom, opacity, range, ...look } = this.look, full = this.fullSize();
     const part = isFull ? 1 : Math.min(1, MOVING_PIXELS / Math.max(...full));
     const size = full.map(side => Math.max(1, Math.round(side * part)));
     const scale = zoom * 0.95 * Math.min(...size) / (2 * this.facts.radius);
     const lod = isFull || mode === 'slice' ? 0 : Math.min(this.facts.coarsest, 1);
-    const { range = null, clear = null } = this.known[this.modeKey()] ?? {};
-    return { mode, ...look, ...(opacity && mode === 'composite' ? { opacity } : {}), size, scale, lod, frames, range, clear };
+    const isOfErrors = mode === 'error', isComposite = mode === 'composite';
+    return {
+      ...look, mode: isOfErrors ? 'mean' : mode, size, scale, lod, frames, certify: isOfErrors && isFull, packed: this.isSlow,
+      ...(isComposite && opacity ? { opacity } : {}), range: isComposite ? range : null, ...this.known[this.modeKey()],
+      ...(isComposite && range ? { range } : {}),
+    };
   }
 
   modeKey() { return `${this.look.mode} ${this.look.map ?? ''}`; }
 
-  key(isFull) { return JSON.stringify(this.request(null, isFull)); }
+  // The same for all requests whose pictures are the same but for the frame.
+  key(isFull) { return JSON.stringify({ ...this.request(null, isFull), mode: this.modeKey(), ...(this.look.range ? {} : { range: null }), clear: null, packed: null }); }
 
   // A picture: complete if nothing moves, else a small one.
-  async picture(_, index) {
+  async picture(_, index, isPlaying) {
     this.index = index;
     const isFull = !this.isMoving, key = this.key(isFull);
     const kept = this.kept.get(this.key(true))?.get(index) ?? this.kept.get(key)?.get(index);
-    const picture = kept ?? await this.load(key, [index, index + 1], isFull, index);
+    const frames = isPlaying && isFull ? this.block(index) : [index, index + 1];
+    const picture = kept ?? await this.load(key, frames, isFull, index);
     if (isFull) this.fillLater(index);
     return picture;
   }
 
-  // Loads pictures in turn. Those that nobody wants any more are not asked for.
+  // The frames that are asked for together, around one.
+  block(index) {
+    const [width, height] = this.fullSize(), numbers = this.kind === 'light' ? 4 : 1;
+    const count = Math.min(Math.max(Math.floor(BLOCK_NUMBERS / (width * height * numbers)), 1), BLOCK_FRAMES);
+    const first = index - index % count;
+    return [first, Math.min(first + count, this.sequences[0].pictures.length)];
+  }
+
+  // Loads pictures in turn, and stops what does not help. Those that nobody wants any more are not asked for.
   async load(key, frames, isFull, index) {
-    const before = this.turn;
+    const { underWay, turn: before } = this;
+    const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
+    if (underWay?.isFull && !isHelp) underWay.stop.abort();
     let done;
     this.turn = new Promise(resolve => { done = resolve; });
     try {
@@ -67,27 +88,43 @@ class Live {
       const kept = this.kept.get(key)?.get(index);
       if (kept) return kept;
       if (key !== this.key(isFull)) throw new Stale();
+      this.underWay = { key, frames, isFull, stop: new AbortController() };
       return (await this.ask(key, frames, isFull)).get(index);
-    } finally { done(); }
+    } finally {
+      this.underWay = null;
+      done();
+    }
   }
 
   async ask(key, frames, isFull) {
-    const answer = await fetch('pictures', { method: 'POST', body: JSON.stringify(this.request(frames, isFull)) });
-    if (!answer.ok) throw new Error(await answer.text());
-    const bytes = new Uint8Array(await answer.arrayBuffer());
+    const answer = await this.post('pictures', this.request(frames, isFull), this.underWay.stop.signal);
+    const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer());
+    if (bytes.length > 2 ** 20 && bytes.length / (performance.now() - started) * 1000 < SLOW) this.isSlow = true;
     const length = new DataView(bytes.buffer).getUint32(0, true);
-    const { about, blocks } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+    const { about, blocks, errors } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+    this.kind = about.kind;
     for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
-    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title: this.facts.title, labels: this.facts.labels, key: this.modeKey() });
+    const { title, labels } = this.facts;
+    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, key: this.modeKey(), hasBar: this.look.mode === 'composite' });
+    this.known[this.modeKey()] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null };
     const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));
       pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop }));
     }
-    this.known[this.modeKey()] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null };
-    if (key !== this.key(isFull)) this.kept.set(this.key(isFull), kept); // its range is known now
+    if (errors) this.showErrors(kept, frames[0], (await readBlock(bytes.subarray(at, at + errors))).pictures);
     return kept;
+  }
+
+  // Puts the errors of pixels in front of their values.
+  showErrors(kept, first, pictures) {
+    this.largestError ??= pictures[0][0].reduce((most, error) => error > most ? error : most, 0) || 1;
+    pictures.forEach((planes, n) => {
+      const { planes: [beneath], about, ...rest } = kept.get(first + n);
+      const values = `largest error of ${about.values || 'values'}`;
+      kept.set(first + n, { ...rest, planes, beneath, about: { ...about, values, range: [0, this.largestError], clear: null, log: false } });
+    });
   }
 
   // The pictures of a look, within the memory of the page.
@@ -109,19 +146,15 @@ class Live {
   // Asks for the frames around a picture, and for those behind them, as soon as nothing else is wanted.
   fillLater(index) {
     clearTimeout(this.filling);
-    this.filling = setTimeout(() => this.fill(index).catch(error => { if (!(error instanceof Stale)) problem(error); }), REST);
+    this.filling = setTimeout(() => this.fill(index).catch(problem), REST);
   }
 
   async fill(index) {
-    const key = this.key(true), [width, height] = this.fullSize(), numbers = this.about.kind === 'light' ? 4 : 1;
-    const count = Math.min(Math.max(Math.floor(BLOCK_NUMBERS / (width * height * numbers)), 1), BLOCK_FRAMES);
-    const last = this.sequences[0].pictures.length, first = index - index % count;
-    for (const start of [first, first + count].filter(start => start < last)) {
-      const end = Math.min(start + count, last), missing = () => {
-        for (let frame = start; frame < end; frame++) if (!this.kept.get(key)?.has(frame)) return frame;
-        return null;
-      };
-      if (missing() !== null) await this.load(key, [start, end], true, missing());
+    const key = this.key(true), around = this.block(index), last = this.sequences[0].pictures.length;
+    for (const frames of [around, ...(around[1] < last ? [this.block(around[1])] : [])]) {
+      let missing = frames[0];
+      while (missing < frames[1] && this.kept.get(key)?.has(missing)) missing++;
+      if (missing < frames[1]) await this.load(key, frames, true, missing);
     }
     document.documentElement.dataset.filled = index;
   }
@@ -129,6 +162,7 @@ class Live {
   // Changes what is seen. While something moves, pictures are small.
   change(changes, isMoving) {
     Object.assign(this.look, changes);
+    delete document.documentElement.dataset.filled;
     clearTimeout(this.filling);
     this.isMoving = isMoving;
     clearTimeout(this.resting);
@@ -136,12 +170,37 @@ class Live {
     this.changed();
   }
 
-  async command(file) { return this.post('command', file); }
+  // Asks the server. While it does not answer, asks again; while it works, says how far it is.
+  async post(where, request, signal) {
+    const working = setInterval(async () => {
+      const share = await fetch('progress').then(answer => answer.text()).catch(() => '');
+      if (share) element('status').textContent = `rendering, ${Math.round(100 * share)} %`;
+    }, PATIENCE);
+    try {
+      const answer = await this.patiently(where, { method: 'POST', body: JSON.stringify(request), signal });
+      if (!answer.ok) throw new Error(await answer.text() || answer.statusText);
+      return answer;
+    } finally {
+      clearInterval(working);
+      setTimeout(() => { element('status').textContent = ''; });
+    }
+  }
 
-  async post(where, file) {
+  async patiently(where, options) {
+    for (;;) {
+      try {
+        return await fetch(where, options);
+      } catch (error) {
+        if (options.signal?.aborted || !(error instanceof TypeError)) throw error;
+        element('status').textContent = 'wavesplat view does not answer. If it has ended, start it again.';
+        await pause(1000);
+      }
+    }
+  }
+
+  // Asks for a file of what is seen, or for its command.
+  async made(where, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
-    const answer = await fetch(`${where}?${new URLSearchParams({ file })}`, { method: 'POST', body: JSON.stringify({ ...this.request(frames, true), ...this.colours() }) });
-    if (!answer.ok) throw new Error(await answer.text());
-    return answer;
+    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true), ...this.colours(), certify: false });
   }
 }

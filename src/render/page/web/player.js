@@ -4,7 +4,12 @@
 // `picture(sequence, index)`, which promises the planes of a picture, its own description, and the RGBA bytes behind it.
 
 const element = id => document.getElementById(id);
-const shortNumber = number => String(Number(number.toPrecision(4)));
+
+// A number with four digits; with a power of ten if it is very large or small.
+function shortNumber(number) {
+  const size = Math.abs(number), isPlain = size === 0 || (size >= 1e-3 && size < 1e5);
+  return isPlain ? String(Number(number.toPrecision(4))) : Number(number.toPrecision(4)).toExponential().replace('e+', 'e');
+}
 
 class Player {
   constructor(source) {
@@ -42,12 +47,13 @@ class Player {
 
   beginColours() {
     const { about } = this, isOfValues = about.kind === 'value', chosen = element('map').value;
-    element('bar').style.visibility = isOfValues ? 'visible' : 'hidden';
-    element('colours').hidden = element('reset').hidden = !isOfValues;
+    element('bar').style.visibility = isOfValues || about.hasBar ? 'visible' : 'hidden';
+    element('colours').hidden = !isOfValues && !about.hasBar;
+    element('log-control').hidden = element('gamma-control').hidden = !isOfValues;
     element('map').replaceChildren(...Object.keys(about.maps).map(name => new Option(name)));
     element('bar-name').textContent = about.values;
     this.resetColours();
-    if (chosen in about.maps && about.key) element('map').value = chosen;
+    if (chosen in about.maps && about.key && isOfValues) element('map').value = chosen;
     this.recolour();
   }
 
@@ -75,10 +81,10 @@ class Player {
     on('sequence', 'change', () => this.choose(Number(element('sequence').value)));
     for (const id of ['map', 'log', 'gamma']) on(id, 'input', () => this.recolour());
     for (const id of ['low', 'high']) on(id, 'change', () => this.chooseRange());
-    on('reset', 'click', () => this.resetColours());
+    on('reset', 'click', () => { this.resetColours(); this.source.reset?.(); });
     on('save', 'click', () => this.save());
     on('picture', 'pointermove', event => this.read(event));
-    on('picture', 'pointerleave', () => { element('readout').textContent = ''; });
+    on('picture', 'pointerleave', () => { this.pointer = null; element('readout').textContent = ''; });
     on('picture', 'click', event => this.plot(event));
     document.addEventListener('keydown', event => this.key(event));
   }
@@ -111,6 +117,7 @@ class Player {
     if (range.every(Number.isFinite) && range[0] < range[1]) this.range = range;
     [element('low').value, element('high').value] = this.range.map(shortNumber);
     this.recolour();
+    this.source.ranged?.(this.range);
   }
 
   // Makes the colours anew, and draws with them.
@@ -150,12 +157,13 @@ class Player {
     element('frame').value = index;
     const asked = [this.sequence, index], { frame } = this.pictures[index];
     element('label').textContent = this.about.labels[frame] ?? `frame ${frame}`;
-    const shown = await this.source.picture(...asked).catch(problem);
+    const shown = await this.source.picture(...asked, this.isPlaying).catch(problem);
     if (!shown || asked[0] !== this.sequence || asked[1] !== this.index) return;
     if (shown.about !== this.about) this.adopt(shown.about);
     this.shown = shown;
     this.draw();
     if (this.pointer) this.read(this.pointer);
+    if (this.series) this.drawSeries(this.series.values, this.series.name);
   }
 
   draw() {
@@ -197,23 +205,40 @@ class Player {
     this.pointer = event;
     const at = this.pixel(event), { about } = this;
     if (!at || !this.shown) return;
-    const value = this.shown.planes[0][at.i];
+    const { planes: [values], beneath } = this.shown, value = values[at.i];
     const text = Number.isNaN(value) ? 'no value' : `${shortNumber(value)}${about.values ? `  ${about.values}` : ''}`;
-    const place = `pixel ${at.x}, ${at.y}`;
-    element('readout').textContent = about.kind === 'value' ? `${text}   at ${place}` : place;
+    const of = beneath ? `, value ${shortNumber(beneath[at.i])},` : '';
+    const place = this.source.place?.(event) ?? `pixel ${at.x}, ${at.y}`, time = element('label').textContent;
+    element('readout').textContent = `${about.kind === 'value' ? `${text}${of} at ` : ''}${place}, ${time}`;
   }
 
   // Plots the values of a pixel over time.
   async plot(event) {
     const at = this.pixel(event), { about } = this;
-    if (!at || about.kind !== 'value' || this.pictures.length < 2) return;
+    if (!at || this.source.wasDragged?.() || about.kind !== 'value' || this.pictures.length < 2) return;
+    if (await this.source.plot?.(event)) return;
     const sequence = this.sequence, values = [];
     this.plotted = at.i;
     for (let n = 0; n < this.pictures.length; n++) {
       values.push((await this.source.picture(sequence, n)).planes[0][at.i]);
       if (this.plotted !== at.i || sequence !== this.sequence) return;
     }
-    drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
+    this.drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
+  }
+
+  // A line through values; it breaks where there is none. Another marks the time.
+  drawSeries(values, name) {
+    this.series = { values, name };
+    const known = values.filter(Number.isFinite), last = Math.max(values.length - 1, 1);
+    const low = Math.min(...known), high = Math.max(...known), height = high > low ? 180 / (high - low) : 0;
+    const point = (value, n) => `${600 * n / last},${190 - (value - low) * height}`;
+    const runs = [[]];
+    values.forEach((value, n) => Number.isFinite(value) ? runs.at(-1).push(point(value, n)) : runs.push([]));
+    const lines = runs.filter(run => run.length > 1).map(run => shape('polyline', { points: run.join(' ') }));
+    const x = 600 * this.index / last;
+    element('series-plot').replaceChildren(...lines, shape('line', { x1: x, x2: x, y1: 0, y2: 200 }));
+    element('series-name').textContent = known.length ? `${name}: ${shortNumber(low)} to ${shortNumber(high)}` : `${name}: no value`;
+    element('series').hidden = false;
   }
 
   save() {
@@ -249,19 +274,9 @@ function ticks(scale) {
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, n) => (first + n) * step);
 }
 
-// A line through values; it breaks where there is none.
-function drawSeries(values, name) {
-  const known = values.filter(Number.isFinite);
-  const low = Math.min(...known), high = Math.max(...known), height = high > low ? 180 / (high - low) : 0;
-  const point = (value, n) => `${600 * n / (values.length - 1)},${190 - (value - low) * height}`;
-  const runs = [[]];
-  values.forEach((value, n) => Number.isFinite(value) ? runs.at(-1).push(point(value, n)) : runs.push([]));
-  const line = points => {
-    const polyline = document.createElementNS('http://www.w3.org/2000/svg', 'polyline');
-    polyline.setAttribute('points', points.join(' '));
-    return polyline;
-  };
-  element('series-plot').replaceChildren(...runs.filter(run => run.length > 1).map(line));
-  element('series-name').textContent = known.length ? `${name}: ${shortNumber(low)} to ${shortNumber(high)}` : `${name}: no value`;
-  element('series').hidden = false;
+// An SVG element.
+function shape(name, attributes) {
+  const made = document.createElementNS('http://www.w3.org/2000/svg', name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  return made;
 }

@@ -5,8 +5,15 @@ class Steering {
     this.player = player;
     this.live = player.source;
     document.documentElement.classList.add('live');
-    this.live.changed = () => { player.isRead = false; player.show(); };
-    this.live.colours = () => this.colours();
+    Object.assign(this.live, {
+      changed: () => player.show(),
+      colours: () => this.colours(),
+      ranged: range => { if (this.live.look.mode === 'composite') this.live.change({ range }, false); },
+      reset: () => { if (this.live.look.mode === 'composite') this.live.change({ range: null }, false); },
+      wasDragged: () => this.dragged > 4,
+      place: event => this.place(event),
+      plot: event => this.plot(event),
+    });
     this.pointers = new Map();
     this.listenToPicture();
     this.listenToControls();
@@ -17,7 +24,6 @@ class Steering {
     on('pointerdown', event => { this.pointers.set(event.pointerId, event); picture.setPointerCapture(event.pointerId); this.dragged = 0; });
     on('pointermove', event => this.drag(event));
     for (const end of ['pointerup', 'pointercancel']) on(end, event => this.pointers.delete(event.pointerId));
-    on('click', event => { if (this.dragged > 4) event.stopImmediatePropagation(); });
     on('wheel', event => { event.preventDefault(); this.zoom(1.0015 ** -event.deltaY, event); });
     on('dblclick', () => this.live.change(this.live.home(), false));
     on('contextmenu', event => event.preventDefault());
@@ -29,6 +35,39 @@ class Steering {
   unit() {
     const box = element('picture').getBoundingClientRect();
     return 2 * this.live.facts.radius / (this.live.look.zoom * 0.95 * Math.min(box.width, box.height));
+  }
+
+  // The world point under the pointer, on the slice that is nearest to the eye; null where none is.
+  point({ clientX, clientY }) {
+    const { mode, slices, center, view } = this.live.look, { origin, spacing, dims } = this.live.facts;
+    if (mode !== 'slice') return null;
+    const box = element('picture').getBoundingClientRect(), unit = this.unit(), near = nearness(view);
+    const away = [clientX - box.left - box.width / 2, box.top + box.height / 2 - clientY].map(pixels => pixels * unit);
+    const middle = beside(center, view, away), ends = axis => [origin[axis], origin[axis] + spacing[axis] * (dims[axis] - 1)];
+    const isWithin = (at, axis) => ends(axis)[0] - spacing[axis] / 2 <= at && at <= ends(axis)[1] + spacing[axis] / 2;
+    const met = slices.map(([name, share]) => {
+      const axis = 'xyz'.indexOf(name), [low, high] = ends(axis), depth = (low + share * (high - low) - middle[axis]) / near[axis];
+      return { depth, at: middle.map((place, other) => place + depth * near[other]) };
+    });
+    const inside = met.filter(({ depth, at }) => Number.isFinite(depth) && at.every(isWithin));
+    return inside.sort((a, b) => b.depth - a.depth)[0]?.at ?? null;
+  }
+
+  place(event) {
+    const point = this.point(event);
+    return point && [...'xyz'].map((axis, n) => `${axis} ${shortNumber(point[n])}`).join(', ');
+  }
+
+  // Plots the series of a point of a slice, from the file.
+  async plot(event) {
+    const point = this.point(event), { origin, spacing, dims } = this.live.facts;
+    if (!point) return false;
+    const share = point.map((at, axis) => dims[axis] > 1 ? Math.min(Math.max((at - origin[axis]) / (spacing[axis] * (dims[axis] - 1)), 0), 1) : 0);
+    const answer = await fetch('series', { method: 'POST', body: JSON.stringify(share) });
+    if (!answer.ok) return false; // frames have no series of their own: the pixel's is plotted
+    const lines = (await answer.text()).trim().split('\n').slice(1);
+    this.player.drawSeries(lines.map(line => Number(line.split(',').at(-1) || NaN)), `${this.live.facts.values || 'Values'} at ${this.place(event)}`);
+    return true;
   }
 
   drag(event) {
@@ -102,28 +141,28 @@ class Steering {
     if (mode === 'composite') this.opacity.open();
     const changes = { mode, iso: mode === 'iso' ? [iso] : [], slices: mode === 'slice' ? slices : [], shade: element('shade').checked };
     if (mode === 'slice' && !slices.length) return;
-    const map = mode === 'composite' ? element('map').value : undefined;
-    this.live.change({ ...changes, map, annotate: element('around').checked, light: element('white').checked }, isMoving);
+    const isComposite = mode === 'composite', map = isComposite ? element('map').value : undefined;
+    const range = isComposite ? this.live.look.range : null;
+    this.live.change({ ...changes, map, range, annotate: element('around').checked, light: element('white').checked }, isMoving);
   }
 
   // The colours of the page, for a picture made elsewhere.
   colours() {
     const { about, range, scale } = this.player;
-    return about.kind === 'value' ? { range, log: scale.log, map: element('map').value } : {};
+    return about.kind === 'value' && !this.player.shown?.beneath ? { range, log: scale.log, map: element('map').value } : {};
   }
 
   async copy() {
     try {
-      const text = await (await this.live.post('command', 'picture.png')).text();
+      const text = await (await this.live.made('command', 'picture.png')).text();
       await navigator.clipboard.writeText(text);
       element('readout').textContent = `Copied: ${text}`;
     } catch (error) { problem(error); }
   }
 
   async save(file) {
-    element('readout').textContent = `Making ${file}...`;
     try {
-      download(await (await this.live.post('save', file)).blob(), file);
+      download(await (await this.live.made('save', file)).blob(), file);
       element('readout').textContent = `Saved ${file}`;
     } catch (error) { problem(error); }
   }
@@ -172,19 +211,14 @@ class OpacityEditor {
   }
 
   draw() {
-    const make = (name, attributes) => {
-      const shape = document.createElementNS('http://www.w3.org/2000/svg', name);
-      for (const key in attributes) shape.setAttribute(key, attributes[key]);
-      return shape;
-    };
     const most = Math.log1p(Math.max(...this.counts, 1)), width = 600 / Math.max(this.counts.length, 1);
     const bars = this.counts.map((count, n) => {
       const height = 100 * Math.log1p(count) / most;
-      return make('rect', { x: n * width, y: 105 - height, width, height });
+      return shape('rect', { x: n * width, y: 105 - height, width, height });
     });
     const place = ([share, opacity]) => [600 * share, 105 - 100 * opacity];
-    const line = make('polyline', { points: this.points.map(place).join(' ') });
-    const dots = this.points.map((point, n) => make('circle', { cx: place(point)[0], cy: place(point)[1], r: 7, 'data-n': n }));
+    const line = shape('polyline', { points: this.points.map(place).join(' ') });
+    const dots = this.points.map((point, n) => shape('circle', { cx: place(point)[0], cy: place(point)[1], r: 7, 'data-n': n }));
     element('opacity').replaceChildren(...bars, line, ...dots);
   }
 }

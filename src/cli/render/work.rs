@@ -1,0 +1,60 @@
+//! Work that a page waits for: how far it is, and whether the page still wants it.
+
+use crate::base::progress::Progress;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// The work for a request.
+#[derive(Debug, Default)]
+pub struct Work {
+    steps: AtomicU64,
+    done: AtomicU64,
+    is_cancelled: AtomicBool,
+}
+
+impl Work {
+    /// Ends the work soon, with an error.
+    pub fn cancel(&self) {
+        self.is_cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// How much of the work is done, 0 to 1, as far as that is known.
+    pub fn share(&self) -> f64 {
+        let [done, steps] = [&self.done, &self.steps].map(|count| count.load(Ordering::Relaxed) as f64);
+        if steps > 0.0 { (done / steps).min(1.0) } else { 0.0 }
+    }
+}
+
+impl Progress for Work {
+    fn start(&self, steps: Option<u64>) {
+        self.done.store(0, Ordering::Relaxed);
+        self.steps.store(steps.unwrap_or(0), Ordering::Relaxed);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.done.fetch_add(steps, Ordering::Relaxed);
+    }
+
+    fn finish(&self) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.is_cancelled.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_says_how_far_it_is_and_ends_when_it_is_cancelled() {
+        let work = Work::default();
+        assert_eq!(work.share(), 0.0);
+        work.start(Some(4));
+        work.advance(1);
+        assert!(work.share() == 0.25 && work.check().is_ok());
+        work.start(None);
+        work.advance(3);
+        work.cancel();
+        assert!(work.share() == 0.0 && work.check().is_err());
+    }
+}
