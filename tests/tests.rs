@@ -37,5 +37,7 @@ mod scenes;
 mod specification;
 mod torn;
 mod truncation;
+#[cfg(feature = "view")]
+mod viewer;
 mod views;
 mod wavelets;

@@ -33,7 +33,7 @@ mod pipes;
 mod probe;
 mod progress;
 mod recover;
-mod render;
+pub(crate) mod render;
 mod resume;
 mod several;
 mod slices;
@@ -65,7 +65,7 @@ impl Work {
         Self(tempfile::tempdir().unwrap())
     }
 
-    fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+    pub(crate) fn path(&self, name: impl AsRef<Path>) -> PathBuf {
         self.0.path().join(name)
     }
 
@@ -98,7 +98,7 @@ impl Work {
     }
 
     /// Runs `wavesplat-render`.
-    fn render(&self, args: &str) -> Run {
+    pub(crate) fn render(&self, args: &str) -> Run {
         self.run(RENDER, args, b"")
     }
 
@@ -117,7 +117,7 @@ impl Work {
     }
 
     /// A shell that finds the programs as `$WAVESPLAT` and `$RENDER`.
-    fn shell(&self, line: &str) -> Run {
+    pub(crate) fn shell(&self, line: &str) -> Run {
         Run::of(line, self.command("sh").args(["-c", line]).output().unwrap())
     }
 
@@ -213,7 +213,12 @@ impl Run {
         if self.out.is_empty() { self.fails(code, words) } else { self.finds(code, words) }
     }
 
-    fn text(&self) -> &str {
+    /// What it printed on standard error.
+    pub(crate) fn message(&self) -> &str {
+        &self.err
+    }
+
+    pub(crate) fn text(&self) -> &str {
         std::str::from_utf8(&self.out).unwrap()
     }
 
@@ -231,7 +236,7 @@ impl Run {
 
 /// An archive of f32 samples, x fastest, then y, z, frames.
 #[derive(Debug, Clone)]
-struct Archive {
+pub(crate) struct Archive {
     dims: [usize; 3],
     frames: usize,
     values: Vec<f32>,
@@ -244,7 +249,7 @@ fn small() -> Archive {
 
 impl Archive {
     /// Waves that travel and grow.
-    fn smooth(dims: [usize; 3], frames: usize) -> Self {
+    pub(crate) fn smooth(dims: [usize; 3], frames: usize) -> Self {
         Self::of(dims, frames, |x, y, z, t| {
             let [x, y, z, t] = [x, y, z, t].map(|n| n as f32);
             (0.31 * x + 0.11 * t).sin() * (0.23 * y - 0.07 * t).cos() + 0.04 * z + 0.01 * t
@@ -273,7 +278,7 @@ impl Archive {
         self.bytes()[frame * 4 * self.frame_len()..][..4 * self.frame_len()].into()
     }
 
-    fn npy(&self) -> Vec<u8> {
+    pub(crate) fn npy(&self) -> Vec<u8> {
         let [x, y, z] = self.dims;
         npy("<f4", &format!("{}, {z}, {y}, {x}", self.frames), &self.bytes())
     }

@@ -21,7 +21,7 @@ fn a_pattern_numbers_png_files() {
     assert_eq!(decode_png(&work.read("white.png"))[..3], [255; 3]);
 }
 
-pub(super) fn decode_png(bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn decode_png(bytes: &[u8]) -> Vec<u8> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();

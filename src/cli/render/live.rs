@@ -237,7 +237,7 @@ impl Saved {
 const BARS: usize = 64;
 
 /// Options that a command need not repeat.
-const IMPLIED: [&str; 2] = ["--method=", "--memory="];
+const IMPLIED: [&str; 2] = ["--method=coefficients", "--memory="];
 
 /// The format of the pictures of a page. No file of this name is written.
 const PAGE: &str = "live.html";
