@@ -11,7 +11,8 @@ use std::process::Command;
 use std::thread;
 
 /// How commands begin that this test leaves out, and why.
-const NOT_RUN: [(&str, &str); 2] = [
+const NOT_RUN: [(&str, &str); 3] = [
+    ("wavesplat view ", "it runs until it is interrupted; tests/viewer runs it"),
     ("cargo ", "a build takes minutes; tools/tests run the tools"),
     ("python3 tools/peers/peers.py ", "needs the packages of tools/peers/requirements.txt"),
 ];

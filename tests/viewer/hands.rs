@@ -116,7 +116,8 @@ fn clicks_plot_series_and_slices_know_their_places() {
     );
     let share: Vec<f64> = serde_json::from_value(plotted[1][0].clone()).unwrap();
     let [x, y, z] = share.try_into().unwrap();
-    let csv = work.render(&format!("a.wspl --probe={x},{y},{z} -o -")).ok().text().to_string();
+    let [a, b, c] = [x, y, z].map(|share| 100.0 * share);
+    let csv = work.render(&format!("a.wspl --probe={a}%,{b}%,{c}% -o -")).ok().text().to_string();
     let expected: Vec<f64> =
         csv.lines().skip(1).map(|line| line.rsplit(',').next().unwrap().parse().unwrap()).collect();
     assert_eq!(plotted[0], json!(expected));

@@ -21,7 +21,7 @@ fn pages_show_the_pictures_of_the_program() {
     .enumerate()
     {
         work.render(&format!("a.wspl {options} --size 150x110 -o page_{n}.html")).ok();
-        browser.open_file(&work.path(&format!("page_{n}.html")));
+        browser.open_file(&work.path(format!("page_{n}.html")));
         let views = browser.js("player.source.sequences.length").as_u64().unwrap();
         let (view, frame) = (views - 1, 6);
         browser.js(&format!("player.choose({view}); player.show({frame})"));

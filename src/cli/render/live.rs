@@ -8,6 +8,7 @@ use super::ranges;
 use super::scene::Opened;
 use super::work::Work;
 use crate::base::error::{Error, Result};
+use crate::render::annotate::AxisLabels;
 use crate::render::page::{self, Planes};
 use crate::render::sink::{Film, Place};
 use crate::render::{Pixel, render};
@@ -43,6 +44,8 @@ struct Facts {
     dims: [usize; 3],
     origin: [f64; 3],
     spacing: [f64; 3],
+    /// The meaning of x, y and z.
+    axes: [AxisLabels; 3],
     /// The least and the largest sample, if the file says.
     range: Option<(f64, f64)>,
     /// The coarsest level of detail.
@@ -86,7 +89,7 @@ impl Scenery {
 
     fn known(&self) -> Result<Facts> {
         let cli = self.program(&[], Path::new(PAGE))?;
-        let Opened { scene, file, annotation, .. } = cli.scene()?;
+        let Opened { scene, file, annotation, axes, .. } = cli.scene()?;
         let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
@@ -101,6 +104,7 @@ impl Scenery {
             dims: grid.dims,
             origin: grid.origin,
             spacing: grid.spacing,
+            axes: axes.labels(),
             range: file.as_ref().map(|file| file.source_range()),
             coarsest: file.as_ref().map_or(0, |file| file.coarsest_detail()),
             maps: page::maps()?,
@@ -155,13 +159,14 @@ impl Scenery {
     ///
     /// # Errors
     /// Inputs that are no coefficient file, or reads that fail.
-    pub fn series(&self, [x, y, z]: [f64; 3]) -> Result<Vec<u8>> {
+    pub fn series(&self, shares: [f64; 3]) -> Result<Vec<u8>> {
         let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
         let path = folder.path().join("series.csv");
         let pictures = |word: &OsString| word.to_string_lossy().starts_with("--method=");
         let options = self.options.iter().filter(|word| !pictures(word)).cloned().collect();
         let probe = Self { options, ..self.clone() };
-        probe.program(&[format!("--probe={x},{y},{z}")], &path)?.probe()?;
+        let [x, y, z] = shares.map(|share| 100.0 * share);
+        probe.program(&[format!("--probe={x}%,{y}%,{z}%")], &path)?.probe()?;
         std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
     }
 

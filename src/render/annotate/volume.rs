@@ -8,7 +8,7 @@ use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
 
 /// What an axis means.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct AxisLabels {
     /// Its name.
     pub name: String,

@@ -70,6 +70,7 @@ class Live {
 
   // The frames that are asked for together, around one.
   block(index) {
+    if (this.look.mode === 'error') return [index, index + 1]; // errors take long
     const [width, height] = this.fullSize(), numbers = this.kind === 'light' ? 4 : 1;
     const count = Math.min(Math.max(Math.floor(BLOCK_NUMBERS / (width * height * numbers)), 1), BLOCK_FRAMES);
     const first = index - index % count;

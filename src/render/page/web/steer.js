@@ -54,8 +54,12 @@ class Steering {
   }
 
   place(event) {
-    const point = this.point(event);
-    return point && [...'xyz'].map((axis, n) => `${axis} ${shortNumber(point[n])}`).join(', ');
+    const point = this.point(event), { origin, spacing, axes } = this.live.facts;
+    return point && axes.map(({ name, unit, at }, n) => {
+      const voxel = Math.min(Math.max((point[n] - origin[n]) / spacing[n], 0), at.length - 1), below = Math.floor(voxel);
+      const value = at[below] + (voxel - below) * ((at[below + 1] ?? at[below]) - at[below]);
+      return `${name} ${shortNumber(value)}${unit && ` ${unit}`}`;
+    }).join(', ');
   }
 
   // Plots the series of a point of a slice, from the file.
