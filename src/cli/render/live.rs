@@ -1,4 +1,4 @@
-//! Pictures for a page that asks for them: [`facts`] about a scene, a [`page`] with them, and [`pictures`] by request.
+//! Pictures for a page that asks for them: facts about a scene, a page with them, and pictures by request.
 
 use super::Prepared;
 use super::args::Cli;
