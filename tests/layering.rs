@@ -66,12 +66,12 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
     ("hdf5_reader::", &["source/formats/arrays/"]),
     ("netcdf_reader::", &["source/formats/arrays/"]),
     ("zarrs::", &["source/formats/arrays/"]),
-    ("axum::", &["bin/wavesplat/view/"]),
-    ("hyper::", &["bin/wavesplat/view/server.rs"]),
-    ("hyper_util::", &["bin/wavesplat/view/server.rs"]),
-    ("tokio::", &["bin/wavesplat/view/server.rs"]),
-    ("tower_service::", &["bin/wavesplat/view/server.rs"]),
-    ("getrandom::", &["bin/wavesplat/view/guard.rs"]),
+    ("axum::", &["cli/view/"]),
+    ("hyper::", &["cli/view/server.rs"]),
+    ("hyper_util::", &["cli/view/server.rs"]),
+    ("tokio::", &["cli/view/server.rs"]),
+    ("tower_service::", &["cli/view/server.rs"]),
+    ("getrandom::", &["cli/view/guard.rs"]),
     ("base64::", &["source/formats/", "extract/", "render/page/", "render/sink/film.rs"]),
     ("half::f16", &["base/half.rs"]), // its tests
 ];

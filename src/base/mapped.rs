@@ -43,11 +43,17 @@ pub(crate) struct State {
     modified: Option<SystemTime>,
     device: u64,
     inode: u64,
+    /// Whether it is that of a file, and not of data that the caller holds.
+    is_file: bool,
 }
 
 impl State {
+    /// The state of data that the caller holds: there is no file that could change.
+    pub(crate) const HELD: Self = Self { len: 0, modified: None, device: 0, inode: 0, is_file: false };
+
     fn of(meta: &Metadata) -> Self {
-        Self { len: meta.len(), modified: meta.modified().ok(), device: meta.dev(), inode: meta.ino() }
+        let (len, modified, device, inode) = (meta.len(), meta.modified().ok(), meta.dev(), meta.ino());
+        Self { len, modified, device, inode, is_file: true }
     }
 
     /// An error if a file that was in this state is `now` in another.
@@ -63,6 +69,9 @@ impl State {
 
     /// An error if the file of this name is not in this state.
     pub(crate) fn check_path(&self, path: &Path) -> Result<()> {
+        if !self.is_file {
+            return Ok(());
+        }
         let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
         self.check(path, &Self::of(&now))
     }

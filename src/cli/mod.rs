@@ -1,7 +1,7 @@
 //! The parts that the programs share: common options, values of options, progress and exit codes.
 //!
 //! Data or one JSON object goes to standard output; notes and progress go to standard error. `config` reads options
-//! from a file. `render` is all of `wavesplat-render`; `wavesplat view` uses it, too. `program` runs a program, and ends it with an exit code.
+//! from a file. `render` is all of `wavesplat-render`, and `view` the server of `wavesplat view`, which uses it. `program` runs a program, and ends it with an exit code.
 //!
 //! With the feature `args` alone, other programs can use `input` and `values`: options that name and open frames.
 
@@ -29,6 +29,8 @@ pub mod render;
 mod terminal;
 mod times;
 mod values;
+#[cfg(feature = "view")]
+pub mod view;
 
 #[cfg(feature = "cli")]
 pub use colours::{open_colours, stretched, transfer_function};

@@ -7,6 +7,7 @@
 mod distribution;
 mod file;
 mod lab;
+mod list;
 mod named;
 mod paraview;
 mod scale;
@@ -51,13 +52,17 @@ enum Colours {
 }
 
 impl TransferFunction {
-    /// Opens a map by its name, or a file: ParaView's JSON (`FILE.json#MAP` if it holds several maps) or CSV.
+    /// Opens a map by its name; or makes one of a list of colours, `#0000ff,#ffffff`; or opens a file: ParaView's JSON
+    /// (`FILE.json#MAP` if it holds several maps) or CSV.
     ///
     /// # Errors
-    /// An unknown name, or a file that cannot be read or is not a colour map.
+    /// An unknown name, a wrong list, or a file that cannot be read or is not a colour map.
     pub fn open(name: &str) -> Result<Self> {
         if let Some(named) = named::known(name) {
             return Ok(Self::named(named));
+        }
+        if list::is_list(name) {
+            return list::parse(name).map_err(|what| Error::setting("colours", what));
         }
         let path = Path::new(file::split(name).0);
         if path.extension().is_none() && !path.exists() {

@@ -31,6 +31,7 @@ pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;
+pub use formats::arrays::held::{ArrayType, NamedArray, NamedArrays};
 #[doc(hidden)]
 pub use formats::{ArrayHeader, array_header, extensions};
 #[doc(hidden)]
@@ -50,6 +51,7 @@ use crate::base::time_labels::TimeLabels;
 use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A result for one file. The error is a text that follows the file's name.
 type Parsed<T> = std::result::Result<T, String>;
@@ -190,6 +192,21 @@ pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variab
 /// As [`open`]; messages call the stream `-`.
 pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     Ok(Box::new(stream::Stream::open(reader, options)?))
+}
+
+/// Opens named arrays that the caller holds or computes; `name` stands for them in messages. The variable is chosen, and
+/// the meaning of its axes found, as for a NetCDF file. So converting it gives the bytes that the file would give.
+///
+/// # Errors
+/// No variable with three axes, or several; options for headerless data.
+pub fn open_arrays(
+    name: impl AsRef<Path>,
+    arrays: &Arc<dyn NamedArrays>,
+    options: &OpenOptions,
+) -> Result<Box<dyn FrameSource>> {
+    let name = name.as_ref();
+    let header = formats::arrays::held::describe(name, arrays, options)?;
+    Ok(Box::new(series::Series::single(header, name, options)?))
 }
 
 /// What an archive holds, known before any frame is read.

@@ -72,6 +72,18 @@ impl Series {
         series.finish(files, timed_otherwise, options)
     }
 
+    /// The frames that one header describes. Messages call where they are from `name`.
+    pub(super) fn single(mut header: FileHeader, name: &Path, options: &OpenOptions) -> Result<Self> {
+        if header.parts.len() > 1 {
+            header.stack_frames();
+        }
+        let mut grid = header.grid();
+        override_grid(&mut grid, options);
+        (header.spacing, header.origin) = (grid.spacing, grid.origin);
+        let files = FrameFiles { paths: vec![name.into()], times: Vec::new(), notes: Vec::new() };
+        Self::of(&mut header, options).finish(&files, None, options)
+    }
+
     fn of(first: &mut FileHeader, options: &OpenOptions) -> Self {
         let archive = Archive {
             variable: first.variable.clone(),

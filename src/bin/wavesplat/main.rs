@@ -8,11 +8,11 @@ mod info;
 mod recover;
 mod several;
 mod verify;
-#[cfg(feature = "view")]
-mod view;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+#[cfg(feature = "view")]
+use wavesplat::cli::view;
 use wavesplat::cli::{self, GenerateArgs};
 
 /// Compresses time-varying volumes along time under a guaranteed error bound.

@@ -1,18 +1,16 @@
 //! Pictures for a page that asks for them: facts about a scene, a page with them, and pictures by request.
 
-use super::Prepared;
 use super::args::Cli;
-use super::generate::Program;
 use super::look::Look;
 use super::ranges;
 use super::scene::Opened;
 use super::work::Work;
+use super::{Prepared, parsed};
 use crate::base::error::{Error, Result};
 use crate::render::annotate::AxisLabels;
 use crate::render::page::{self, Planes};
 use crate::render::sink::{Film, Place};
 use crate::render::{Pixel, render};
-use clap::Parser;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -66,15 +64,11 @@ struct Answer<'a> {
 impl Scenery {
     /// The program that does what options say.
     fn program(&self, options: &[String], output: &Path) -> Result<Cli> {
-        let mut words: Vec<OsString> = vec!["wavesplat-render".into()];
-        words.extend(self.options.iter().cloned());
+        let mut words = self.options.clone();
         words.extend(options.iter().map(OsString::from));
-        words.extend(["--quiet".into(), "-o".into(), output.into(), "--".into()]);
+        words.extend(["-o".into(), output.into(), "--".into()]);
         words.extend(self.inputs.iter().cloned());
-        let program = Program::try_parse_from(words).map_err(|e| Error::usage(first_line(&e.to_string())))?;
-        let Program::Render(mut cli) = program else { return Err(Error::usage("--generate: shows no pictures")) };
-        cli.imply_mode()?;
-        Ok(*cli)
+        parsed(words)
     }
 
     /// The page that shows a scene of these [`Self::facts`].
@@ -246,10 +240,6 @@ const IMPLIED: [&str; 2] = ["--method=coefficients", "--memory="];
 
 /// The format of the pictures of a page. No file of this name is written.
 const PAGE: &str = "live.html";
-
-fn first_line(text: &str) -> String {
-    text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string()
-}
 
 /// A word as shells take it.
 fn quoted(word: &str) -> String {

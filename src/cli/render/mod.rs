@@ -29,16 +29,19 @@ mod views;
 #[cfg(feature = "view")]
 mod work;
 
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
+use crate::base::progress::Progress;
 use crate::file::CoefficientFile;
 use crate::render::annotate::Annotation;
 use crate::render::sink::Provenance;
 use crate::render::{RenderConfig, Scene, render};
 use args::Cli;
+use clap::Parser;
 use colouring::Colouring;
 pub use generate::Program;
 use report::{Reported, summary, unit};
 use scene::Opened;
+use std::ffi::OsString;
 use std::sync::Arc;
 use targets::Targets;
 #[cfg(feature = "view")]
@@ -57,17 +60,41 @@ struct Prepared {
     annotation: Annotation,
 }
 
+/// Does what words after `wavesplat-render` ask for, in a program that has threads, progress and messages of its own.
+///
+/// # Errors
+/// Those of the program; [`Error::Usage`](crate::Error::Usage) names its options.
+pub fn run_within(words: impl IntoIterator<Item = OsString>, progress: &dyn Progress) -> Result<()> {
+    parsed(words)?.work(Some(progress))
+}
+
+/// What words after `wavesplat-render` ask for; it prints no notes.
+fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli> {
+    let first_line = |text: &str| text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string();
+    let words = ["wavesplat-render", "--quiet"].map(OsString::from).into_iter().chain(words);
+    let program = Program::try_parse_from(words).map_err(|e| Error::usage(first_line(&e.to_string())))?;
+    let Program::Render(mut cli) = program else { return Err(Error::usage("--generate: shows no pictures")) };
+    cli.imply_mode()?;
+    Ok(*cli)
+}
+
 impl Cli {
     fn run(&self) -> Result<()> {
         self.common.start()?;
+        self.work(None)
+    }
+
+    /// Writes what is asked for. Progress goes to the terminal unless there is another.
+    fn work(&self, progress: Option<&dyn Progress>) -> Result<()> {
         if self.probes.is_asked() {
             return self.probe();
         }
         let Prepared { mut scene, file, config, targets, colouring, provenance, annotation } = self.prepared()?;
         let targets = (&targets.0, targets.1.as_ref());
         let mut sinks = self.sinks(&config, targets, &colouring, (&provenance, annotation))?;
-        let progress = self.common.progress("render", unit(&config.mode));
-        let report = render(scene.as_mut(), &config, &progress, &mut |rendered| sinks.picture(&rendered))?;
+        let terminal = self.common.progress("render", unit(&config.mode));
+        let progress = progress.unwrap_or(&terminal);
+        let report = render(scene.as_mut(), &config, progress, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         self.common.detail(summary(&report));
         self.note_errors(&report);

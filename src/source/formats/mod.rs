@@ -9,8 +9,7 @@
 //! 3. Name it in `tools/guide/formats.md` and the README, add it to the tests of inputs, and name its crate, if it has
 //!    one, in `tests/layering.rs`.
 
-#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
-mod arrays;
+pub(in crate::source) mod arrays;
 pub(in crate::source) mod file_series;
 mod metaimage;
 mod nifti;

@@ -214,7 +214,8 @@ mod tests {
         for memory in [240, 500, 1 << 20] {
             READS.lock().expect("no panic").clear();
             let how = ReadConfig { access: Access::Read, memory };
-            let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
+            let opener =
+                Opener { path: "a".into(), how, open: Arc::new(|_, _| Ok(Box::new(Counted))), opened: Arc::default() };
             let mut chunks = Chunks::new(&variable, &counts, Vec::new(), &opener).expect("small chunks");
             let stored = chunks.stored(&Layout::plain([6, 4, 5], 7)).expect("small");
             assert_eq!((chunks.frames_per_chunk(), stored.bytes), (3, 3 * 120 * 2));
@@ -232,7 +233,8 @@ mod tests {
             assert!(expected.eq(reads), "{memory} bytes");
         }
         let how = ReadConfig { access: Access::Read, memory: 200 };
-        let opener = Opener { path: "a".into(), how, open: |_, _| Ok(Box::new(Counted)), opened: Arc::default() };
+        let opener =
+            Opener { path: "a".into(), how, open: Arc::new(|_, _| Ok(Box::new(Counted))), opened: Arc::default() };
         let refused = Chunks::new(&variable, &counts, Vec::new(), &opener).expect_err("chunks of 240 bytes");
         assert!(matches!(refused, Error::Setting { setting: "memory", .. }), "{refused}");
     }

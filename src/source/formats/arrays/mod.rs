@@ -1,4 +1,5 @@
-//! Files of named arrays, such as HDF5 and NetCDF. One variable is an archive, read chunk by chunk.
+//! Files of named arrays, such as HDF5 and NetCDF, and named arrays that the caller holds ([`held`]). One variable is an
+//! archive, read chunk by chunk.
 //!
 //! An [`ArrayFile`] lists the arrays. [`choose`] finds the variable, [`axes`] the meaning of its axes, [`places`] the
 //! positions of voxels and frames, and [`values`] the meaning of its numbers. [`chunks`] reads it, unless it is stored as
@@ -11,6 +12,7 @@ mod chunks;
 mod describe;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+pub(in crate::source) mod held;
 #[cfg_attr(not(feature = "netcdf"), allow(dead_code, reason = "classic NetCDF alone says where numbers are"))]
 mod in_place;
 #[cfg(feature = "netcdf")]
@@ -175,8 +177,8 @@ struct ReadConfig {
     memory: usize,
 }
 
-/// Opens a file of one format.
-type OpenFile = fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>>;
+/// Opens a file of one format, or what the caller holds.
+type OpenFile = Arc<dyn Fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>> + Send + Sync>;
 
 /// What opens a file of arrays, as often as it is asked.
 #[derive(Clone)]
@@ -220,14 +222,14 @@ pub(super) struct ArrayArchive {
     format: &'static str,
     opener: Opener,
     file: Box<dyn ArrayFile>,
-    /// The file whose state says whether the archive was changed.
-    watched: PathBuf,
+    /// The file whose state says whether the archive was changed; none if the caller holds the arrays.
+    watched: Option<PathBuf>,
 }
 
 /// Opens an HDF5 file. One that the NetCDF library wrote is a NetCDF file, whatever its name is.
 #[cfg(feature = "hdf5")]
 pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
-    let archive = ArrayArchive::open("HDF5", [path, path], hdf5::open, options)?;
+    let archive = ArrayArchive::open("HDF5", (path, Some(path)), Arc::new(hdf5::open), options)?;
     match archive.file.group("/").contains_key("_NCProperties") {
         #[cfg(feature = "netcdf")]
         true => open_netcdf(path, options),
@@ -240,20 +242,30 @@ pub(super) fn open_hdf5(path: &Path, options: &OpenOptions) -> Result<ArrayArchi
 /// Opens a NetCDF file.
 #[cfg(feature = "netcdf")]
 pub(super) fn open_netcdf(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
-    ArrayArchive::open("NetCDF", [path, path], netcdf::open, options)
+    ArrayArchive::open("NetCDF", (path, Some(path)), Arc::new(netcdf::open), options)
 }
 
 /// Opens a Zarr store, a folder.
 #[cfg(feature = "zarr")]
 pub(super) fn open_zarr(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = super::zarr_metadata(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    ArrayArchive::open("Zarr", [path, &metadata], zarr::open, options)
+    ArrayArchive::open("Zarr", (path, Some(&metadata)), Arc::new(zarr::open), options)
 }
 
 impl ArrayArchive {
-    fn open(format: &'static str, [path, watched]: [&Path; 2], open: OpenFile, options: &OpenOptions) -> Result<Self> {
+    fn open(
+        format: &'static str,
+        (path, watched): (&Path, Option<&Path>),
+        open: OpenFile,
+        options: &OpenOptions,
+    ) -> Result<Self> {
         let opener = Opener::new(path, open, options);
-        Ok(Self { format, file: opener.open()?, opener, watched: watched.into() })
+        Ok(Self { format, file: opener.open()?, opener, watched: watched.map(Path::to_path_buf) })
+    }
+
+    /// The state of the file that is watched.
+    fn state(&self) -> Result<State> {
+        self.watched.as_ref().map_or(Ok(State::HELD), |path| Ok(FileBytes::open(path, Access::Read)?.state()))
     }
 
     /// All arrays, or those of an image in VTKHDF.
@@ -271,7 +283,7 @@ impl ArrayArchive {
 
     /// Reads what the variable that is meant says of its frames.
     pub(super) fn describe(&self, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
-        let (path, state) = (self.opener.path.as_path(), FileBytes::open(&self.watched, Access::Read)?.state());
+        let (path, state) = (self.opener.path.as_path(), self.state()?);
         let refused = |e| Error::input(path, e);
         let (all, image) = self.variables().map_err(refused)?;
         let (choice, index) = match options.variable.as_deref() {
@@ -320,7 +332,8 @@ impl ArrayArchive {
     /// The frames of an array: where they are, or how to decode them.
     fn part(&self, found: &ResolvedArray, state: State) -> Result<Part> {
         let refused = |e| Error::input(&self.opener.path, e);
-        let (file, variable) = ((self.watched.as_path(), state), &found.variable);
+        let path = self.watched.as_ref().unwrap_or(&self.opener.path);
+        let (file, variable) = ((path.as_path(), state), &found.variable);
         if let Some(place) = self.file.in_place(&variable.path).filter(|_| found.order.is_empty()) {
             return found.in_place(file, place).map_err(refused);
         }

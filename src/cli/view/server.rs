@@ -1,6 +1,9 @@
 //! The server of the page: it renders what the page asks for, one request after another, as long as the page waits.
 
 use super::guard;
+use crate::base::error::Result;
+use crate::cli::render::live::{Saved, Scenery};
+use crate::cli::render::{Look, Work};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Query, Request, State};
@@ -16,11 +19,8 @@ use std::io;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use tokio::sync::Semaphore;
+use tokio::sync::{Notify, Semaphore};
 use tower_service::Service;
-use wavesplat::base::error::Result;
-use wavesplat::cli::render::live::{Saved, Scenery};
-use wavesplat::cli::render::{Look, Work};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
@@ -43,6 +43,16 @@ pub(super) struct Server {
     /// What is rendered now, or was last.
     work: Mutex<Arc<Work>>,
     requests: Semaphore,
+}
+
+/// Stops a server, from any thread.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stop(Arc<Notify>);
+
+impl Stop {
+    pub(super) fn stop(&self) {
+        self.0.notify_one();
+    }
 }
 
 type Shared = State<Arc<Server>>;
@@ -71,11 +81,16 @@ impl Server {
         Self { scenery: Arc::new(scenery), facts, token, renders, work: Mutex::default(), requests }
     }
 
-    /// Answers requests until the program ends.
-    pub(super) fn run(self, listener: TcpListener) -> io::Result<()> {
+    /// Answers requests until somebody stops it.
+    pub(super) fn run(self, listener: TcpListener, stop: &Stop) -> io::Result<()> {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-        runtime.block_on(async { serve(tokio::net::TcpListener::from_std(listener)?, self.router()).await })
+        let ended = runtime.block_on(async {
+            let answering = serve(tokio::net::TcpListener::from_std(listener)?, self.router());
+            tokio::select! { ended = answering => ended, () = stop.0.notified() => Ok(()) }
+        });
+        runtime.shutdown_background(); // does not wait for pictures that nobody sees
+        ended
     }
 
     fn router(self) -> Router {
@@ -160,7 +175,7 @@ async fn whole(request: Request) -> Option<Request> {
 }
 
 async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed> {
-    let failed = |e: wavesplat::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
+    let failed = |e: crate::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
     let nonce = guard::token().map_err(failed)?;
     Scenery::page(&server.facts, &nonce).map(Html).map_err(failed)
 }

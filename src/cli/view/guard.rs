@@ -1,8 +1,8 @@
 //! Who may ask: only pages of this server, which know its token.
 
+use crate::base::error::{Error, Result};
 use axum::http::{HeaderMap, HeaderValue, header};
 use std::net::SocketAddr;
-use wavesplat::base::error::{Error, Result};
 
 /// A word that nobody can guess.
 pub(super) fn token() -> Result<String> {

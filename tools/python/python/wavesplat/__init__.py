@@ -1,0 +1,44 @@
+"""Time-varying volumes in small files with a guaranteed error for every sample, and pictures from them.
+
+>>> import wavesplat
+>>> report = wavesplat.convert(array, "run.wspl", tolerance=1e-3)  # array: (time, z, y, x)
+>>> f = wavesplat.open("run.wspl")
+>>> f[10, :, 5]  # samples as numpy arrays, from the blocks that they are in alone
+>>> f.figure(mode="composite")  # an interactive picture in a notebook
+
+With xarray, ``xr.open_dataset("run.wspl")`` opens a file lazily, and ``ds.to_wavesplat("run.wspl")`` writes one after
+``import wavesplat.xarray``.
+"""
+
+import sys as _sys
+
+from ._convert import convert
+from ._figure import Figure
+from ._file import File, Viewer, open
+from ._wavesplat import (
+    BoundMissedError,
+    ChangedError,
+    DamagedError,
+    InputError,
+    UnsupportedError,
+    WavesplatError,
+    __version__,
+)
+
+if "xarray" in _sys.modules:  # its users expect Dataset.to_wavesplat; others do not wait for its import
+    from . import xarray as _xarray  # noqa: F401
+
+__all__ = [
+    "BoundMissedError",
+    "ChangedError",
+    "DamagedError",
+    "Figure",
+    "File",
+    "InputError",
+    "UnsupportedError",
+    "Viewer",
+    "WavesplatError",
+    "__version__",
+    "convert",
+    "open",
+]

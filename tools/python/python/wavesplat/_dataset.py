@@ -1,0 +1,152 @@
+"""Conversions of DataArrays and Datasets. Coordinates and attributes are encoded as xarray encodes them for NetCDF."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from . import _wavesplat
+from ._convert import Allowed, Settings, _chunk, frames_together, little_endian, told
+from ._progress import Progress, reporting
+
+NAME = "%n"
+"""What stands for the name of a variable in the name of a file."""
+
+_OF_STORAGE = ("units", "calendar", "dtype")
+"""Encodings of coordinates that say how dates become numbers. Others say how a file stored them."""
+
+
+def convert_dataset(
+    source: xr.DataArray | xr.Dataset,
+    settings: Settings,
+    allowed: Allowed,
+    *,
+    variable: str | None,
+    axes: str | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Converts a variable, or each of several to a file of its own."""
+    dataset = _dataset(source)
+    names = [variable] if variable is not None else _volumes(dataset)
+    if NAME not in settings.path:
+        if len(names) != 1:
+            found = ", ".join(names) or "none"
+            raise ValueError(
+                f"a file holds one variable with three axes or more, and the dataset has {found}: name one as "
+                f"variable=..., or write each to a file of its own, as in 'run_{NAME}.wspl'"
+            )
+        return _one(dataset, names[0], settings, allowed, axes, progress)
+    reports = {}
+    for name in names:
+        of_name = replace(settings, path=settings.path.replace(NAME, name.replace("/", "_")))
+        reports[name] = _one(dataset, name, of_name, allowed, axes, progress)
+    return reports
+
+
+def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
+    if isinstance(source, xr.DataArray):
+        name = "data" if source.name is None else source.name
+        return source.to_dataset(name=name)
+    if not isinstance(source, xr.Dataset):
+        raise ValueError(f"source: takes a DataArray or a Dataset, not {type(source).__name__}")
+    return source
+
+
+def _volumes(dataset: xr.Dataset) -> list[str]:
+    """The variables that can be frames."""
+    found = [str(name) for name, array in dataset.data_vars.items() if array.ndim >= 3 and array.dtype.kind in "fiu"]
+    return found
+
+
+def _one(
+    dataset: xr.Dataset, name: str, settings: Settings, allowed: Allowed, axes: str | None, progress: Progress
+) -> dict[str, Any]:
+    if name not in dataset.data_vars:
+        raise ValueError(f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}")
+    encoded, attrs = _encoded(dataset, name)
+    unlimited = set(dataset.encoding.get("unlimited_dims", ()))
+    arrays = [_described(key, var, unlimited, settings.memory, key == name) for key, var in encoded.items()]
+
+    def read(array: str, ranges: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
+        part = encoded[array][tuple(slice(start, stop) for start, stop in ranges)]
+        return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
+
+    chosen = {"source": f"dataset ({name})", "variable": None, "axes": axes}
+    of_name = asdict(allowed.applied(settings, name))
+    with reporting(progress, f"convert {name}") as report:
+        return told(*_wavesplat.convert_arrays(arrays, _attributes(attrs), read, chosen, of_name, report))
+
+
+def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], dict[Hashable, Any]]:
+    """The variables that a NetCDF file of this variable would have. Lazy arrays stay lazy."""
+    alone = dataset[[name]].copy()  # not the data
+    for key, var in alone.variables.items():
+        kept = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
+        alone[key].encoding = kept if _is_date(var) else {}
+    variables, attrs = xr.conventions.encode_dataset_coordinates(alone)  # type: ignore[no-untyped-call]
+    encoded = {str(key): xr.conventions.encode_cf_variable(var, name=key) for key, var in variables.items()}
+    return encoded, attrs
+
+
+def _is_date(variable: Any) -> bool:
+    return variable.dtype.kind in "mMO"
+
+
+def _described(key: str, variable: xr.Variable, unlimited: set[Any], memory: int, is_samples: bool) -> dict[str, Any]:
+    """An array as the native half takes it."""
+    lengths = zip(variable.dims, variable.shape, strict=True)
+    is_small = variable.ndim <= 1 or variable.dtype.kind in "OUS"
+    return {
+        "name": key,
+        "dtype": variable.dtype.name,
+        "dimensions": [(str(dim), int(length), dim in unlimited) for dim, length in lengths],
+        "chunk": _chunks(variable, memory) if is_samples else None,
+        "attributes": _attributes(variable.attrs),
+        "values": _values(variable.values) if is_small and not is_samples else None,
+    }
+
+
+_SHARE = 128
+"""The part of the memory that a chunk may have, so that frames are not decoded twice."""
+
+
+def _chunks(variable: xr.Variable, memory: int) -> list[int] | None:
+    """Pieces of the samples that are computed together, as large as the memory allows."""
+    chunk = _chunk(variable.data) if variable.chunks is not None else None
+    if chunk is None:
+        return None
+    along = [min(n, length) for n, length in zip(chunk, variable.shape, strict=True)]
+    together = frames_together(tuple(along), variable.dtype.itemsize, (along[0],), memory * 8 // _SHARE)
+    along[0] = min(along[0], together)
+    for axis in range(1, len(along)):
+        size = int(np.prod(along, dtype=np.int64)) * variable.dtype.itemsize
+        while size > memory // _SHARE and along[axis] > 1:
+            along[axis] = (along[axis] + 1) // 2
+            size = int(np.prod(along, dtype=np.int64)) * variable.dtype.itemsize
+    return along
+
+
+def _attributes(attributes: Any) -> list[tuple[str, Any]]:
+    """Attributes as the native half takes them, with the fill value first, as in NetCDF files. Values that are no texts and
+    no numbers are left out.
+    """
+    ordered = sorted(attributes.items(), key=lambda item: item[0] != "_FillValue")
+    encoded = ((str(name), _values(np.atleast_1d(np.asarray(value)))) for name, value in ordered)
+    return [(name, value) for name, value in encoded if value is not None]
+
+
+def _values(array: npt.NDArray[Any]) -> Any:
+    """Texts as a list, numbers as (bytes, name of their type); None for others."""
+    if array.dtype.kind == "S":
+        return [text.decode(errors="replace") for text in array.reshape(-1).tolist()]
+    if array.dtype.kind in "UO":
+        texts = array.reshape(-1).tolist()
+        return texts if all(isinstance(text, str) for text in texts) else None
+    if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8 or array.dtype == np.float16:
+        return None
+    return little_endian(array).reshape(-1).view(np.uint8), array.dtype.name

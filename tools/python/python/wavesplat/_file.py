@@ -1,0 +1,382 @@
+"""Coefficient files: samples, what is known of them, and pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _wavesplat
+from ._description import Axes, coordinates
+from ._figure import Figure
+from ._index import read_into, select
+from ._options import in_python, words
+from ._progress import Progress, reporting
+
+MEMORY = 512 << 20
+"""Bytes that reading, converting and rendering may take beside their results."""
+
+
+def open(path: str | PathLike[str], *, lod: int = 0) -> File:
+    """Opens a coefficient file. Samples are read when they are asked for.
+
+    Args:
+        path: A ``.wspl`` file.
+        lod: Level of detail: every 2**lod-th voxel along each axis, read from the coarse levels alone.
+
+    Raises:
+        FileNotFoundError: There is no such file.
+        DamagedError: It is damaged, or no coefficient file.
+        ValueError: It has no such level of detail.
+
+    """
+    return File(path, lod=lod)
+
+
+class File:
+    """An open coefficient file. It acts as a read-only array of shape (time, z, y, x); several threads may read it.
+
+    ``f[10, :, ::2, 5]`` gives samples as numpy does for basic indices and one list or mask, and ``f.oindex`` takes one along
+    each axis. Only the blocks that an index touches are read, and the interpreter's lock is released meanwhile. Voxels are in
+    the file's own order: along each axis, coordinates ascend. ``xarray.open_dataset`` gives the order of the source.
+    """
+
+    def __init__(self, path: str | PathLike[str], *, lod: int = 0) -> None:
+        """As `wavesplat.open`."""
+        self._path, self._lod = os.fspath(path), lod
+        self._file = _wavesplat.File(self._path, lod)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
+        return _reopened, (os.path.abspath(self._path), self._lod, self.id)
+
+    def __repr__(self) -> str:  # noqa: D105
+        sizes = ", ".join(f"{name}: {length}" for name, length in zip(self.dims, self.shape, strict=True))
+        name = self.variable or "samples"
+        return f"<wavesplat.File {self._path!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
+
+    def __len__(self) -> int:  # noqa: D105
+        return self.shape[0]
+
+    @property
+    def path(self) -> str:
+        """Its path."""
+        return self._path
+
+    @property
+    def id(self) -> str:
+        """Its identity, which the same frames and settings share."""
+        return self._file.id
+
+    @cached_property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Frames, and voxels along z, y and x."""
+        x, y, z = self._file.dims
+        return self._file.frames, z, y, x
+
+    @property
+    def ndim(self) -> int:
+        """Four: time, z, y and x."""
+        return 4
+
+    @cached_property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the samples."""
+        sample = self._file.sample
+        return np.dtype(f"<{sample[0]}{int(sample[1:]) // 8}")
+
+    @property
+    def channels(self) -> int:
+        """1, or 3 for red, green and blue."""
+        return self._file.channels
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all samples of a channel."""
+        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
+
+    @cached_property
+    def chunks(self) -> tuple[tuple[int, ...], ...]:
+        """Lengths of the windows, and of the blocks along z, y and x: what is decoded together."""
+        edges = reversed(self._file.block)
+        spatial = zip(self.shape[1:], edges, strict=True)
+        blocks = (tuple(min(edge, n - at) for at in range(0, n, edge)) for n, edge in spatial)
+        return (tuple(self._file.windows), *blocks)
+
+    @property
+    def variable(self) -> str | None:
+        """The name of the variable, if the source had one."""
+        return self._file.variable
+
+    @property
+    def unit(self) -> str | None:
+        """The unit of the samples, if the source had one."""
+        return self._file.setting("units")
+
+    @cached_property
+    def description(self) -> dict[str, Any] | None:
+        """Dimensions, coordinates and attributes of the source, as far as they are kept."""
+        return self._file.description()
+
+    @cached_property
+    def _axes(self) -> Axes:
+        return Axes.of(self)
+
+    @property
+    def dims(self) -> tuple[str, str, str, str]:
+        """The names of the four axes."""
+        return self._axes.names
+
+    @cached_property
+    def coords(self) -> dict[str, npt.NDArray[Any]]:
+        """The coordinates of each axis that has some: of its frames or voxels, in the file's order."""
+        return coordinates(self)
+
+    @cached_property
+    def attrs(self) -> dict[str, Any]:
+        """The attributes of the samples in the source."""
+        return self._axes.attributes
+
+    @cached_property
+    def times(self) -> npt.NDArray[np.float64]:
+        """The time of each frame, in `time_unit`; empty if there are none."""
+        return np.asarray(self._file.times)
+
+    @property
+    def time_unit(self) -> str | None:
+        """The unit of times, perhaps since a date: "hours since 2000-01-01"."""
+        return self._file.setting("time-units")
+
+    @property
+    def calendar(self) -> str | None:
+        """The calendar of times, if it is not the usual one."""
+        return self._file.setting("calendar")
+
+    @property
+    def missing_value(self) -> float | None:
+        """The value that stands for missing samples, besides NaN and infinities."""
+        return self._file.missing_value
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The least and the largest sample."""
+        return self._file.value_range
+
+    @property
+    def bound(self) -> float:
+        """The largest error of any sample, in its unit. It was measured in the conversion, and is guaranteed."""
+        return self._file.reached
+
+    @cached_property
+    def promise(self) -> dict[str, Any]:
+        """What was promised: kind of bound, tolerance and so on, as ``wavesplat verify --json`` reports it."""
+        promise: dict[str, Any] = json.loads(self._file.promise())
+        return promise
+
+    @property
+    def file_bytes(self) -> int:
+        """Bytes of the file."""
+        return self._file.bytes
+
+    @property
+    def bytes_read(self) -> int:
+        """Bytes of the file that were read so far."""
+        return self._file.bytes_read
+
+    def __getitem__(self, key: Any) -> npt.NDArray[Any]:
+        """Samples by an index of numpy's: numbers, slices, ``...``, ``None``, and one list or mask."""
+        selection = select(key, self.shape)
+        return selection.finish(self._read(selection.items))
+
+    @property
+    def oindex(self) -> Outer:
+        """Samples by a number, slice, list or mask along each axis: every combination of them."""
+        return Outer(self)
+
+    def __array__(self, dtype: npt.DTypeLike = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        """All samples."""
+        if copy is False:
+            raise ValueError("samples are decoded: there is no array without a copy")
+        return self[...].astype(dtype or self.dtype, copy=False)
+
+    def read(
+        self,
+        t: Any = slice(None),
+        z: Any = slice(None),
+        y: Any = slice(None),
+        x: Any = slice(None),
+        *,
+        out: npt.NDArray[Any] | None = None,
+        channel: int = 0,
+        memory: int = MEMORY,
+    ) -> npt.NDArray[Any]:
+        """Samples by a number, slice, list or mask along each axis.
+
+        Args:
+            t: Which frames.
+            z: Which voxels along z.
+            y: Which voxels along y.
+            x: Which voxels along x.
+            out: An array for the samples, of their shape and type. All axes are kept then, with length 1 for a number.
+            channel: Which channel, from 0.
+            memory: Bytes that decoding may take beside the result.
+
+        Raises:
+            IndexError: There are no such frames or voxels.
+            DamagedError: A block is damaged.
+
+        """
+        selection = select((t, z, y, x), self.shape, outer=True)
+        if out is None:
+            return selection.finish(self._read(selection.items, channel=channel, memory=memory))
+        if out.shape != selection.shape or out.dtype != self.dtype:
+            raise ValueError(f"out: takes {self.dtype} of shape {selection.shape}, not {out.dtype} of shape {out.shape}")
+        self._fill(out, selection.items, channel, memory)
+        return out
+
+    def _read(self, items: Sequence[Any], *, channel: int = 0, memory: int = MEMORY) -> npt.NDArray[Any]:
+        out = np.empty(tuple(len(along) for along in items), self.dtype)
+        self._fill(out, items, channel, memory)
+        return out
+
+    def _fill(self, out: npt.NDArray[Any], items: Sequence[Any], channel: int, memory: int) -> None:
+        def read(frames: list[int], box: tuple[list[int], list[int]], part: npt.NDArray[Any]) -> None:
+            region = (box[0][::-1], box[1][::-1])
+            self._file.read(frames, region, channel, memory, part.reshape(-1).view(np.uint8))
+
+        blocks = self._file.block[::-1]
+        read_into(out, items, read, blocks=blocks, windows=self._file.windows, memory=memory)
+
+    def check(self, progress: Progress = False) -> None:
+        """Compares the checksums of every byte of the file.
+
+        Raises:
+            DamagedError: It names the place of the first damage.
+
+        """
+        with reporting(progress, "check") as report:
+            self._file.check(report)
+
+    def render(self, *, progress: Progress = False, **options: Any) -> npt.NDArray[Any]:
+        """Pictures as numbers.
+
+        Args:
+            progress: Whether to show progress, or a function of (done, all).
+            options: Those of ``wavesplat-render`` with underscores: ``view=(30, 30)``, ``mode="composite"``,
+                ``frames=slice(0, 8)``, ``size=(640, 480)``, ``range=(0, 1)``, ``iso="50%"``, ``slice={"z": 0.5}``,
+                ``colormap="RdBu"`` (names and objects of matplotlib work), ``memory="1GiB"`` and so on.
+
+        Returns:
+            Means and largest values: float32 (pictures, height, width) in the unit of the samples, NaN for background.
+            Composites, isosurfaces and pictures with a ``colormap``: uint8 (pictures, height, width, 3).
+
+        Raises:
+            ValueError: An option is wrong.
+
+        """
+        with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
+            path = os.path.join(folder, "pictures.npy")
+            self._render(path, options, progress)
+            pictures: npt.NDArray[Any] = np.load(path)
+        return pictures
+
+    def figure(self, format: str = "html", *, height: int = 700, progress: Progress = False, **options: Any) -> Figure:
+        """A picture that a notebook shows.
+
+        Args:
+            format: "html" for an interactive page with all frames, "png" for one picture, "apng" or "gif" for a movie.
+            height: Pixels of height that a page takes in a notebook.
+            progress: Whether to show progress, or a function of (done, all).
+            options: As for `render`. ``annotate`` is True by default.
+
+        """
+        if format not in ("html", "png", "apng", "gif"):
+            raise ValueError(f"format: 'html', 'png', 'apng' or 'gif', not {format!r}")
+        options = {"annotate": True, **options}
+        if format == "png" and "frames" not in options:
+            options["frames"] = self.shape[0] // 2
+        with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
+            path = Path(folder, f"figure.{format}")
+            self._render(str(path), options, progress)
+            return Figure(path.read_bytes(), format, height)
+
+    def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
+        if self._lod:
+            options = {"lod": self._lod, **options}
+        with reporting(progress, "render") as report:
+            try:
+                _wavesplat.render([*words(options), "-o", output, "--", self._path], report)
+            except ValueError as error:
+                raise ValueError(in_python(str(error))) from None
+
+    def view(self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Any) -> Viewer:
+        """Opens the interactive viewer in the browser.
+
+        Args:
+            browser: Whether to open the browser; otherwise open `Viewer.address` yourself.
+            port: Port of the server on 127.0.0.1; any free one by default.
+            memory: Bytes that pictures may take.
+            options: As for `render`, for all pictures.
+
+        """
+        return Viewer(self._path, words(options), port=port, memory=memory, browser=browser)
+
+
+class Outer:
+    """Samples by a list along each axis; see `File.oindex`."""
+
+    def __init__(self, file: File) -> None:
+        """Of a file."""
+        self._of = file
+
+    def __getitem__(self, key: Any) -> npt.NDArray[Any]:  # noqa: D105
+        selection = select(key, self._of.shape, outer=True)
+        return selection.finish(self._of._read(selection.items))
+
+
+class Viewer:
+    """The viewer of a file, a server on this machine. It answers until it is closed, or this object is gone."""
+
+    def __init__(self, path: str, options: Sequence[str], *, port: int, memory: int, browser: bool) -> None:
+        """Starts the server."""
+        self._viewer = _wavesplat.Viewer(path, port, memory, options)
+        if browser:
+            self._viewer.open_browser()
+
+    @property
+    def address(self) -> str:
+        """The address of the page. It holds a token: only who knows it can look."""
+        return self._viewer.address
+
+    def close(self) -> None:
+        """Ends the server."""
+        self._viewer.close()
+
+    def __enter__(self) -> Viewer:  # noqa: D105
+        return self
+
+    def __exit__(self, *raised: object) -> None:  # noqa: D105
+        self.close()
+
+    def __repr__(self) -> str:  # noqa: D105
+        return f"<wavesplat.Viewer {self.address}>"
+
+    def _repr_html_(self) -> str:
+        return f'<a href="{self.address}" target="_blank">{self.address}</a>'
+
+
+def _reopened(path: str, lod: int, id: str) -> File:
+    """A file that was pickled, if it is still the same."""
+    file = File(path, lod=lod)
+    if file.id != id:
+        raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled")
+    return file
+
+

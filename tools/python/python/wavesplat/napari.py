@@ -1,0 +1,40 @@
+"""A reader for napari: a Dask array with scale, place and units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+Layer = tuple[Any, dict[str, Any], str]
+
+
+def get_reader(path: str | list[str]) -> Callable[[str | list[str]], list[Layer]] | None:
+    """The reader of a coefficient file; None for other files."""
+    first = path[0] if isinstance(path, list) else path
+    return read if str(first).endswith(".wspl") else None
+
+
+def read(path: str | list[str]) -> list[Layer]:
+    """The layers of one file, or of several."""
+    return [_layer(one) for one in (path if isinstance(path, list) else [path])]
+
+
+def _layer(path: str) -> Layer:
+    import dask.array as da
+
+    from ._file import open
+
+    file = open(path)
+    samples = da.from_array(file, chunks=file.chunks, name=f"wavesplat-{file.id}", asarray=False)
+    times = file.times
+    step = float(times[1] - times[0]) if len(times) > 1 and times[1] > times[0] else 1.0
+    spacing, origin = file._file.spacing[::-1], file._file.origin[::-1]
+    settings: dict[str, Any] = {
+        "name": file.variable or "samples",
+        "scale": (step, *spacing),
+        "translate": (float(times[0]) if len(times) else 0.0, *origin),
+        "contrast_limits": file.range,
+        "axis_labels": file.dims,
+        "metadata": {"path": file.path, "unit": file.unit, "time_unit": file.time_unit},
+    }
+    return samples, settings, "image"

@@ -1,0 +1,194 @@
+"""Coefficient files in xarray: ``xr.open_dataset("run.wspl")`` and, with this module imported, ``ds.to_wavesplat(...)``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from xarray.backends import BackendArray, BackendEntrypoint
+from xarray.core import indexing
+
+from ._convert import convert
+from ._description import ROLES, along_axis, array, attributes
+from ._file import File, open
+
+_COLOURS = ("red", "green", "blue")
+
+
+class _Samples(BackendArray):
+    """The samples of a file in the axes of its source."""
+
+    def __init__(self, file: File, channel: int = 0) -> None:
+        self.file, self.channel, self.dtype = file, channel, file.dtype
+        self.axes = file._axes.source
+        self.shape = tuple(_length(file, axis.role) for axis in self.axes)
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> npt.NDArray[Any]:
+        """Samples by a number, slice or array along each axis of the source."""
+        items = [np.arange(length)[part] for part, length in zip(key, self.shape, strict=True)]
+        turned = {
+            axis.role: self.shape[n] - 1 - items[n] if axis.reversed else items[n] for n, axis in enumerate(self.axes)
+        }
+        by_role = [np.atleast_1d(turned.get(role, np.array([0]))) for role in ROLES]
+        samples = self.file.read(*by_role, channel=self.channel)
+        own = [ROLES.index(axis.role) for axis in self.axes if axis.role in ROLES]
+        samples = samples.transpose([*own, *(n for n in range(len(ROLES)) if n not in own)])
+        return samples.reshape([items[n].size if np.ndim(items[n]) else 1 for n in range(len(items))])[
+            tuple(slice(None) if np.ndim(along) else 0 for along in items)
+        ]
+
+
+def _length(file: File, role: str) -> int:
+    return file.shape[ROLES.index(role)] if role in ROLES else 1
+
+
+class WavesplatBackend(BackendEntrypoint):
+    """Opens coefficient files lazily, with the coordinates, times and attributes of their source."""
+
+    description = "Open coefficient files (.wspl) of wavesplat"
+    url = "https://docs.rs/wavesplat"
+    open_dataset_parameters: ClassVar[tuple[str, ...]] = (
+        "filename_or_obj",
+        "drop_variables",
+        "mask_and_scale",
+        "decode_times",
+        "decode_timedelta",
+        "use_cftime",
+        "decode_coords",
+        "lod",
+    )
+
+    def open_dataset(  # type: ignore[override]
+        self,
+        filename_or_obj: str | os.PathLike[str],
+        *,
+        drop_variables: str | Iterable[str] | None = None,
+        mask_and_scale: bool = True,
+        decode_times: Any = True,
+        decode_timedelta: Any = None,
+        use_cftime: bool | None = None,
+        decode_coords: Any = True,
+        lod: int = 0,
+    ) -> xr.Dataset:
+        """The dataset of a file; with ``lod``, every 2**lod-th voxel along each axis."""
+        file = open(filename_or_obj, lod=lod)
+        variables, attrs = _variables(file)
+        dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
+        variables = {name: var for name, var in variables.items() if name not in dropped}
+        times = {} if use_cftime is None else {"use_cftime": use_cftime}
+        dataset: xr.Dataset = xr.conventions.decode_cf(
+            xr.Dataset(variables, attrs=attrs),
+            mask_and_scale=mask_and_scale,
+            decode_times=decode_times,
+            decode_timedelta=decode_timedelta,
+            decode_coords=decode_coords,
+            **times,
+        )
+        dataset.encoding["source"] = os.path.abspath(file.path)
+        return dataset
+
+    def guess_can_open(self, filename_or_obj: Any) -> bool:
+        """Whether a name ends like one of a coefficient file."""
+        return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).endswith(".wspl")
+
+
+def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
+    """The variables that a file stands for, as its source encoded them, and global attributes."""
+    samples = _samples(file)
+    described = file.description
+    if described is None:
+        return {**samples, **_coordinates(file, set(samples))}, {}
+    names = {axis.name for axis in file._axes.source}
+    dimensions = [dimension[0] for dimension in described["dimensions"]]
+    others = {}
+    for name, along, values, attrs in described["variables"]:
+        data = array(values)
+        data = file.times if data is None else data
+        is_of_file = np.shape(data) == () or len(along) == 0 or _fits(file, along, dimensions, described)
+        if name not in samples and is_of_file:
+            dims = [dimensions[at] for at in along]
+            shape = [described["dimensions"][at][1] for at in along]
+            others[name] = xr.Variable(dims, _typed(data, values).reshape(shape), attributes(attrs))
+    others = {name: var for name, var in others.items() if var.ndim > 0 or name not in names}
+    return {**samples, **others, **_coordinates(file, {*samples, *others})}, attributes(described["global"])
+
+
+def _typed(data: npt.NDArray[Any], values: Any) -> npt.NDArray[Any]:
+    """Times in the type that they had."""
+    if not isinstance(values, str):
+        return data
+    typed = data.astype(values)
+    return typed if np.array_equal(typed, data) else data
+
+
+def _fits(file: File, along: list[int], dimensions: list[str], described: dict[str, Any]) -> bool:
+    """Whether the lengths of a variable are those of the axes: at a level of detail they are not."""
+    own = {axis.name: _length(file, axis.role) for axis in file._axes.source}
+    return all(own.get(dimensions[at], described["dimensions"][at][1]) == described["dimensions"][at][1] for at in along)
+
+
+def _samples(file: File) -> dict[str, xr.Variable]:
+    """The samples, or those of each colour."""
+    base = (file.variable or "data").split("[")[0]
+    names = (base,) if file.channels == 1 else _COLOURS
+    dims = [axis.name for axis in file._axes.source]
+    attrs = dict(file.attrs)
+    if file.unit is not None:
+        attrs.setdefault("units", file.unit)
+    if file.missing_value is not None:
+        attrs["_FillValue"] = file.dtype.type(file.missing_value)
+    found = {}
+    for channel, name in enumerate(names):
+        lazy = indexing.LazilyIndexedArray(_Samples(file, channel))
+        variable = xr.Variable(dims, lazy, attrs)
+        variable.encoding["preferred_chunks"] = _chunks(file)
+        found[name] = variable
+    return found
+
+
+def _chunks(file: File) -> dict[str, tuple[int, ...]]:
+    """Windows and blocks along the axes of the source."""
+    by_role = dict(zip(ROLES, file.chunks, strict=True))
+    chunks = {axis.name: by_role.get(axis.role, (1,)) for axis in file._axes.source}
+    return {axis.name: chunks[axis.name][:: -1 if axis.reversed else 1] for axis in file._axes.source}
+
+
+def _coordinates(file: File, taken: set[str]) -> dict[str, xr.Variable]:
+    """Coordinates of axes that have no variable in the source."""
+    found = {}
+    for axis in file._axes.source:
+        if axis.name in taken:
+            continue
+        along = along_axis(file, axis)
+        if along is None or len(along) != _length(file, axis.role):
+            along = along_axis_of_grid(file, axis.role)
+        if along is not None:
+            unit = {"units": file.time_unit, "calendar": file.calendar} if axis.role == "t" else {}
+            found[axis.name] = xr.Variable(axis.name, along, {name: value for name, value in unit.items() if value})
+    return found
+
+
+def along_axis_of_grid(file: File, role: str) -> npt.NDArray[Any] | None:
+    """The places of voxels at a level of detail of a grid that is more than numbers."""
+    return None
+
+
+@xr.register_dataset_accessor("to_wavesplat")
+@xr.register_dataarray_accessor("to_wavesplat")
+class ToWavesplat:
+    """``ds.to_wavesplat("run.wspl", tolerance=1e-3)``: see `wavesplat.convert`."""
+
+    def __init__(self, of: xr.Dataset | xr.DataArray) -> None:
+        """Of a Dataset or a DataArray."""
+        self._of = of
+
+    def __call__(self, path: str | os.PathLike[str], **settings: Any) -> dict[str, Any]:
+        """Writes a coefficient file; settings are those of `wavesplat.convert`."""
+        return convert(self._of, path, **settings)

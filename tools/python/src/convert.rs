@@ -1,0 +1,189 @@
+//! Conversions of what Python holds.
+#![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
+
+use crate::described::GivenValues;
+use crate::errors::raised;
+use crate::frames::{FrameReader, Raised};
+use crate::job;
+use crate::named::{GivenArray, PythonArrays};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use wavesplat::base::progress::Progress;
+use wavesplat::base::sample::SampleType;
+use wavesplat::convert::{Bound as ErrorBound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, open_partial};
+use wavesplat::file::resume::{self, Earlier};
+use wavesplat::source::{self, FrameSource, GivenTimes, NamedArrays, OpenOptions};
+use wavesplat::{Error, Result};
+
+/// Settings of a conversion, and where it goes.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Settings {
+    path: PathBuf,
+    resume: bool,
+    overwrite: bool,
+    tolerance: f64,
+    max_error: Option<f64>,
+    bound: String,
+    floor: f64,
+    range: Option<(f64, f64)>,
+    /// `error`, `mask`, or what the source says.
+    missing: Option<String>,
+    missing_value: Option<f64>,
+    clip: bool,
+    window: usize,
+    block: Option<usize>,
+    level: i32,
+    memory: usize,
+}
+
+/// Of the memory, what a window of frames may take.
+const SHARE: usize = 4;
+
+impl Settings {
+    fn bound(&self) -> PyResult<ErrorBound> {
+        match self.bound.as_str() {
+            "pointwise" => Ok(ErrorBound::Pointwise),
+            "rms" => Ok(ErrorBound::Rms),
+            "relative" => Ok(ErrorBound::Relative { floor: self.floor }),
+            other => Err(PyValueError::new_err(format!("bound: 'pointwise', 'rms' or 'relative', not {other:?}"))),
+        }
+    }
+
+    fn config(&self, source: &dyn FrameSource) -> PyResult<ConvertConfig> {
+        let archive = source.archive();
+        let is_declared = archive.missing.is_some() || self.missing_value.is_some();
+        let missing = match self.missing.as_deref() {
+            Some("mask") => MissingPolicy::Mask,
+            Some("error") => MissingPolicy::Error,
+            None if is_declared => MissingPolicy::Mask,
+            None => MissingPolicy::Error,
+            Some(other) => return Err(PyValueError::new_err(format!("missing: 'error' or 'mask', not {other:?}"))),
+        };
+        Ok(ConvertConfig {
+            window: self.window,
+            max_error: self.max_error,
+            bound: self.bound()?,
+            range: self.range,
+            missing,
+            missing_value: archive.missing_value(self.missing_value),
+            clip: self.clip,
+            block: self.block,
+            level: self.level,
+            memory: self.memory,
+            ..ConvertConfig::new(self.tolerance)
+        })
+    }
+
+    /// Converts, and returns the report as JSON and warnings; nothing if the file is complete already.
+    fn convert(
+        &self,
+        source: &mut dyn FrameSource,
+        config: &ConvertConfig,
+        progress: &dyn Progress,
+    ) -> Result<Option<ConvertReport>> {
+        if self.resume && !self.overwrite && self.path.is_file() {
+            return self.check_complete(source, config).map(|()| None);
+        }
+        let (mut out, held) = resume::open(&self.path, self.overwrite, Earlier::by(self.overwrite, self.resume))?;
+        let begun = held.map(|complete| PartialFile { complete, first_window: 0, description: None });
+        let report = wavesplat::convert::resume(source, config, begun, &self.path, &mut out, progress)?;
+        out.commit_if(resume::check)?;
+        Ok(Some(report))
+    }
+
+    /// An error unless the file is what this conversion would make.
+    fn check_complete(&self, source: &dyn FrameSource, config: &ConvertConfig) -> Result<()> {
+        let archive = source.archive();
+        match resume::is_complete(&self.path, &open_partial(config, archive)?, archive)? {
+            true => Ok(()),
+            false => Err(Error::path(&self.path, "is complete, but with other settings or frames")),
+        }
+    }
+
+    /// Converts what was opened. Exceptions of the frames come before those of the conversion.
+    fn run(
+        &self,
+        py: Python<'_>,
+        source: Result<Box<dyn FrameSource>>,
+        raised_by_frames: &Raised,
+        report: Option<&Py<PyAny>>,
+    ) -> PyResult<Converted> {
+        let first = |error: PyErr| raised_by_frames.take().unwrap_or(error);
+        let mut source = source.map_err(|e| first(raised(e)))?;
+        let config = self.config(source.as_ref())?;
+        let mut notes: Vec<String> = source.archive().notes.iter().map(|note| note.text.clone()).collect();
+        let done = job::run(py, report, |progress| self.convert(source.as_mut(), &config, progress)).map_err(first)?;
+        notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(|warning| warning.text.clone())));
+        Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
+    }
+}
+
+/// The report of a conversion as JSON, nothing if the file was complete already; and what is worth knowing.
+type Converted = (Option<String>, Vec<String>);
+
+/// What frames are, and where.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Layout {
+    /// Voxels along x, y and z; then frames, if their number is known.
+    dims: Vec<usize>,
+    sample: String,
+    spacing: Option<[f64; 3]>,
+    origin: Option<[f64; 3]>,
+    times: Option<Vec<f64>>,
+    time_unit: Option<String>,
+}
+
+/// Converts frames that an iterator gives as bytes, x fastest.
+#[pyfunction]
+#[pyo3(signature = (iterator, layout, settings, report = None))]
+pub(crate) fn convert_frames(
+    py: Python<'_>,
+    iterator: Py<PyAny>,
+    layout: Layout,
+    settings: Settings,
+    report: Option<Py<PyAny>>,
+) -> PyResult<Converted> {
+    let Layout { dims, sample, spacing, origin, times, time_unit } = layout;
+    let kept = Raised::default();
+    let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
+    let times = times.map(|times| GivenTimes::List(times.into()));
+    let (dims, memory) = (Some(dims), settings.memory / SHARE);
+    let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
+    let reader = FrameReader::new(iterator, kept.clone());
+    let source = py.detach(|| source::open_stream(reader, &options));
+    settings.run(py, source, &kept, report.as_ref())
+}
+
+/// Which variable is converted.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Chosen {
+    /// What the arrays are called in messages.
+    source: String,
+    variable: Option<String>,
+    axes: Option<String>,
+}
+
+/// Converts a variable of named arrays.
+#[pyfunction]
+#[pyo3(signature = (arrays, attributes, read, chosen, settings, report = None))]
+pub(crate) fn convert_arrays(
+    py: Python<'_>,
+    arrays: Vec<GivenArray<'_>>,
+    attributes: Vec<(String, GivenValues<'_>)>,
+    read: Py<PyAny>,
+    chosen: Chosen,
+    settings: Settings,
+    report: Option<Py<PyAny>>,
+) -> PyResult<Converted> {
+    let kept = Raised::default();
+    let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(&arrays, &attributes, read, kept.clone())?);
+    let Chosen { source: name, variable, axes } = chosen;
+    let options = OpenOptions { variable, axes, memory: settings.memory / SHARE, ..OpenOptions::default() };
+    let source = py.detach(|| source::open_arrays(Path::new(&name), &arrays, &options));
+    settings.run(py, source, &kept, report.as_ref())
+}

@@ -1,0 +1,31 @@
+//! `wavesplat._wavesplat`, the native half of the Python package: files, conversions, pictures and the viewer.
+//!
+//! Python names axes, chooses items and builds objects. This half moves numbers: it reads into arrays of numpy, takes frames
+//! from Python, and releases the interpreter's lock meanwhile.
+
+mod convert;
+mod described;
+mod errors;
+mod file;
+mod frames;
+mod job;
+mod look;
+mod named;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _wavesplat {
+    #[pymodule_export]
+    use super::convert::{convert_arrays, convert_frames};
+    #[pymodule_export]
+    use super::errors::{BoundMissedError, ChangedError, DamagedError, InputError, UnsupportedError, WavesplatError};
+    #[pymodule_export]
+    use super::file::File;
+    #[pymodule_export]
+    use super::look::{Viewer, render};
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}
