@@ -256,7 +256,7 @@ impl Archive {
         })
     }
 
-    fn of(dims: [usize; 3], frames: usize, value: impl Fn(usize, usize, usize, usize) -> f32) -> Self {
+    pub(crate) fn of(dims: [usize; 3], frames: usize, value: impl Fn(usize, usize, usize, usize) -> f32) -> Self {
         let [nx, ny, nz] = dims;
         let at = |i: usize| value(i % nx, i / nx % ny, i / (nx * ny) % nz, i / (nx * ny * nz));
         Self { dims, frames, values: (0..nx * ny * nz * frames).map(at).collect() }

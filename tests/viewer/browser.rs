@@ -148,6 +148,22 @@ impl Browser {
         }
     }
 
+    /// Presses the space bar, which writes a space.
+    pub(super) fn space(&mut self) {
+        for (kind, text) in [("keyDown", " "), ("keyUp", "")] {
+            let event = json!({ "type": kind, "key": " ", "code": "Space", "text": text, "windowsVirtualKeyCode": 32 });
+            self.ask("Input.dispatchKeyEvent", &event);
+        }
+    }
+
+    /// Clicks in the middle of the picture: `[1, 2]` is a double click.
+    pub(super) fn click(&mut self, counts: &[u32]) {
+        for n in counts {
+            self.pointer("mousePressed", [0.0; 2], &json!({ "buttons": 1, "clickCount": n }));
+            self.pointer("mouseReleased", [0.0; 2], &json!({ "clickCount": n }));
+        }
+    }
+
     /// A pointer's event in the middle of the picture, and this far from it. The left button is down if `is_down`.
     pub(super) fn pointer(&mut self, kind: &str, [dx, dy]: [f64; 2], more: &Value) {
         let box_ = self.js("(() => { const b = element('picture').getBoundingClientRect(); return [b.left + b.width / 2, b.top + b.height / 2]; })()");

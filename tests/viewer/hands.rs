@@ -6,9 +6,10 @@ use super::served::Served;
 use crate::cli::Work;
 use serde_json::{Value, json};
 
-const FULL: &str = "!steering.live.isMoving && document.documentElement.dataset.filled !== undefined";
+/// The picture is complete, and so are those around it.
+pub(super) const FULL: &str = "!steering.live.isMoving && document.documentElement.dataset.filled !== undefined";
 
-fn opened(work: &Work, browser: &mut Browser) -> Served {
+pub(super) fn opened(work: &Work, browser: &mut Browser) -> Served {
     let served = Served::start(work, "a.wspl");
     browser.open(&served.address);
     browser.wait(FULL);
@@ -55,10 +56,7 @@ fn the_camera_follows_the_pointer() {
     let after = point(browser.js(under));
     assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < pixel), "{before:?} {after:?}");
 
-    for n in [1, 2] {
-        browser.pointer("mousePressed", [0.0; 2], &json!({ "buttons": 1, "clickCount": n }));
-        browser.pointer("mouseReleased", [0.0; 2], &json!({ "clickCount": n }));
-    }
+    browser.click(&[1, 2]);
     browser.wait("steering.live.look.zoom === 1 && steering.live.look.view[0] === 30");
     assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
 }
@@ -97,11 +95,7 @@ fn clicks_plot_series_and_slices_know_their_places() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
-    let click = |browser: &mut Browser| {
-        browser.pointer("mousePressed", [0.0; 2], &json!({ "buttons": 1 }));
-        browser.pointer("mouseReleased", [0.0; 2], &json!({}));
-    };
-    click(&mut browser);
+    browser.click(&[1]);
     browser.wait("player.series?.values.length === 12");
     browser.set("side", &json!("top"));
     browser.set("mode", &json!("slice"));
@@ -109,7 +103,7 @@ fn clicks_plot_series_and_slices_know_their_places() {
     browser.js("player.series = null");
     browser.pointer("mouseMoved", [1.0, 0.0], &json!({ "button": "none" }));
     browser.wait("/at x 11|at x 12/.test(element('readout').textContent)");
-    click(&mut browser);
+    browser.click(&[1]);
     browser.wait("player.series?.values.length === 12");
     let plotted = browser.js(
         "[player.series.values, asked.filter(([where]) => where === 'series').map(([_, body]) => JSON.parse(body))]",
@@ -163,10 +157,10 @@ fn the_page_waits_for_a_server_that_comes_back() {
 
 #[test]
 fn a_narrow_window_holds_everything() {
-    let Some(mut browser) = Browser::start([400, 800]) else { return };
+    let Some(mut browser) = Browser::start([390, 844]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
-    assert_eq!(browser.js("document.documentElement.scrollWidth <= 400"), true);
+    assert_eq!(browser.js("document.documentElement.scrollWidth <= 390"), true);
     browser.resize([1200, 700]);
     browser.wait("element('picture').width > 500");
 }

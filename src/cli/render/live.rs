@@ -7,10 +7,11 @@ use super::scene::Opened;
 use super::work::Work;
 use super::{Prepared, parsed};
 use crate::base::error::{Error, Result};
+use crate::colour::Distribution;
 use crate::render::annotate::AxisLabels;
 use crate::render::page::{self, Planes};
 use crate::render::sink::{Film, Place};
-use crate::render::{Pixel, render};
+use crate::render::{Mode, Pixel, render};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -59,6 +60,19 @@ struct Answer<'a> {
     blocks: Vec<(Place, usize)>,
     /// The largest error of each pixel, as one more block of this many bytes behind the others.
     errors: Option<usize>,
+    /// The opacities of a composite, at shares of its range.
+    opacity: Option<Vec<(f64, f64)>>,
+}
+
+/// How common values are.
+#[derive(Debug, Serialize)]
+pub struct Histogram {
+    /// The least and the largest value.
+    range: Option<(f64, f64)>,
+    /// How many values lie in each of equal parts of the range.
+    counts: Vec<usize>,
+    /// A value with a surface: halfway from the most common value to the end that is farther from it.
+    surface: Option<f64>,
 }
 
 impl Scenery {
@@ -140,6 +154,7 @@ impl Scenery {
             about: &film.about().without_maps(),
             blocks: blocks.iter().map(|(place, block)| (*place, block.len())).collect(),
             errors: errors.as_ref().map(Vec::len),
+            opacity: opacities(&config.mode),
         };
         let head = page::headed(&answer).map_err(failed)?;
         Ok(blocks.into_iter().map(|(_, block)| block).chain(errors).fold(head, |mut all, block| {
@@ -164,21 +179,22 @@ impl Scenery {
         std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
     }
 
-    /// How many samples of some frames lie in each of 64 equal parts of the range of all.
+    /// How common samples of a frame are, or samples of some frames.
     ///
     /// # Errors
-    /// Those of rendering.
-    pub fn histogram(&self, _: &Work) -> Result<Vec<usize>> {
-        let cli = self.program(&[], Path::new(PAGE))?;
+    /// A frame that the archive lacks, or those of rendering.
+    pub fn histogram(&self, frame: Option<usize>) -> Result<Histogram> {
+        let mut options = vec!["--range=0,1".into(), "--clear=none".into()]; // no small pictures are needed
+        options.extend(frame.map(|frame| format!("--frames={frame}")));
+        let cli = self.program(&options, Path::new(PAGE))?;
         let Prepared { mut scene, config, .. } = cli.prepared()?;
-        let samples = ranges::distribution(scene.as_mut(), &config, &cli.common)?;
-        let mut counts = vec![0; BARS];
-        let samples = samples.as_ref().map_or(&[][..], |samples| samples.values());
-        if let [first, .., last] = *samples {
-            let bar = |value: f32| (f64::from(value - first) / f64::from(last - first) * BARS as f64) as usize;
-            samples.iter().for_each(|value| counts[bar(*value).min(BARS - 1)] += 1);
-        }
-        Ok(counts)
+        let samples = match frame {
+            Some(frame) => ranges::distribution_of(scene.as_mut(), (&config, &[frame]), &cli.common)?,
+            None => ranges::distribution(scene.as_mut(), &config, &cli.common)?,
+        };
+        Ok(samples
+            .as_ref()
+            .map_or_else(|| Histogram { range: None, counts: Vec::new(), surface: None }, Histogram::new))
     }
 
     /// The file of the pictures of a request.
@@ -202,6 +218,7 @@ impl Scenery {
             words(&self.options).into_iter().filter(|word| !IMPLIED.iter().any(|start| word.starts_with(start))),
         );
         all.extend(look.options());
+        all.extend(look.certify.then(|| "--error-image=error.npy".into()));
         all.extend(["-o".into(), saved.name().into()]);
         all.iter().fold("wavesplat-render".into(), |line, word| line + " " + &quoted(word))
     }
@@ -232,8 +249,28 @@ impl Saved {
     }
 }
 
-/// Parts of a histogram.
-const BARS: usize = 64;
+impl Histogram {
+    fn new(samples: &Distribution) -> Self {
+        let (values, mut counts) = (samples.values(), vec![0; BARS]);
+        let range = values.first().zip(values.last()).map(|(lo, hi)| (f64::from(*lo), f64::from(*hi)));
+        let Some((lo, hi)) = range else { return Self { range, counts, surface: None } };
+        let bar = |value: f32| ((f64::from(value) - lo) / (hi - lo) * BARS as f64) as usize;
+        values.iter().for_each(|value| counts[bar(*value).min(BARS - 1)] += 1);
+        let common = samples.empty((lo, hi)).or_else(|| samples.common((lo, hi))).map_or(lo, |common| common.value);
+        let end = if hi - common >= common - lo { hi } else { lo };
+        Self { range, counts, surface: Some((common + end) / 2.0) }
+    }
+}
+
+/// The opacities of a composite, at shares of its range.
+fn opacities(mode: &Mode) -> Option<Vec<(f64, f64)>> {
+    let Mode::Composite { transfer, .. } = mode else { return None };
+    let (lo, hi) = transfer.range();
+    Some(transfer.opacity_points().iter().map(|(value, opacity)| ((value - lo) / (hi - lo), *opacity)).collect())
+}
+
+/// Parts of a histogram: many more than a page draws, for it may draw a part of the range.
+const BARS: usize = 2048;
 
 /// Options that a command need not repeat.
 const IMPLIED: [&str; 2] = ["--method=coefficients", "--memory="];

@@ -49,14 +49,23 @@ pub(crate) fn distribution(
     config: &RenderConfig,
     common: &CommonArgs,
 ) -> Result<Option<Distribution>> {
+    let frames = spread(scene, LEAST_FRAMES);
+    distribution_of(scene, (config, &frames), common)
+}
+
+/// The same for these frames.
+pub(crate) fn distribution_of(
+    scene: &mut dyn Scene,
+    (config, frames): (&RenderConfig, &[usize]),
+    common: &CommonArgs,
+) -> Result<Option<Distribution>> {
     let small = small(config);
     let mut thinning = thinning(scene, &small)?;
     while voxels(&thinning) * LEAST_FRAMES > MOST_OF_DISTRIBUTION && thinning.stride < 64 {
         thinning.stride *= 2;
     }
     let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let frames = spread(scene, LEAST_FRAMES);
-    let request = OverviewRequest { thinning, frames: &frames, region };
+    let request = OverviewRequest { thinning, frames, region };
     let samples = scene.overview(&request, &common.progress("overview", "steps"))?;
     Ok(samples.map(Distribution::new))
 }

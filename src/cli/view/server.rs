@@ -198,9 +198,17 @@ async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Vec<u
     server.render(move |scenery, _| scenery.series(point)).await
 }
 
-async fn histogram(State(server): Shared) -> std::result::Result<Response, Failed> {
-    let counts = server.render(Scenery::histogram).await?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], format!("{counts:?}")).into_response())
+/// How common samples are, of all frames or of the one that is asked for.
+async fn histogram(
+    State(server): Shared,
+    Query(query): Query<HashMap<String, String>>,
+) -> std::result::Result<Response, Failed> {
+    let number = |text: &String| text.parse().map_err(|_| Failed(StatusCode::BAD_REQUEST, "frame: no number".into()));
+    let frame = query.get("frame").map(number).transpose()?;
+    let histogram = server.render(move |scenery, _| scenery.histogram(frame)).await?;
+    let failed = |e: serde_json::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
+    let text = serde_json::to_string(&histogram).map_err(failed)?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
 
 async fn command(

@@ -26,7 +26,12 @@ const SCRIPT: &str = concat!(
 );
 /// What a page needs besides, if it asks a server for pictures.
 #[cfg(feature = "view")]
-const LIVE: &str = concat!(include_str!("web/camera.js"), include_str!("web/live.js"), include_str!("web/steer.js"));
+const LIVE: &str = concat!(
+    include_str!("web/camera.js"),
+    include_str!("web/live.js"),
+    include_str!("web/opacity.js"),
+    include_str!("web/steer.js"),
+);
 #[cfg(feature = "view")]
 const CONTROLS: &str = include_str!("web/controls.html");
 #[cfg(feature = "view")]

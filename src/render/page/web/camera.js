@@ -1,6 +1,6 @@
 // The camera, as src/view/camera.rs has it: azimuth and elevation in degrees, a parallel projection.
 
-const SIDES = { free: null, iso: [225, 35.264], top: [180, 90], bottom: [180, -90], south: [180, 0], north: [0, 0], east: [270, 0], west: [90, 0] };
+const SIDES = { free: null, default: [30, 30], iso: [225, 35.264], top: [180, 90], bottom: [180, -90], south: [180, 0], north: [0, 0], east: [270, 0], west: [90, 0] };
 
 const radians = degrees => degrees * Math.PI / 180;
 

@@ -16,6 +16,15 @@ function tableOf(bytes) {
   return table;
 }
 
+// Maps whose middle is for 0, and the share of one side that the other must have for that.
+const DIVERGING = ['coolwarm'], SIDE = 0.05;
+
+// The range to stretch a map over, as src/colour/mod.rs has it.
+function suitable([low, high], map) {
+  const isSigned = low < -SIDE * high && high > -SIDE * low, most = Math.max(high, -low);
+  return DIVERGING.includes(map) && isSigned ? [-most, most] : [low, high];
+}
+
 // The colours of values: a map over a range, which may be logarithmic and bent by gamma.
 class Scale {
   constructor({ table, range, log = false, gamma = 1, clear = null }) {

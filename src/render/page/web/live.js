@@ -6,6 +6,9 @@ const REST = 250; // milliseconds without a change after which pictures are comp
 const PATIENCE = 600; // milliseconds after which a request says how far it is
 const SLOW = 30e6; // bytes per second below which answers are packed
 
+// Who asks for pictures. Nobody stops those of somebody who ranks higher.
+const AHEAD = 0, PLOT = 1, USER = 2;
+
 class Stale extends Error {}
 
 const pause = milliseconds => new Promise(next => setTimeout(next, milliseconds));
@@ -16,15 +19,17 @@ class Live {
     this.facts = facts;
     this.first = {
       title: facts.title, values: facts.values, size: [1, 1], kind: 'value', background: [0, 0, 0], range: facts.range ?? [0, 1],
-      log: false, clear: null, maps: facts.maps, map: 'viridis', fps: 25, labels: facts.labels, settings: {}, key: '',
+      log: false, clear: null, maps: facts.maps, map: 'viridis', fps: 25, labels: facts.labels, settings: {}, mode: '',
     };
     this.about = this.first;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
     this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: true, light: false, ...this.home() };
-    this.known = {}; // range and clear values of each mode, from its first answer
+    this.known = {}; // automatic range and clear values of each mode, from its first answer
     this.kept = new Map(); // pictures of each look, the last one used at the end
     this.turn = Promise.resolve();
     this.underWay = null; // the request that is asked
+    this.wanted = 0; // how many requests of the user there were
+    this.waiting = 0; // and how many of them wait
     this.isMoving = this.isSlow = false;
   }
 
@@ -47,49 +52,81 @@ class Live {
     const isOfErrors = mode === 'error', isComposite = mode === 'composite';
     return {
       ...look, mode: isOfErrors ? 'mean' : mode, size, scale, lod, frames, certify: isOfErrors && isFull, packed: this.isSlow,
-      ...(isComposite && opacity ? { opacity } : {}), range: isComposite ? range : null, ...this.known[this.modeKey()],
+      ...(isComposite && opacity ? { opacity } : {}), range: isComposite ? range : null, ...this.known[this.colourKey(isFull)],
       ...(isComposite && range ? { range } : {}),
     };
   }
 
-  modeKey() { return `${this.look.mode} ${this.look.map ?? ''}`; }
+  // The same for all pictures that share their automatic colours. Slices have those of their places as soon as they rest.
+  colourKey(isFull) {
+    const { mode, map, slices } = this.look;
+    if (mode !== 'slice') return `${mode === 'error' ? 'mean' : mode} ${map ?? ''}`;
+    const own = `slice ${JSON.stringify(slices)}`;
+    return isFull || this.known[own] ? own : this.ofSlices ?? own;
+  }
 
   // The same for all requests whose pictures are the same but for the frame.
-  key(isFull) { return JSON.stringify({ ...this.request(null, isFull), mode: this.modeKey(), ...(this.look.range ? {} : { range: null }), clear: null, packed: null }); }
+  key(isFull) {
+    const isChosen = this.look.mode === 'composite' && this.look.range;
+    return JSON.stringify({ ...this.request(null, isFull), ...(isChosen ? {} : { range: null }), clear: null, packed: null, colours: this.colourKey(isFull) });
+  }
 
   // A picture: complete if nothing moves, else a small one.
   async picture(_, index, isPlaying) {
     this.index = index;
-    const isFull = !this.isMoving, key = this.key(isFull);
-    const kept = this.kept.get(this.key(true))?.get(index) ?? this.kept.get(key)?.get(index);
-    const frames = isPlaying && isFull ? this.block(index) : [index, index + 1];
-    const picture = kept ?? await this.load(key, frames, isFull, index);
-    if (isFull) this.fillLater(index);
-    return picture;
+    clearTimeout(this.filling);
+    for (const wanted = ++this.wanted; ;) {
+      const isFull = !this.isMoving, key = this.key(isFull);
+      const kept = this.kept.get(this.key(true))?.get(index) ?? this.kept.get(key)?.get(index);
+      const frames = isPlaying && isFull ? this.block(index) : [index, index + 1];
+      try {
+        const picture = kept ?? await this.load(key, { frames, isFull, index, rank: USER });
+        if (isFull && wanted === this.wanted) this.fillLater(index);
+        return picture;
+      } catch (error) {
+        if (!(error instanceof Stale) || wanted !== this.wanted) throw error; // else automatic colours were found meanwhile
+      }
+    }
+  }
+
+  // A complete picture for a plot. It asks again while what the user sees comes first.
+  async whole(_, index, isWanted) {
+    const key = this.key(true);
+    for (;;) {
+      try {
+        return this.kept.get(key)?.get(index) ?? await this.load(key, { frames: this.block(index), isFull: true, index, rank: PLOT });
+      } catch (error) {
+        if (!isPassing(error) || !isWanted() || key !== this.key(true)) throw error;
+        await pause(REST);
+      }
+    }
   }
 
   // The frames that are asked for together, around one.
   block(index) {
-    if (this.look.mode === 'error') return [index, index + 1]; // errors take long
-    const [width, height] = this.fullSize(), numbers = this.kind === 'light' ? 4 : 1;
+    const { mode } = this.look, [width, height] = this.fullSize();
+    if (mode === 'error') return [index, index + 1]; // errors take long
+    const numbers = mode === 'composite' || mode === 'iso' || this.kind === 'channels' ? 4 : 1;
     const count = Math.min(Math.max(Math.floor(BLOCK_NUMBERS / (width * height * numbers)), 1), BLOCK_FRAMES);
     const first = index - index % count;
     return [first, Math.min(first + count, this.sequences[0].pictures.length)];
   }
 
   // Loads pictures in turn, and stops what does not help. Those that nobody wants any more are not asked for.
-  async load(key, frames, isFull, index) {
-    const { underWay, turn: before } = this;
+  async load(key, { frames, isFull, index, rank }) {
+    const { underWay, turn: before } = this, isOfUser = rank === USER;
     const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
-    if (underWay?.isFull && !isHelp) underWay.stop.abort();
+    if (underWay?.isFull && !isHelp && (isOfUser || rank === AHEAD && underWay.rank === AHEAD)) underWay.stop.abort();
+    const { wanted } = this;
     let done;
     this.turn = new Promise(resolve => { done = resolve; });
+    this.waiting += isOfUser;
     try {
-      await before;
+      await before.finally(() => { this.waiting -= isOfUser; });
       const kept = this.kept.get(key)?.get(index);
       if (kept) return kept;
-      if (key !== this.key(isFull)) throw new Stale();
-      this.underWay = { key, frames, isFull, stop: new AbortController() };
+      if (key !== this.key(isFull) || (isOfUser ? wanted !== this.wanted : this.waiting > 0)) throw new Stale();
+      this.underWay = { key, frames, isFull, rank, stop: new AbortController() };
       return (await this.ask(key, frames, isFull)).get(index);
     } finally {
       this.underWay = null;
@@ -98,16 +135,19 @@ class Live {
   }
 
   async ask(key, frames, isFull) {
+    const { mode, range } = this.look, colours = this.colourKey(isFull), isChosen = mode === 'composite' && range;
     const answer = await this.post('pictures', this.request(frames, isFull), this.underWay.stop.signal);
     const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer());
     if (bytes.length > 2 ** 20 && bytes.length / (performance.now() - started) * 1000 < SLOW) this.isSlow = true;
     const length = new DataView(bytes.buffer).getUint32(0, true);
-    const { about, blocks, errors } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+    const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
     this.kind = about.kind;
     for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
     const { title, labels } = this.facts;
-    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, key: this.modeKey(), hasBar: this.look.mode === 'composite' });
-    this.known[this.modeKey()] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null };
+    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, hasBar: mode === 'composite', opacity });
+    about.mode = mode === 'error' && !errors ? 'mean' : mode;
+    if (mode === 'slice') this.ofSlices = colours;
+    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null };
     const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
@@ -144,7 +184,7 @@ class Live {
     return kept;
   }
 
-  // Asks for the frames around a picture, and for those behind them, as soon as nothing else is wanted.
+  // Asks for the frames around a picture, and for those behind them, unless something else is wanted.
   fillLater(index) {
     clearTimeout(this.filling);
     this.filling = setTimeout(() => this.fill(index).catch(problem), REST);
@@ -155,13 +195,21 @@ class Live {
     for (const frames of [around, ...(around[1] < last ? [this.block(around[1])] : [])]) {
       let missing = frames[0];
       while (missing < frames[1] && this.kept.get(key)?.has(missing)) missing++;
-      if (missing < frames[1]) await this.load(key, frames, true, missing);
+      if (missing < frames[1]) await this.load(key, { frames, isFull: true, index: missing, rank: AHEAD });
     }
     document.documentElement.dataset.filled = index;
   }
 
+  // Stops what nobody waits for.
+  halt() {
+    clearTimeout(this.filling);
+    if (this.underWay?.rank === AHEAD) this.underWay.stop.abort();
+  }
+
   // Changes what is seen. While something moves, pictures are small.
   change(changes, isMoving) {
+    const isOther = name => name in changes && JSON.stringify(changes[name]) !== JSON.stringify(this.look[name]);
+    if (!Object.keys(changes).length || ['mode', 'view', 'center', 'zoom', 'slices'].some(isOther)) this.moved();
     Object.assign(this.look, changes);
     delete document.documentElement.dataset.filled;
     clearTimeout(this.filling);
@@ -175,7 +223,7 @@ class Live {
   async post(where, request, signal) {
     const working = setInterval(async () => {
       const share = await fetch('progress').then(answer => answer.text()).catch(() => '');
-      if (share) element('status').textContent = `rendering, ${Math.round(100 * share)} %`;
+      if (share) say('status', `rendering, ${Math.round(100 * share)} %`);
     }, PATIENCE);
     try {
       const answer = await this.patiently(where, { method: 'POST', body: JSON.stringify(request), signal });
@@ -183,7 +231,7 @@ class Live {
       return answer;
     } finally {
       clearInterval(working);
-      setTimeout(() => { element('status').textContent = ''; });
+      setTimeout(() => say('status', ''));
     }
   }
 
@@ -193,7 +241,7 @@ class Live {
         return await fetch(where, options);
       } catch (error) {
         if (options.signal?.aborted || !(error instanceof TypeError)) throw error;
-        element('status').textContent = 'wavesplat view does not answer. If it has ended, start it again.';
+        say('status', 'wavesplat view does not answer. If it has ended, start it again.');
         await pause(1000);
       }
     }
@@ -202,6 +250,7 @@ class Live {
   // Asks for a file of what is seen, or for its command.
   async made(where, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
-    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true), ...this.colours(), certify: false });
+    const certify = where === 'command' && this.look.mode === 'error';
+    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true), ...this.colours(), certify });
   }
 }

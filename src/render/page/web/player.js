@@ -11,9 +11,24 @@ function shortNumber(number) {
   return isPlain ? String(Number(number.toPrecision(4))) : Number(number.toPrecision(4)).toExponential().replace('e+', 'e');
 }
 
+const DOUBLE = 250; // milliseconds in which a second click makes a double click
+
+// Says something on a line; what does not fit shows as its title.
+function say(id, text) {
+  element(id).textContent = element(id).title = text;
+}
+
+// Whether a key is for the control that has the focus.
+function isForControl({ key, target, ctrlKey, metaKey, altKey }) {
+  if (ctrlKey || metaKey || altKey) return true;
+  if (target.matches('input[type="range"]')) return /^(Arrow|Page|Home$|End$)/.test(key);
+  return target.matches('input, select, textarea') || (target.matches('button, summary') && [' ', 'Enter'].includes(key));
+}
+
 class Player {
   constructor(source) {
     this.source = source;
+    this.chosen = { map: null }; // the map that was chosen, and the range, the logarithm and gamma of each kind of picture
     this.sequence = 0;
     this.index = 0;
     this.shown = null;
@@ -29,9 +44,9 @@ class Player {
 
   get pictures() { return this.source.sequences[this.sequence].pictures; }
 
-  // Follows the description of pictures. The colours begin anew if these are of another kind.
+  // Follows the description of pictures. Colours that nobody chose follow, too.
   adopt(about) {
-    const isOther = about.key !== this.about?.key || about.kind !== this.about?.kind;
+    const isOther = about.mode !== this.about?.mode || about.kind !== this.about?.kind;
     this.about = about;
     document.documentElement.classList.toggle('light', about.background[1] > 127);
     document.title = element('title').textContent = about.title || about.values || 'wavesplat';
@@ -43,28 +58,56 @@ class Player {
       this.image.data.fill(255);
     }
     if (isOther) this.beginColours();
+    if (about.kind === 'light') element('map').value = about.map;
+    this.takeColours();
   }
 
   beginColours() {
-    const { about } = this, isOfValues = about.kind === 'value', chosen = element('map').value;
+    const { about } = this, isOfValues = about.kind === 'value';
     element('bar').style.visibility = isOfValues || about.hasBar ? 'visible' : 'hidden';
-    element('colours').hidden = !isOfValues && !about.hasBar;
+    element('colours').hidden = !isOfValues && about.mode !== 'composite';
     element('log-control').hidden = element('gamma-control').hidden = !isOfValues;
     element('map').replaceChildren(...Object.keys(about.maps).map(name => new Option(name)));
     element('bar-name').textContent = about.values;
-    this.resetColours();
-    if (chosen in about.maps && about.key && isOfValues) element('map').value = chosen;
+    const { map } = this.chosen, { isLog = about.log, gamma = 0 } = this.ownColours;
+    element('map').value = isOfValues && map in about.maps ? map : about.map;
+    element('log').checked = isLog;
+    element('gamma').value = gamma;
+  }
+
+  // What was chosen for pictures of this kind.
+  get ownColours() { return this.chosen[`of ${this.about.mode}`] ??= {}; }
+
+  // The range: as chosen, or that of the pictures, with 0 in the middle of a map that diverges from it.
+  takeColours() {
+    const { about, range: before } = this, map = element('map').value;
+    this.range = this.ownColours.range ?? (map === about.map ? about.range : suitable(about.range, map));
+    if (this.range.some((end, n) => end !== before?.[n])) this.showRange(); // else what is typed stays
     this.recolour();
   }
 
+  showRange() {
+    [element('low').value, element('high').value] = this.range.map(shortNumber);
+    this.markRange('');
+  }
+
+  // Says what is wrong with the range that is typed, if anything is.
+  markRange(wrong) {
+    for (const id of ['low', 'high']) element(id).setCustomValidity(wrong);
+    if (wrong) say('readout', wrong);
+  }
+
   resetColours() {
-    const { about } = this;
-    element('map').value = about.map;
-    [element('low').value, element('high').value] = about.range.map(shortNumber);
-    this.range = about.range;
-    element('log').checked = about.log;
-    element('gamma').value = 0;
-    this.recolour();
+    delete this.chosen[`of ${this.about.mode}`];
+    this.chosen.map = null;
+    this.beginColours();
+    this.takeColours();
+    this.showRange();
+  }
+
+  chooseMap() {
+    this.chosen.map = element('map').value;
+    this.takeColours();
   }
 
   beginTime() {
@@ -79,21 +122,23 @@ class Player {
     on('play', 'click', () => this.play(!this.isPlaying));
     on('frame', 'input', () => this.show(Number(element('frame').value)));
     on('sequence', 'change', () => this.choose(Number(element('sequence').value)));
-    for (const id of ['map', 'log', 'gamma']) on(id, 'input', () => this.recolour());
+    on('map', 'input', () => this.chooseMap());
+    on('log', 'input', () => { this.ownColours.isLog = element('log').checked; this.recolour(); });
+    on('gamma', 'input', () => { this.ownColours.gamma = element('gamma').value; this.recolour(); });
     for (const id of ['low', 'high']) on(id, 'change', () => this.chooseRange());
     on('reset', 'click', () => { this.resetColours(); this.source.reset?.(); });
     on('save', 'click', () => this.save());
     on('picture', 'pointermove', event => this.read(event));
-    on('picture', 'pointerleave', () => { this.pointer = null; element('readout').textContent = ''; });
-    on('picture', 'click', event => this.plot(event));
+    on('picture', 'pointerleave', () => { this.pointer = null; say('readout', ''); });
+    on('picture', 'click', event => this.click(event));
     document.addEventListener('keydown', event => this.key(event));
   }
 
   key(event) {
-    if (event.target.matches('input, select, textarea') || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (isForControl(event)) return;
     const last = this.pictures.length - 1;
     const actions = {
-      ' ': () => this.play(!this.isPlaying),
+      ' ': () => event.repeat || this.play(!this.isPlaying),
       ArrowRight: () => this.show(Math.min(this.index + 1, last)),
       ArrowLeft: () => this.show(Math.max(this.index - 1, 0)),
       Home: () => this.show(0),
@@ -108,26 +153,38 @@ class Player {
   choose(sequence) {
     this.sequence = sequence;
     element('sequence').value = sequence;
+    this.clearSeries();
     this.beginTime();
     this.show();
   }
 
+  // Takes the range that is typed, as soon as it is in order: its other end may follow.
   chooseRange() {
-    const range = ['low', 'high'].map(id => element(id).valueAsNumber);
-    if (range.every(Number.isFinite) && range[0] < range[1]) this.range = range;
-    [element('low').value, element('high').value] = this.range.map(shortNumber);
-    this.recolour();
-    this.source.ranged?.(this.range);
+    const ends = ['low', 'high'].map(element), number = (end, n) => end.value === shortNumber(this.range[n]) ? this.range[n] : end.valueAsNumber;
+    ends.filter(end => !Number.isFinite(end.valueAsNumber)).forEach(end => { end.value = shortNumber(this.range[ends.indexOf(end)]); });
+    const range = ends.map(number);
+    if (range[0] >= range[1]) return this.markRange('From must be below To: change the other one as well.');
+    this.ownColours.range = range;
+    this.takeColours();
+    this.showRange();
+    this.source.ranged?.(range);
   }
 
   // Makes the colours anew, and draws with them.
   recolour() {
     const { about } = this, log = element('log');
     log.disabled = this.range[0] <= 0;
+    element('log-control').title = log.disabled ? 'A logarithm needs a range above 0: raise From' : '';
     const table = tableOf(about.maps[element('map').value]), gamma = 2 ** -element('gamma').value;
-    this.scale = new Scale({ table, range: this.range, log: log.checked, gamma, clear: about.clear });
+    this.scale = new Scale({ table, range: this.range, log: log.checked, gamma, clear: this.clear() });
     this.drawBar();
     this.draw();
+  }
+
+  // The values of empty space, which fade over a share of the range.
+  clear() {
+    const { range: [low, high], clear } = this.about, [least, most] = this.range;
+    return clear && [clear[0], clear[1], high > low ? clear[2] * (most - least) / (high - low) : clear[2]];
   }
 
   drawBar() {
@@ -159,9 +216,10 @@ class Player {
     element('label').textContent = this.about.labels[frame] ?? `frame ${frame}`;
     const shown = await this.source.picture(...asked, this.isPlaying).catch(problem);
     if (!shown || asked[0] !== this.sequence || asked[1] !== this.index) return;
-    if (shown.about !== this.about) this.adopt(shown.about);
     this.shown = shown;
-    this.draw();
+    if (shown.about === this.about) this.draw();
+    else this.adopt(shown.about);
+    this.source.drawn?.(shown);
     if (this.pointer) this.read(this.pointer);
     if (this.series) this.drawSeries(this.series.values, this.series.name);
   }
@@ -192,13 +250,12 @@ class Player {
     }
   }
 
-  // The pixel under the pointer.
-  pixel(event) {
-    const canvas = element('picture'), box = canvas.getBoundingClientRect();
-    const scale = Math.min(box.width / canvas.width, box.height / canvas.height);
+  // The pixel under the pointer, in a picture of this size.
+  pixel(event, [width, height] = this.about.size) {
+    const box = element('picture').getBoundingClientRect(), scale = Math.min(box.width / width, box.height / height);
     const at = (pointer, start, length, pixels) => Math.floor((pointer - start - (length - pixels * scale) / 2) / scale);
-    const x = at(event.clientX, box.left, box.width, canvas.width), y = at(event.clientY, box.top, box.height, canvas.height);
-    return x >= 0 && y >= 0 && x < canvas.width && y < canvas.height ? { x, y, i: y * canvas.width + x } : null;
+    const x = at(event.clientX, box.left, box.width, width), y = at(event.clientY, box.top, box.height, height);
+    return x >= 0 && y >= 0 && x < width && y < height ? { x, y, i: y * width + x } : null;
   }
 
   read(event) {
@@ -209,21 +266,37 @@ class Player {
     const text = Number.isNaN(value) ? 'no value' : `${shortNumber(value)}${about.values ? `  ${about.values}` : ''}`;
     const of = beneath ? `, value ${shortNumber(beneath[at.i])},` : '';
     const place = this.source.place?.(event) ?? `pixel ${at.x}, ${at.y}`, time = element('label').textContent;
-    element('readout').textContent = `${about.kind === 'value' ? `${text}${of} at ` : ''}${place}, ${time}`;
+    say('readout', `${about.kind === 'value' ? `${text}${of} at ` : ''}${place}, ${time}`);
+  }
+
+  // Plots what was clicked, unless another click makes it a double click.
+  click(event) {
+    clearTimeout(this.clicked);
+    if (event.detail > 1 || this.source.wasDragged?.()) return;
+    this.clicked = setTimeout(() => this.plot(event).catch(problem), DOUBLE);
   }
 
   // Plots the values of a pixel over time.
   async plot(event) {
-    const at = this.pixel(event), { about } = this;
-    if (!at || this.source.wasDragged?.() || about.kind !== 'value' || this.pictures.length < 2) return;
-    if (await this.source.plot?.(event)) return;
-    const sequence = this.sequence, values = [];
-    this.plotted = at.i;
-    for (let n = 0; n < this.pictures.length; n++) {
-      values.push((await this.source.picture(sequence, n)).planes[0][at.i]);
-      if (this.plotted !== at.i || sequence !== this.sequence) return;
+    const { sequence, index } = this, values = [];
+    if (!this.shown || this.pictures.length < 2) return;
+    this.clearSeries();
+    if (this.about.kind !== 'value') return say('readout', 'These pixels have colours and no values, so nothing is plotted.');
+    const plotted = this.plotted = {}, isWanted = () => this.plotted === plotted;
+    const { about, planes: [now] } = await this.source.whole(sequence, index, isWanted), at = this.pixel(event, about.size);
+    if (!at || Number.isNaN(now[at.i])) return say('readout', 'There is no value here, so nothing is plotted.');
+    if (await this.source.plot?.(event, isWanted)) return;
+    for (let n = 0; n < this.pictures.length && isWanted(); n++) {
+      values.push((await this.source.whole(sequence, n, isWanted)).planes[0][at.i]);
     }
-    this.drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
+    if (isWanted()) this.drawSeries(values, `${about.values || 'Values'} at pixel ${at.x}, ${at.y}`);
+  }
+
+  // Forgets a series, for its pixel shows something else now.
+  clearSeries() {
+    this.series = this.plotted = null;
+    clearTimeout(this.clicked);
+    element('series').hidden = true;
   }
 
   // A line through values; it breaks where there is none. Another marks the time.
@@ -255,9 +328,12 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// Says what went wrong. A picture that nobody wants any more is no problem.
+// Whether an error says only that something else is wanted more.
+const isPassing = error => error.name === 'AbortError' || error.constructor.name === 'Stale';
+
+// Says what went wrong.
 function problem(error) {
-  if (error.name !== 'AbortError' && error.constructor.name !== 'Stale') element('readout').textContent = `Cannot do this: ${error.message}`;
+  if (!isPassing(error)) say('readout', `Cannot do this: ${error.message}`);
 }
 
 // Round values within the range, no more than about seven.

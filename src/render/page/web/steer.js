@@ -1,18 +1,28 @@
 // What a user does to the camera and the scene of a live page.
 
+const AXES = ['x', 'y', 'z'];
+
+// What a click does in each mode.
+const CLICKS = {
+  mean: 'A click plots the pixel over time.', mip: 'A click plots the pixel over time.',
+  slice: 'A click plots the point over time.', error: 'A click plots the error of the pixel over time.',
+};
+
 class Steering {
   constructor(player) {
     this.player = player;
     this.live = player.source;
     document.documentElement.classList.add('live');
     Object.assign(this.live, {
-      changed: () => player.show(),
+      changed: () => { this.showSide(); player.show(); },
+      moved: () => player.clearSeries(),
+      drawn: shown => this.follow(shown),
       colours: () => this.colours(),
       ranged: range => { if (this.live.look.mode === 'composite') this.live.change({ range }, false); },
-      reset: () => { if (this.live.look.mode === 'composite') this.live.change({ range: null }, false); },
+      reset: () => { if (this.live.look.mode === 'composite') this.choose(false); },
       wasDragged: () => this.dragged > 4,
       place: event => this.place(event),
-      plot: event => this.plot(event),
+      plot: (event, isWanted) => this.plot(event, isWanted),
     });
     this.pointers = new Map();
     this.listenToPicture();
@@ -28,7 +38,16 @@ class Steering {
     on('dblclick', () => this.live.change(this.live.home(), false));
     on('contextmenu', event => event.preventDefault());
     document.addEventListener('keydown', event => this.key(event));
-    window.addEventListener('resize', () => this.live.change({}, false));
+    this.size = String(this.live.fullSize());
+    new ResizeObserver(() => this.resize()).observe(element('frame-of-picture'));
+  }
+
+  // Asks for pictures that fill their place.
+  resize() {
+    const size = String(this.live.fullSize());
+    if (size === this.size) return;
+    this.size = size;
+    this.live.change({}, false);
   }
 
   // World units of a pixel on the screen.
@@ -55,22 +74,26 @@ class Steering {
 
   place(event) {
     const point = this.point(event), { origin, spacing, axes } = this.live.facts;
-    return point && axes.map(({ name, unit, at }, n) => {
-      const voxel = Math.min(Math.max((point[n] - origin[n]) / spacing[n], 0), at.length - 1), below = Math.floor(voxel);
-      const value = at[below] + (voxel - below) * ((at[below + 1] ?? at[below]) - at[below]);
-      return `${name} ${shortNumber(value)}${unit && ` ${unit}`}`;
-    }).join(', ');
+    return point && axes.map(({ name }, n) => `${name} ${this.coordinate(n, (point[n] - origin[n]) / spacing[n])}`).join(', ');
+  }
+
+  // The coordinate of a voxel, or of a place between two, with its unit.
+  coordinate(axis, voxel) {
+    const { unit, at } = this.live.facts.axes[axis], within = Math.min(Math.max(voxel, 0), at.length - 1), below = Math.floor(within);
+    const value = at[below] + (within - below) * ((at[below + 1] ?? at[below]) - at[below]);
+    return `${shortNumber(value)}${unit && ` ${unit}`}`;
   }
 
   // Plots the series of a point of a slice, from the file.
-  async plot(event) {
-    const point = this.point(event), { origin, spacing, dims } = this.live.facts;
+  async plot(event, isWanted) {
+    const point = this.point(event), { origin, spacing, dims } = this.live.facts, place = this.place(event);
     if (!point) return false;
     const share = point.map((at, axis) => dims[axis] > 1 ? Math.min(Math.max((at - origin[axis]) / (spacing[axis] * (dims[axis] - 1)), 0), 1) : 0);
     const answer = await fetch('series', { method: 'POST', body: JSON.stringify(share) });
     if (!answer.ok) return false; // frames have no series of their own: the pixel's is plotted
+    if (!isWanted()) return true;
     const lines = (await answer.text()).trim().split('\n').slice(1);
-    this.player.drawSeries(lines.map(line => Number(line.split(',').at(-1) || NaN)), `${this.live.facts.values || 'Values'} at ${this.place(event)}`);
+    this.player.drawSeries(lines.map(line => Number(line.split(',').at(-1) || NaN)), `${this.live.facts.values || 'Values'} at ${place}`);
     return true;
   }
 
@@ -86,7 +109,6 @@ class Steering {
     const { view, center } = this.live.look, height = element('picture').getBoundingClientRect().height;
     const moved = () => beside(center, view, [-by[0] * this.unit(), by[1] * this.unit()]);
     this.live.change(isMove ? { center: moved() } : { view: turned(view, by, height) }, true);
-    element('side').value = 'free';
   }
 
   // Two fingers zoom by the change of their distance.
@@ -105,7 +127,7 @@ class Steering {
   }
 
   key(event) {
-    if (event.target.matches('input, select, textarea') || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (isForControl(event)) return;
     const box = element('picture').getBoundingClientRect(), middle = { clientX: box.left + box.width / 2, clientY: box.top + box.height / 2 };
     const turn = by => this.live.change({ view: turned(this.live.look.view, by, box.height) }, true);
     const actions = {
@@ -118,10 +140,12 @@ class Steering {
   listenToControls() {
     const on = (id, event, action) => element(id).addEventListener(event, action);
     element('side').replaceChildren(...Object.keys(SIDES).map(name => new Option(name)));
-    element('side').value = 'free';
     on('side', 'change', () => this.live.change({ view: SIDES[element('side').value] ?? this.live.look.view }, false));
+    this.showSide();
     for (const id of ['mode', 'shade', 'around', 'white']) on(id, 'change', () => this.choose(false));
-    for (const axis of 'xyz') {
+    for (const [n, axis] of AXES.entries()) {
+      say(`name-${axis}`, this.live.facts.axes[n].name);
+      element(`place-${axis}`).ariaLabel = `place along ${this.live.facts.axes[n].name}`;
       on(`slice-${axis}`, 'change', () => this.choose(false));
       on(`place-${axis}`, 'input', () => { element(`slice-${axis}`).checked = true; this.choose(true); });
     }
@@ -131,23 +155,69 @@ class Steering {
     on('save-page', 'click', () => this.save('page.html'));
     on('save-movie', 'click', () => this.save('movie.mp4'));
     this.opacity = new OpacityEditor(points => this.live.change({ opacity: points }, true));
+    this.showControls('mean');
   }
 
-  // Shows what the controls say.
-  choose(isMoving) {
-    const mode = element('mode').value, [low, high] = this.live.facts.range ?? this.live.about.range;
-    const iso = Number((low + element('iso').valueAsNumber * (high - low)).toPrecision(4));
-    const slices = [...'xyz'].filter(axis => element(`slice-${axis}`).checked).map(axis => [axis, element(`place-${axis}`).valueAsNumber]);
+  // Names the side that is seen, if it has a name.
+  showSide() {
+    const { view } = this.live.look, named = Object.keys(SIDES).find(name => String(SIDES[name]) === String(view));
+    element('side').value = named ?? 'free';
+  }
+
+  // Shows the controls of a mode, and what they say.
+  showControls(mode) {
     element('iso-control').hidden = mode !== 'iso';
     element('slice-control').hidden = mode !== 'slice';
     element('shade-control').hidden = element('opacity-editor').hidden = mode !== 'composite';
-    element('iso-value').textContent = shortNumber(iso);
+    say('help-click', this.player.pictures.length > 1 ? CLICKS[mode] ?? '' : '');
+    const ticked = AXES.filter(axis => element(`slice-${axis}`).checked);
+    for (const [n, axis] of AXES.entries()) {
+      const box = element(`slice-${axis}`);
+      box.disabled = ticked.length === 1 && box.checked;
+      box.title = box.disabled ? 'One slice stays: tick another one first' : '';
+      say(`at-${axis}`, this.coordinate(n, element(`place-${axis}`).valueAsNumber * (this.live.facts.dims[n] - 1)));
+    }
+    for (const [id, what] of [['save-page', 'page'], ['save-movie', 'movie (by ffmpeg)']]) {
+      element(id).disabled = mode === 'error';
+      element(id).title = mode === 'error' ? `A ${id.slice(5)} would show the mean and not its error: save the picture` : `Save all frames of this view as a ${what}`;
+    }
     if (mode === 'composite') this.opacity.open();
-    const changes = { mode, iso: mode === 'iso' ? [iso] : [], slices: mode === 'slice' ? slices : [], shade: element('shade').checked };
-    if (mode === 'slice' && !slices.length) return;
-    const isComposite = mode === 'composite', map = isComposite ? element('map').value : undefined;
-    const range = isComposite ? this.live.look.range : null;
+  }
+
+  // Follows the picture that is drawn.
+  follow({ about, planes }) {
+    element('iso-note').hidden = about.mode !== 'iso' || planes[3].some(opacity => opacity > 0.01);
+    if (about.mode === 'composite') this.opacity.follow(this.live.look.opacity ? null : about.opacity, about.range);
+  }
+
+  // Shows what the controls say.
+  async choose(isMoving) {
+    const mode = element('mode').value;
+    this.showControls(mode);
+    if (mode === 'iso') await (this.isoRange ??= this.beginIso());
+    if (element('mode').value !== mode) return;
+    const slices = AXES.filter(axis => element(`slice-${axis}`).checked).map(axis => [axis, element(`place-${axis}`).valueAsNumber]);
+    const changes = { mode, iso: mode === 'iso' ? [await this.iso()] : [], slices: mode === 'slice' ? slices : [], shade: element('shade').checked };
+    const isComposite = mode === 'composite', { chosen } = this.player, { maps } = this.live.facts;
+    const map = isComposite && chosen.map in maps ? chosen.map : undefined, range = isComposite ? chosen['of composite']?.range ?? null : null;
     this.live.change({ ...changes, map, range, annotate: element('around').checked, light: element('white').checked }, isMoving);
+  }
+
+  // The value of the isosurface.
+  async iso() {
+    const [low, high] = await this.isoRange, iso = Number((low + element('iso').valueAsNumber * (high - low)).toPrecision(4));
+    element('iso-value').textContent = shortNumber(iso);
+    return iso;
+  }
+
+  // The range of isosurfaces. Begins at one that is in the frame that is seen, unless the user is faster.
+  async beginIso() {
+    const { index } = this.player, slider = element('iso'), before = slider.value;
+    this.live.halt();
+    const range = this.live.facts.range ?? (await howCommon())?.range ?? this.live.first.range;
+    const { surface } = await howCommon({ frame: index }) ?? {};
+    if (surface != null && slider.value === before) slider.value = (surface - range[0]) / (range[1] - range[0]);
+    return range;
   }
 
   // The colours of the page, for a picture made elsewhere.
@@ -160,69 +230,14 @@ class Steering {
     try {
       const text = await (await this.live.made('command', 'picture.png')).text();
       await navigator.clipboard.writeText(text);
-      element('readout').textContent = `Copied: ${text}`;
+      say('readout', `Copied: ${text}`);
     } catch (error) { problem(error); }
   }
 
   async save(file) {
     try {
       download(await (await this.live.made('save', file)).blob(), file);
-      element('readout').textContent = `Saved ${file}`;
+      say('readout', `Saved ${file}`);
     } catch (error) { problem(error); }
-  }
-}
-
-// Points of opacity over shares of the range, in front of how common values are.
-class OpacityEditor {
-  constructor(changed) {
-    this.changed = changed;
-    this.points = [[0, 0], [1, 0.6]];
-    const plot = element('opacity');
-    plot.addEventListener('pointerdown', event => { this.held = event.target.tagName === 'circle' ? Number(event.target.dataset.n) : null; });
-    plot.addEventListener('pointermove', event => { if (this.held != null && event.buttons) this.move(event); });
-    plot.addEventListener('pointerup', () => { this.held = null; });
-    plot.addEventListener('dblclick', event => this.toggle(event));
-    element('opacity-auto').addEventListener('click', () => this.changed(null));
-  }
-
-  async open() {
-    if (this.isOpen) return;
-    this.isOpen = true;
-    const answer = await fetch('histogram');
-    this.counts = answer.ok ? await answer.json() : [];
-    this.draw();
-  }
-
-  at({ clientX, clientY }) {
-    const box = element('opacity').getBoundingClientRect(), within = share => Number(Math.min(Math.max(share, 0), 1).toFixed(3));
-    return [within((clientX - box.left) / box.width), within(1 - (clientY - box.top) / box.height)];
-  }
-
-  move(event) {
-    const [share, opacity] = this.at(event), n = this.held, last = this.points.length - 1;
-    const low = n ? this.points[n - 1][0] + 0.002 : 0, high = n < last ? this.points[n + 1][0] - 0.002 : 1;
-    this.points[n] = [n === 0 ? 0 : n === last ? 1 : Math.min(Math.max(share, low), high), opacity];
-    this.draw();
-    this.changed(this.points.map(point => [...point]));
-  }
-
-  toggle(event) {
-    const n = event.target.tagName === 'circle' ? Number(event.target.dataset.n) : null, last = this.points.length - 1;
-    if (n !== null && n > 0 && n < last) this.points.splice(n, 1);
-    if (n === null && this.points.length < 16) this.points = [...this.points, this.at(event)].sort((a, b) => a[0] - b[0]);
-    this.draw();
-    this.changed(this.points.map(point => [...point]));
-  }
-
-  draw() {
-    const most = Math.log1p(Math.max(...this.counts, 1)), width = 600 / Math.max(this.counts.length, 1);
-    const bars = this.counts.map((count, n) => {
-      const height = 100 * Math.log1p(count) / most;
-      return shape('rect', { x: n * width, y: 105 - height, width, height });
-    });
-    const place = ([share, opacity]) => [600 * share, 105 - 100 * opacity];
-    const line = shape('polyline', { points: this.points.map(place).join(' ') });
-    const dots = this.points.map((point, n) => shape('circle', { cx: place(point)[0], cy: place(point)[1], r: 7, 'data-n': n }));
-    element('opacity').replaceChildren(...bars, line, ...dots);
   }
 }

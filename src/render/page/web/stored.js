@@ -8,7 +8,8 @@ const bytesOf = base64 => Uint8Array.from(atob(base64), letter => letter.charCod
 class Stored {
   constructor(about) {
     this.about = about;
-    const { maps, sequences } = this.about;
+    const { maps, sequences, settings } = this.about;
+    this.about.hasBar = settings?.mode === 'composite';
     for (const name in maps) maps[name] = bytesOf(maps[name]);
     const pictures = list => list.map(([view, frame]) => ({ view, frame }));
     this.sequences = sequences.map(({ label, pictures: list }) => ({ label, pictures: pictures(list) }));
@@ -27,6 +28,8 @@ class Stored {
     const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
     return { planes: pictures[index - block.first], about: this.about, backdrop };
   }
+
+  whole(sequence, index) { return this.picture(sequence, index); }
 
   unpack(block) {
     const found = this.unpacked.get(block) ?? readBlock(bytesOf(block.script.textContent));
