@@ -1,12 +1,10 @@
 //! Conversions of what Python holds.
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
-use crate::described::GivenValues;
-use crate::errors::raised;
-use crate::frames::{FrameReader, Raised};
-use crate::job;
+use crate::described::{GivenValues, given_attributes};
+use crate::frames::FrameReader;
+use crate::job::{self, Caller};
 use crate::named::{GivenArray, PythonArrays};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -43,16 +41,16 @@ pub(crate) struct Settings {
 const SHARE: usize = 4;
 
 impl Settings {
-    fn bound(&self) -> PyResult<ErrorBound> {
+    fn bound(&self) -> Result<ErrorBound> {
         match self.bound.as_str() {
             "pointwise" => Ok(ErrorBound::Pointwise),
             "rms" => Ok(ErrorBound::Rms),
             "relative" => Ok(ErrorBound::Relative { floor: self.floor }),
-            other => Err(PyValueError::new_err(format!("bound: 'pointwise', 'rms' or 'relative', not {other:?}"))),
+            other => Err(Error::setting("bound", format!("'pointwise', 'rms' or 'relative', not {other:?}"))),
         }
     }
 
-    fn config(&self, source: &dyn FrameSource) -> PyResult<ConvertConfig> {
+    fn config(&self, source: &dyn FrameSource) -> Result<ConvertConfig> {
         let archive = source.archive();
         let is_declared = archive.missing.is_some() || self.missing_value.is_some();
         let missing = match self.missing.as_deref() {
@@ -60,7 +58,7 @@ impl Settings {
             Some("error") => MissingPolicy::Error,
             None if is_declared => MissingPolicy::Mask,
             None => MissingPolicy::Error,
-            Some(other) => return Err(PyValueError::new_err(format!("missing: 'error' or 'mask', not {other:?}"))),
+            Some(other) => return Err(Error::setting("missing", format!("'error' or 'mask', not {other:?}"))),
         };
         Ok(ConvertConfig {
             window: self.window,
@@ -103,21 +101,21 @@ impl Settings {
         }
     }
 
-    /// Converts what was opened. Exceptions of the frames come before those of the conversion.
+    /// Opens frames and converts them. `open` may call Python.
     fn run(
         &self,
         py: Python<'_>,
-        source: Result<Box<dyn FrameSource>>,
-        raised_by_frames: &Raised,
+        open: impl FnOnce(Caller) -> Result<Box<dyn FrameSource>> + Send,
         report: Option<&Py<PyAny>>,
     ) -> PyResult<Converted> {
-        let first = |error: PyErr| raised_by_frames.take().unwrap_or(error);
-        let mut source = source.map_err(|e| first(raised(e)))?;
-        let config = self.config(source.as_ref())?;
-        let mut notes: Vec<String> = source.archive().notes.iter().map(|note| note.text.clone()).collect();
-        let done = job::run(py, report, |progress| self.convert(source.as_mut(), &config, progress)).map_err(first)?;
-        notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(|warning| warning.text.clone())));
-        Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
+        job::run(py, report, |progress, caller| {
+            let mut source = open(caller)?;
+            let config = self.config(source.as_ref())?;
+            let mut notes: Vec<String> = source.archive().notes.iter().map(|note| note.text.clone()).collect();
+            let done = self.convert(source.as_mut(), &config, progress)?;
+            notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(|warning| warning.text.clone())));
+            Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
+        })
     }
 }
 
@@ -148,14 +146,12 @@ pub(crate) fn convert_frames(
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
     let Layout { dims, sample, spacing, origin, times, time_unit } = layout;
-    let kept = Raised::default();
     let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
     let times = times.map(|times| GivenTimes::List(times.into()));
     let (dims, memory) = (Some(dims), settings.memory / SHARE);
     let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
-    let reader = FrameReader::new(iterator, kept.clone());
-    let source = py.detach(|| source::open_stream(reader, &options));
-    settings.run(py, source, &kept, report.as_ref())
+    let open = |caller| source::open_stream(FrameReader::new(iterator, caller), &options);
+    settings.run(py, open, report.as_ref())
 }
 
 /// Which variable is converted.
@@ -180,10 +176,13 @@ pub(crate) fn convert_arrays(
     settings: Settings,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let kept = Raised::default();
-    let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(&arrays, &attributes, read, kept.clone())?);
+    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
+    let attributes = given_attributes(&attributes)?;
     let Chosen { source: name, variable, axes } = chosen;
     let options = OpenOptions { variable, axes, memory: settings.memory / SHARE, ..OpenOptions::default() };
-    let source = py.detach(|| source::open_arrays(Path::new(&name), &arrays, &options));
-    settings.run(py, source, &kept, report.as_ref())
+    let open = |caller| {
+        let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
+        source::open_arrays(Path::new(&name), &arrays, &options)
+    };
+    settings.run(py, open, report.as_ref())
 }

@@ -171,7 +171,9 @@ class Allowed:
             raise ValueError("tolerance is a share of a range, and max_error is in the samples' unit; give one")
         tolerance, error = (_of_variable(name, getattr(self, name), variable) for name in ("tolerance", "max_error"))
         exact = 0.0 if error is not None else 0.01
-        return Settings(**{**asdict(settings), "tolerance": exact if tolerance is None else tolerance, "max_error": error})
+        return Settings(
+            **{**asdict(settings), "tolerance": exact if tolerance is None else tolerance, "max_error": error}
+        )
 
 
 def _of_variable(name: str, given: float | dict[str, float] | None, variable: str | None) -> float | None:
@@ -263,8 +265,9 @@ def _sample(dtype: Any) -> str:
 def _chunk(array: Any) -> tuple[int, ...] | None:
     """Lengths of the pieces that an array is made of: Dask's or Zarr's."""
     chunk = getattr(array, "chunksize", None) or getattr(array, "chunks", None)
-    is_plain = isinstance(chunk, tuple) and all(isinstance(n, (int, np.integer)) for n in chunk)
-    return tuple(int(n) for n in chunk) if is_plain else None
+    if not isinstance(chunk, tuple) or not all(isinstance(n, (int, np.integer)) for n in chunk):
+        return None
+    return tuple(int(n) for n in chunk)
 
 
 _COPIES = 8
