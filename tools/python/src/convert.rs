@@ -1,6 +1,7 @@
 //! Conversions of what Python holds.
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
+use crate::advice;
 use crate::described::{GivenValues, given_attributes};
 use crate::frames::FrameReader;
 use crate::job::{self, Caller};
@@ -111,9 +112,9 @@ impl Settings {
         job::run(py, report, |progress, caller| {
             let mut source = open(caller)?;
             let config = self.config(source.as_ref())?;
-            let mut notes: Vec<String> = source.archive().notes.iter().map(|note| note.text.clone()).collect();
+            let mut notes: Vec<String> = source.archive().notes.iter().map(advice::of_note).collect();
             let done = self.convert(source.as_mut(), &config, progress)?;
-            notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(|warning| warning.text.clone())));
+            notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(advice::of_note)));
             Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
         })
     }

@@ -3,6 +3,7 @@
 //! Python names axes, chooses items and builds objects. This half moves numbers: it reads into arrays of numpy, takes frames
 //! from Python, and releases the interpreter's lock meanwhile.
 
+mod advice;
 mod convert;
 mod described;
 mod errors;
