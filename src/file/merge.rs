@@ -56,7 +56,7 @@ impl Place {
             let frames = start.parse().ok()?..end.parse().ok()?;
             Some(Self { number: number.parse().ok()?, of: of.parse().ok()?, frames, all: all.parse().ok()? })
         });
-        let place = place.ok_or_else(|| Error::path(file.path(), "is no shard: convert --shard makes shards"))?;
+        let place = place.ok_or_else(|| Error::path(file.path(), "is no shard of an archive"))?;
         let frames = file.frames() as u64;
         match place.frames.end.checked_sub(place.frames.start) == Some(frames) {
             true => Ok(place),

@@ -107,6 +107,7 @@ fn prepared() -> Work {
     frames.write_frames(&work, "demo-output/frames");
     Archive::smooth([12, 10, 8], 8).write_frames(&work, "more");
     Archive::smooth([9, 8, 7], 8).write_frames(&work, "signed");
+    work.write("long.npy", Archive::smooth([12, 10, 8], 64).npy());
     work.write("other.raw", Archive::smooth([32, 32, 16], 40).bytes());
     for (name, input) in [
         ("run.nc", "netcdf/netcdf4.nc"),

@@ -53,8 +53,6 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     args.common.report(&report, args.output == Path::new(STANDARD))?;
     match blocks_lost {
         0 => Ok(()),
-        lost => {
-            Err(Error::input(&args.output, format!("{lost} blocks are lost, since they are damaged in the shards")))
-        }
+        lost => Err(Error::input(&args.output, format!("blocks of damaged shards are lost: {lost}"))),
     }
 }

@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat::base::progress::Progress;
 use wavesplat::base::sample::SampleType;
+use wavesplat::convert::shard::{Shard, sharded};
 use wavesplat::convert::{Bound as ErrorBound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, open_partial};
+use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{self, FrameSource, GivenTimes, NamedArrays, OpenOptions};
 use wavesplat::{Error, Result};
@@ -33,6 +35,9 @@ pub(crate) struct Settings {
     missing_value: Option<f64>,
     clip: bool,
     window: usize,
+    chain: usize,
+    /// Which of how many shards, from 1.
+    shard: Option<(usize, usize)>,
     block: Option<usize>,
     level: i32,
     memory: usize,
@@ -63,6 +68,7 @@ impl Settings {
         };
         Ok(ConvertConfig {
             window: self.window,
+            chain: self.chain,
             max_error: self.max_error,
             bound: self.bound()?,
             range: self.range,
@@ -102,6 +108,29 @@ impl Settings {
         }
     }
 
+    /// The frames of the shard, if one is meant.
+    fn sharded(
+        &self,
+        source: Box<dyn FrameSource>,
+        config: ConvertConfig,
+    ) -> Result<(Box<dyn FrameSource>, ConvertConfig)> {
+        let Some((number, of)) = self.shard else { return Ok((source, config)) };
+        if !(1..=of).contains(&number) {
+            return Err(Error::setting(
+                "shard",
+                format!("takes (I, N), the I-th of N, from (1, {of}) to ({of}, {of})"),
+            ));
+        }
+        if config.range.is_none() && config.max_error.is_none() {
+            return Err(Error::setting(
+                "shard",
+                "needs range=... or max_error=..., since a shard does not know all frames",
+            ));
+        }
+        let (source, settings) = sharded(source, Shard { number, of }, (config.window, config.chain))?;
+        Ok((source, ConvertConfig { settings, ..config }))
+    }
+
     /// Opens frames and converts them. `open` may call Python.
     fn run(
         &self,
@@ -110,8 +139,9 @@ impl Settings {
         report: Option<&Py<PyAny>>,
     ) -> PyResult<Converted> {
         job::run(py, report, |progress, caller| {
-            let mut source = open(caller)?;
+            let source = open(caller)?;
             let config = self.config(source.as_ref())?;
+            let (mut source, config) = self.sharded(source, config)?;
             let mut notes: Vec<String> = source.archive().notes.iter().map(advice::of_note).collect();
             let done = self.convert(source.as_mut(), &config, progress)?;
             notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(advice::of_note)));
@@ -186,4 +216,24 @@ pub(crate) fn convert_arrays(
         source::open_arrays(Path::new(&name), &arrays, &options)
     };
     settings.run(py, open, report.as_ref())
+}
+
+/// Joins shards to one file, and returns a report as JSON.
+#[pyfunction]
+#[pyo3(signature = (shards, path, resume, overwrite, report_to = None))]
+pub(crate) fn merge(
+    py: Python<'_>,
+    shards: Vec<PathBuf>,
+    path: PathBuf,
+    resume: bool,
+    overwrite: bool,
+    report_to: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    job::run(py, report_to.as_ref(), |progress, _| {
+        let shards = Shards::open(&shards, progress)?;
+        let (mut out, begun) = resume::open(&path, overwrite, Earlier::by(overwrite, resume))?;
+        let report = shards.merge(begun, false, (&path, &mut out), progress)?;
+        out.commit_if(resume::check)?;
+        Ok(serde_json::to_string(&report).unwrap_or_default())
+    })
 }

@@ -18,7 +18,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _wavesplat {
     #[pymodule_export]
-    use super::convert::{convert_arrays, convert_frames};
+    use super::convert::{convert_arrays, convert_frames, merge};
     #[pymodule_export]
     use super::errors::{BoundMissedError, ChangedError, DamagedError, InputError, UnsupportedError, WavesplatError};
     #[pymodule_export]

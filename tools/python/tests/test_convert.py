@@ -224,3 +224,9 @@ def test_memory_is_bounded(tmp_path):
     before, after = json.loads(done.stdout)
     assert after - before < 16 << 10, f"{before} -> {after} KiB"
     assert wavesplat.open(tmp_path / "a.wspl").shape == (640, 64, 64, 64)
+
+
+def test_warnings_are_of_the_callers_line(tmp_path):
+    with pytest.warns(UserWarning, match="clip=True") as warned:
+        wavesplat.convert(np.abs(smooth()), tmp_path / "a.wspl", tolerance=0.05)
+    assert {warning.filename for warning in warned} == {__file__}

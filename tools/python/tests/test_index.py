@@ -86,3 +86,10 @@ def test_only_touched_blocks_are_read(path):
     assert ends.shape == (2,)
     assert one < file.file_bytes / 4
     assert file.bytes_read - opened < file.file_bytes / 2
+
+
+def test_repeated_items(pair):
+    file, decoded = pair
+    for key in ([0, 0, 2], [2, 0, 0, 1], [1, 1]):
+        np.testing.assert_array_equal(file[3, key], decoded[3, key])
+        np.testing.assert_array_equal(file[key, 3], decoded[key, 3])
