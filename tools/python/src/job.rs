@@ -3,40 +3,15 @@
 use crate::errors::raised;
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 use wavesplat::base::progress::Progress;
+use wavesplat::cli::render::Work;
 
 /// The time between two looks at the work.
 const LOOK: Duration = Duration::from_millis(50);
-
-/// How far the work is, and whether its result is wanted.
-#[derive(Debug, Default)]
-struct Job {
-    steps: AtomicU64,
-    done: AtomicU64,
-    is_cancelled: AtomicBool,
-}
-
-impl Progress for Job {
-    fn start(&self, steps: Option<u64>) {
-        self.done.store(0, Ordering::Relaxed);
-        self.steps.store(steps.unwrap_or(0), Ordering::Relaxed);
-    }
-
-    fn advance(&self, steps: u64) {
-        self.done.fetch_add(steps, Ordering::Relaxed);
-    }
-
-    fn finish(&self) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.is_cancelled.load(Ordering::Relaxed)
-    }
-}
 
 /// A call of Python.
 type Call = Box<dyn FnOnce(Python<'_>) + Send>;
@@ -82,7 +57,7 @@ pub(crate) fn run<T: Send>(
     report: Option<&Py<PyAny>>,
     work: impl FnOnce(&dyn Progress, Caller) -> wavesplat::Result<T> + Send,
 ) -> PyResult<T> {
-    let (job, (calls, called)) = (Job::default(), channel());
+    let (job, (calls, called)) = (Work::default(), channel());
     let caller = Caller { calls, raised: Arc::default() };
     let raised_by_calls = caller.raised.clone();
     let (done, raising) = py.detach(|| {
@@ -103,7 +78,7 @@ pub(crate) fn run<T: Send>(
 }
 
 /// Makes calls and reports progress until nobody can call any more. Returns the exception that cancelled the work.
-fn serve(called: &Receiver<Call>, job: &Job, report: Option<&Py<PyAny>>) -> Option<PyErr> {
+fn serve(called: &Receiver<Call>, job: &Work, report: Option<&Py<PyAny>>) -> Option<PyErr> {
     let (mut raising, mut looked) = (None, Instant::now());
     loop {
         match called.recv_timeout(LOOK) {
@@ -113,14 +88,13 @@ fn serve(called: &Receiver<Call>, job: &Job, report: Option<&Py<PyAny>>) -> Opti
         }
         if raising.is_none() && looked.elapsed() >= LOOK {
             raising = Python::attach(|py| look(py, job, report)).err();
-            job.is_cancelled.store(raising.is_some(), Ordering::Relaxed);
+            raising.iter().for_each(|_| job.cancel());
             looked = Instant::now();
         }
     }
 }
 
-fn look(py: Python<'_>, job: &Job, report: Option<&Py<PyAny>>) -> PyResult<()> {
+fn look(py: Python<'_>, job: &Work, report: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
-    let [done, steps] = [&job.done, &job.steps].map(|count| count.load(Ordering::Relaxed));
-    report.map_or(Ok(()), |report| report.call1(py, (done, steps)).map(drop))
+    report.map_or(Ok(()), |report| report.call1(py, job.counts()).map(drop))
 }
