@@ -38,7 +38,7 @@ impl FrameReader {
         let iterator = self.iterator.clone();
         let next = move |py: Python<'_>| {
             let next = iterator.bind(py).try_iter()?.next().transpose()?;
-            Ok(next.map(|array| array.cast_into::<PyArray1<u8>>()).transpose()?.map(Bound::unbind))
+            Ok(next.map(Bound::cast_into::<PyArray1<u8>>).transpose()?.map(Bound::unbind))
         };
         self.current = self.caller.call(next)?.map(|array| (array, 0));
         Ok(self.current.is_some())
