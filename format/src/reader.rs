@@ -1,7 +1,7 @@
 //! Reads a file: opens it, finds blocks, reads and decompresses parts. Everything is checked before it is used: length,
 //! bounds, checksum, fields, decompression into the declared and limited size, exact length, valid values.
 
-use crate::block::{BlockId, PartKind};
+use crate::block::{BlockId, EncodedBlock, EncodedPart, PartKind};
 use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::codes::sparse::{CodeBox, SparseCodes};
 use crate::description::Description;
@@ -169,6 +169,22 @@ impl<S: Storage> Reader<S> {
         self.geometry(block.id)?.check(part).map_err(|what| section.corrupt(part.offset, what))?;
         let stored = part.read(&self.storage, self.id(), block.id)?;
         decompress(&stored, part.raw_len).map_err(|what| section.corrupt(part.offset, what))
+    }
+
+    /// Reads a block as it is stored, to be written into another file. Checks its checksums, but decodes nothing.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
+    pub fn stored(&self, block: &BlockEntry) -> Result<EncodedBlock> {
+        self.check_present(block)?;
+        let geometry = self.geometry(block.id)?;
+        let part = |part: &PartEntry| {
+            let PartEntry { kind, stats, raw_len, offset, .. } = *part;
+            geometry.check(part).map_err(|what| SectionId::Part(block.id, kind).corrupt(offset, what))?;
+            Ok(EncodedPart { kind, stats, raw_len, stored: part.read(&self.storage, self.id(), block.id)? })
+        };
+        let parts = block.parts.iter().map(part).collect::<Result<_>>()?;
+        Ok(EncodedBlock { id: block.id, stats: block.stats, parts })
     }
 
     /// Fails with [`Error::Lost`] if the block is lost.

@@ -6,6 +6,12 @@ pub(crate) fn short(v: f64) -> String {
     written(rounded, 1e6)
 }
 
+/// The same with a power of ten, but for 0.
+pub(crate) fn with_power(v: f64) -> String {
+    let rounded: f64 = format!("{v:.11e}").parse().unwrap_or(v);
+    if rounded == 0.0 { "0".into() } else { format!("{rounded:e}") }
+}
+
 /// A number with at most so many decimals.
 pub(super) fn rounded(v: f64, decimals: usize) -> String {
     written(format!("{v:.decimals$}").parse().unwrap_or(v), 1e12)

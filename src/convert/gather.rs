@@ -213,7 +213,8 @@ impl<'a> WindowReader<'a> {
         let delta = self.delta(&channels, of_window, range)?;
         let promise = ErrorBound { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(of_window);
-        let before = self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(ANEW) && scheme.pyramid.is_some());
+        let before =
+            self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(config.chain) && scheme.pyramid.is_some());
         let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
         let scheme = SchemeSelector {
             config,
@@ -349,6 +350,3 @@ fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindo
         |colour_transform| (0..plan.channels()).map(move |channel| ColourWindow { window, colour_transform, channel });
     plan.colour_transform.into_iter().flat_map(of).collect()
 }
-
-/// Every this many windows, the scheme is chosen anew; otherwise the choice begins with that of the window before.
-const ANEW: usize = 8;

@@ -25,6 +25,7 @@ mod record;
 #[doc(hidden)]
 pub mod sampled;
 mod settings;
+pub mod shard;
 mod smoothness;
 mod task;
 mod to_file;
@@ -80,6 +81,8 @@ pub enum MissingPolicy {
 pub struct ConvertConfig {
     /// Restricts the choice of scheme. Default: the smallest is found for every window.
     pub coding: SchemeConstraint,
+    /// Windows in a row of which each may begin with the scheme of the one before. Shards are whole chains. Default: 8.
+    pub chain: usize,
     /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
     pub window: usize,
     /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
@@ -119,6 +122,7 @@ impl ConvertConfig {
     pub fn new(tolerance: f64) -> Self {
         Self {
             coding: SchemeConstraint::AUTO,
+            chain: CHAIN,
             window: 32,
             tolerance,
             max_error: None,
@@ -156,6 +160,9 @@ impl ConvertConfig {
         Self { max_error: Some(max_error), ..Self::new(0.0) }
     }
 }
+
+/// The default of [`ConvertConfig::chain`].
+pub(crate) const CHAIN: usize = 8;
 
 /// The report of a conversion.
 #[derive(Debug, Clone, Serialize)]

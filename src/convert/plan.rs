@@ -60,6 +60,9 @@ impl<'a> Plan<'a> {
     ) -> Result<Self> {
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
         check_bound(config, colour_transform.is_some())?;
+        if config.chain == 0 {
+            return Err(Error::setting("chain", "takes 1 or more windows"));
+        }
         let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
         if !Self::takes(config, edge) {

@@ -1,6 +1,6 @@
 //! The settings stored in a file: enough to verify it against its source, and to append to it.
 
-use super::{ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
+use super::{CHAIN, ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use crate::codec::CLIP;
 use crate::codec::bound::Bound;
 use crate::codec::scheme::Stencil;
@@ -30,6 +30,7 @@ pub(super) fn stored_settings(
         .chain(more)
         .chain(range)
         .chain(max_error)
+        .chain((config.chain != CHAIN).then(|| ("chain", config.chain.to_string())))
         .chain(config.clip.then(|| (CLIP.0, CLIP.1.to_string())))
         .chain(colour_transform.into_iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
@@ -60,6 +61,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
     };
     Some(ConvertConfig {
         coding: SchemeConstraint { basis, space },
+        chain: named("chain").map_or(Some(CHAIN), number)?,
         window: number(named("window")?)?,
         tolerance: file.tolerance,
         max_error,
@@ -109,7 +111,9 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
 }
 
 /// Settings of a file that are options by the same names.
-const STORED: [&str; 21] = [
+const STORED: [&str; 23] = [
+    "chain",
+    "shard",
     "clip",
     "range",
     "missing",
@@ -185,7 +189,7 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 }
 
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
-const OWN: [&str; 8] = [MAX_ERROR, CLIP.0, "basis", "space", "window", "level", "missing", "range"];
+const OWN: [&str; 9] = [MAX_ERROR, CLIP.0, "chain", "basis", "space", "window", "level", "missing", "range"];
 
 /// The stored name of a basis, which is that of the option. No basis means that any is allowed.
 fn basis_name(basis: Option<Basis>) -> &'static str {

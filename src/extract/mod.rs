@@ -119,16 +119,22 @@ pub fn extract_to(
     progress.start(Some(config.frames.len() as u64));
     let mut report = ExtractReport::default();
     let pieces = Pieces::new(file, config)?;
-    let mut bytes = Vec::new();
     let all = config.frames.len() * config.region.voxels() * file.sample().size();
-    for piece in pieces.list(file, config) {
+    let mut buffers = Vec::new();
+    for together in pieces.list(file, config).chunks(pieces.together(file, config)) {
         progress.check()?;
-        read_piece(file, config, &piece, pieces.blocks, &mut bytes, &mut report)?;
-        write(&bytes)?;
-        report.bytes += bytes.len() as u64;
-        let done = (report.bytes as u128 * config.frames.len() as u128 / all as u128) as usize;
-        progress.advance((done - report.frames) as u64);
-        report.frames = done;
+        buffers.resize_with(together.len(), Vec::new);
+        let read = together.par_iter().zip(&mut buffers);
+        let read = read.map(|(piece, bytes)| read_piece(file, config, piece, pieces.blocks, bytes));
+        for (read, bytes) in read.collect::<Result<Vec<_>>>()?.into_iter().zip(&buffers) {
+            write(bytes)?;
+            report.blocks_read += read.blocks_read;
+            report.bytes_read += read.bytes_read;
+            report.bytes += bytes.len() as u64;
+            let done = (report.bytes as u128 * config.frames.len() as u128 / all as u128) as usize;
+            progress.advance((done - report.frames) as u64);
+            report.frames = done;
+        }
     }
     file.check_unchanged()?;
     (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
@@ -164,6 +170,12 @@ impl Pieces {
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
         let planes = available / plane.max(1);
         Ok(Self { blocks, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })
+    }
+
+    /// Pieces that are decoded side by side: several if each touches few blocks, as the series of a voxel does.
+    fn together(&self, file: &CoefficientFile, config: &ExtractConfig) -> usize {
+        let touched = file.blocks.touching(&config.region).take(self.blocks).count();
+        (self.blocks / touched.max(1)).max(1)
     }
 
     fn list(&self, file: &CoefficientFile, config: &ExtractConfig) -> Vec<Piece> {
@@ -210,24 +222,24 @@ fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
 
-/// Fills `out` with the samples of a piece.
+/// Fills `out` with the samples of a piece. Reports the blocks that it read.
 fn read_piece(
     file: &CoefficientFile,
     config: &ExtractConfig,
     piece: &Piece,
     at_once: usize,
     out: &mut Vec<u8>,
-    report: &mut ExtractReport,
-) -> Result<()> {
+) -> Result<ExtractReport> {
+    let mut report = ExtractReport::default();
     let strides = config.order.strides(piece.frames.len(), &piece.region);
     out.resize(piece.frames.len() * piece.region.voxels() * file.sample().size(), 0); // blocks overwrite all of it
     let mut first = 0;
     for frames in piece.frames.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)) {
         let target = Target { strides, region: piece.region, first };
-        read_window(file, config.channel, frames, &target, at_once, out, report)?;
+        read_window(file, config.channel, frames, &target, at_once, out, &mut report)?;
         first += frames.len();
     }
-    Ok(())
+    Ok(report)
 }
 
 /// Where samples go in the array of a piece.

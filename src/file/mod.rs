@@ -12,6 +12,7 @@ pub mod report;
 pub mod verify;
 pub mod recover;
 pub mod repack;
+pub mod merge;
 pub mod resume;
 
 pub(crate) use batch::BlockBatch;

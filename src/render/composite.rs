@@ -46,7 +46,7 @@ pub(super) fn composite(
                 Sliced { number, view, blend, behind, config, progress }.render(scene, report, &mut sink)?;
             }
             Mode::Iso { surfaces, light, .. } => {
-                let blend = Isosurfaces::new(surfaces, Shader::new(*light, view, 0.0));
+                let blend = Isosurfaces::new(surfaces, view, Shader::new(*light, view, 0.0));
                 Sliced { number, view, blend, behind: None, config, progress }.render(scene, report, &mut sink)?;
             }
             Mode::Mip { .. } => {

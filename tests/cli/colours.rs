@@ -211,3 +211,59 @@ fn annotations_keep_the_volume_free() {
         assert!(annotated != alone);
     }
 }
+
+/// The title that a PNG holds in UTF-8, and in Latin-1.
+fn titles(bytes: &[u8]) -> [Option<String>; 2] {
+    let reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let (key, info) = ("wavesplat:title", reader.info());
+    let new = info.utf8_text.iter().find(|text| text.keyword == key).map(|text| text.get_text().unwrap());
+    let old = info.uncompressed_latin1_text.iter().find(|text| text.keyword == key).map(|text| text.text.clone());
+    [new, old]
+}
+
+#[test]
+fn titles_have_any_letters() {
+    let work = Work::with_file("");
+    for (title, is_new) in [("σ", true), ("a–b", true), ("10⁶水", true), ("Größe:µm", false), ("plain", false)]
+    {
+        let expected = if is_new { [Some(title.to_string()), None] } else { [None, Some(title.to_string())] };
+        for (name, options) in
+            [("a.png", "--frames 2"), ("a.apng", "--frames 2:4"), ("s.png", "--frames 2:5 --format sheet")]
+        {
+            // Each run replaces the file of the one before.
+            work.render(&format!("a.wspl --size 200x160 {options} -o {name} --annotate --title {title}")).ok();
+            assert_eq!(titles(&work.read(name)), expected, "{name} {title}");
+        }
+    }
+}
+
+#[test]
+fn long_titles_are_cut_with_a_note() {
+    let work = Work::with_file("");
+    let title = ["a"; 60].join("_");
+    let draw = |size: &str, title: &str| {
+        work.render(&format!("a.wspl --frames 2 --size {size} --annotate --title {title} --force -o t.png")).ok()
+    };
+    for (size, is_cut) in [("320x240", true), ("1200x240", false), ("40x30", false)] {
+        let run = draw(size, &title);
+        assert!(run.err.contains("it shows 'a_a_") == is_cut && run.err.contains("--title") == is_cut, "{}", run.err);
+        assert_eq!(titles(&work.read("t.png"))[1].as_deref(), Some(title.as_str()), "the file keeps all of it");
+    }
+    let pixels = |title: &str| {
+        draw("512x512", title).ok();
+        decode_png(&work.read("t.png"))
+    };
+    let ([long, other], short) = (["a", "b"].map(|end| pixels(&format!("{}{end}", &title[..70]))), pixels("a"));
+    assert!(long != short && long != other, "smaller letters show all of it");
+}
+
+#[test]
+fn the_words_beside_the_bar_are_chosen() {
+    let work = Work::with_file("");
+    let shown = |options: &str| {
+        decode_png(&work.render(&format!("a.wspl --frames 2 --size 320x240 --annotate -o - {options}")).ok().out)
+    };
+    assert!(shown("--bar-title Speed") != shown("") && shown("--bar-title Speed") != shown("--bar-title Depth"));
+    let json = work.render("a.wspl --frames 2 -o t.png --annotate --bar-title Speed --json").ok().json();
+    assert_eq!(json["picture"]["bar_title"].as_str(), Some("Speed"));
+}

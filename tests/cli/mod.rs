@@ -36,6 +36,7 @@ mod recover;
 pub(crate) mod render;
 mod resume;
 mod several;
+mod shards;
 mod slices;
 mod streams;
 mod times;

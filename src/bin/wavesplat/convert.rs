@@ -10,6 +10,7 @@ use wavesplat::cli::{
     CommonArgs, InputArgs, MaxError, Pair, SelectArgs, advice, note_text, share, spare_inputs, transfer_function,
 };
 use wavesplat::colour::TransferFunction;
+use wavesplat::convert::shard::{Shard, sharded};
 use wavesplat::convert::{
     Basis, Bound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, SchemeConstraint, SpatialPredictor,
     Stencil, open_partial, resume,
@@ -31,7 +32,8 @@ Examples:
   wavesplat convert frames/ -o run.wspl --resume
   wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
   wavesplat convert run.nc -o run_%n.wspl --variable u,v,w
-  wavesplat convert old.wspl -o new.wspl",
+  wavesplat convert old.wspl -o new.wspl
+  wavesplat convert frames/ --scan scan.json --shard 3/16 -o part-3.wspl",
     after_help = after_help()
 )]
 pub(crate) struct ConvertArgs {
@@ -87,6 +89,16 @@ pub(crate) struct ConvertArgs {
     seed: Option<u64>,
     #[command(flatten)]
     select: SelectArgs,
+    /// Convert only the I-th of N runs of whole windows, for wavesplat merge. Needs --scan, --range or --max-error
+    #[arg(long, value_name = "I/N", help_heading = SHARDS)]
+    shard: Option<Shard>,
+    /// What wavesplat scan found in all frames: the range that the tolerance refers to
+    #[arg(long, value_name = "FILE", help_heading = SHARDS)]
+    scan: Option<PathBuf>,
+    /// Windows in a row of which each may begin with the coding of the one before; shards are runs of these. Smaller
+    /// numbers allow more shards and take more time
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024), help_heading = SHARDS)]
+    chain: u32,
     #[command(flatten)]
     pub(super) input: InputArgs,
     /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's
@@ -114,6 +126,7 @@ pub(crate) struct ConvertArgs {
 
 /// The headings of the help.
 const ERROR_BOUND: &str = "Error bound";
+const SHARDS: &str = "Several machines";
 const CODING: &str = "How it is coded (the defaults are good)";
 
 /// The end of the help.
@@ -193,7 +206,8 @@ fn run_one(args: &ConvertArgs) -> Result<()> {
         return args.repack(&file);
     }
     let config = args.config()?;
-    let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
+    let source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
+    let (mut source, config) = args.sharded(source, config)?;
     spare_inputs(&args.inputs, &args.output)?;
     refuse_other_format(&args.output)?;
     let config = args.of_archive(config, source.as_mut())?;
@@ -275,6 +289,42 @@ impl ConvertArgs {
         Ok(())
     }
 
+    /// The frames of a shard, and the range of all frames that a scan found.
+    fn sharded(
+        &self,
+        source: Box<dyn FrameSource>,
+        config: ConvertConfig,
+    ) -> Result<(Box<dyn FrameSource>, ConvertConfig)> {
+        let mut config = config;
+        if let Some(path) = &self.scan {
+            if config.range.is_some() || self.max_error.is_some() {
+                return Err(Error::usage(
+                    "--scan: gives the range that a tolerance refers to; leave --range and --max-error out",
+                ));
+            }
+            self.refuse_range("--scan")?;
+            let range = super::scan::read(path)?.range_of(source.archive()).map_err(|what| Error::input(path, what))?;
+            config.range = Some(range);
+        }
+        let Some(shard) = self.shard else { return Ok((source, config)) };
+        self.refuse_range("--shard")?;
+        if config.range.is_none() && self.max_error.is_none() {
+            let what = "--shard: the tolerance refers to the range of all frames, which a shard does not know";
+            return Err(Error::usage(format!("{what}: give --scan, --range or --max-error")));
+        }
+        let (source, settings) = sharded(source, shard, (config.window, config.chain))?;
+        config.settings.extend(settings);
+        Ok((source, config))
+    }
+
+    /// An error for bounds that refer to no range, which frames of other shards may change.
+    fn refuse_range(&self, option: &str) -> Result<()> {
+        match self.bound {
+            BoundName::Pointwise | BoundName::Rms => Ok(()),
+            _ => Err(Error::usage(format!("{option}: needs --bound pointwise or rms"))),
+        }
+    }
+
     /// Packs a coefficient file anew.
     fn repack(&self, file: &CoefficientFile) -> Result<()> {
         self.refuse_for_coefficients(file.path())?;
@@ -309,6 +359,8 @@ impl ConvertArgs {
             (self.block.is_some(), "--block"),
             (self.select.frames.is_some(), "--frames"),
             (self.select.region.is_some(), "--region"),
+            (self.shard.is_some(), "--shard"),
+            (self.scan.is_some(), "--scan"),
             (self.resume, "--resume"),
         ];
         match given.into_iter().find(|(given, _)| *given) {
@@ -325,6 +377,7 @@ impl ConvertArgs {
         let window = if matches!(self.basis, BasisName::Multi) { 33 } else { 32 };
         Ok(ConvertConfig {
             coding: self.coding()?,
+            chain: self.chain as usize,
             window: self.window.unwrap_or(window),
             tolerance: self.tolerance.unwrap_or(TOLERANCE),
             max_error: None, // may depend on the variable

@@ -5,7 +5,9 @@ mod append;
 mod convert;
 mod extract;
 mod info;
+mod merge;
 mod recover;
+mod scan;
 mod several;
 mod verify;
 
@@ -30,6 +32,7 @@ Examples:
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
   wavesplat recover damaged.wspl -o saved.wspl
+  wavesplat merge part-*.wspl -o run.wspl
   wavesplat convert --help",
     after_help = "wavesplat-render renders pictures of coefficient files."
 )]
@@ -46,6 +49,8 @@ enum Command {
     Verify(verify::VerifyArgs),
     Extract(extract::ExtractArgs),
     Recover(recover::RecoverArgs),
+    Scan(scan::ScanArgs),
+    Merge(merge::MergeArgs),
     #[cfg(feature = "view")]
     View(view::ViewArgs),
     /// Write completions for a shell, or man pages
@@ -68,6 +73,8 @@ fn main() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Extract(args) => extract::run(&args),
         Command::Recover(args) => recover::run(&args),
+        Command::Scan(args) => scan::run(&args),
+        Command::Merge(args) => merge::run(&args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Generate(args) => args.run(cli::command::<Cli>()),

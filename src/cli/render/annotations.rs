@@ -31,6 +31,9 @@ pub(crate) struct AnnotationArgs {
     /// Draw a title above the volume
     #[arg(long, value_name = "TEXT", help_heading = "Colour")]
     title: Option<String>,
+    /// The words beside the colour bar, instead of the name and the unit of the values
+    #[arg(long, value_name = "TEXT", help_heading = "Colour")]
+    bar_title: Option<String>,
     /// Colours of background and letters
     #[arg(long, value_enum, default_value = "dark", help_heading = "Colour")]
     theme: Theme,
@@ -72,7 +75,7 @@ impl FromStr for PartList {
 impl AnnotationArgs {
     /// Whether anything is drawn.
     pub(crate) fn is_asked(&self) -> bool {
-        self.annotate.is_some() || self.title.is_some()
+        self.annotate.is_some() || self.title.is_some() || self.bar_title.is_some()
     }
 
     /// The parts that are asked for.
@@ -86,6 +89,10 @@ impl AnnotationArgs {
         let named = [(bounds, "box"), (axes, "axes"), (triad, "triad"), (scale, "scale"), (bar, "bar"), (time, "time")];
         let names: Vec<&str> = named.into_iter().filter(|(is_drawn, _)| *is_drawn).map(|(_, name)| name).collect();
         Some(if names.is_empty() { "none".into() } else { names.join(",") })
+    }
+
+    pub(crate) fn bar_title(&self) -> Option<String> {
+        self.bar_title.clone().filter(|title| !title.is_empty())
     }
 
     pub(crate) fn title(&self) -> String {
@@ -132,13 +139,22 @@ impl Cli {
 
     /// The annotations of a run, but for the axes.
     pub(crate) fn annotation(&self, values: String, times: TimeLabels) -> Annotation {
+        let values = self.around.bar_title.clone().unwrap_or(values);
         Annotation { parts: self.parts(), title: self.around.title(), values, times, axes: None }
+    }
+
+    /// Says how much of a long title pictures show.
+    pub(crate) fn note_title(&self, annotation: &Annotation, config: &RenderConfig) {
+        let frame = config.frames.first().copied().unwrap_or(0);
+        if let Some(shown) = annotation.cut_title(self.size.0, frame).filter(|_| !self.is_page()) {
+            self.common.note(format_args!("--title: the picture is too narrow for all of it; it shows '{shown}'"));
+        }
     }
 
     /// The axes of the volume as it is drawn, with their true coordinates.
     pub(crate) fn volume_axes(&self, axes: &Axes, whole: &Grid, config: &RenderConfig) -> Result<VolumeAxes> {
         let region = self.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
-        let has_kernel = !matches!(config.mode, Mode::Planes { .. });
+        let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
         let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
         let volume = VolumeAxes { grid: *whole, region, rim, labels: axes.labels() };
         if self.parts().scale && volume.length_unit().is_none() {

@@ -123,10 +123,12 @@ impl Cli {
             slice: self.slice_texts(&axes)?,
             annotate: self.around.words(),
             title: Some(annotation.title.clone()).filter(|title| !title.is_empty()),
+            bar_title: self.around.bar_title(),
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
         };
         let annotation = Annotation { axes: Some(self.volume_axes(&axes, &whole, &config)?), ..annotation };
+        self.note_title(&annotation, &config);
         Ok(Prepared { scene, file, config, targets, colouring, provenance, annotation })
     }
 }

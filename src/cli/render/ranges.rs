@@ -299,6 +299,29 @@ impl Ranges {
                 self.positive.ok_or_else(|| Error::usage("--norm log: no value is above 0; give --norm linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
-        Ok(if lo < hi { map.suitable((lo, hi)) } else { (lo, hi) })
+        Ok(if lo < hi { map.suitable(of_noticeable_width((lo, hi))) } else { (lo, hi) })
+    }
+}
+
+/// The range around the same middle, at least as wide as a hundred thousandth of its values. What changes by less is mostly
+/// rounding, and should look constant.
+fn of_noticeable_width((lo, hi): (f64, f64)) -> (f64, f64) {
+    const LEAST: f64 = 1e-5;
+    let (middle, half) = (lo / 2.0 + hi / 2.0, LEAST / 2.0 * lo.abs().max(hi.abs()));
+    if (hi - lo) / 2.0 < half { (middle - half, middle + half) } else { (lo, hi) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_wider_than_rounding() {
+        let near = |(lo, hi): (f64, f64), (a, b): (f64, f64)| (lo - a).abs() < 1e-9 && (hi - b).abs() < 1e-9;
+        assert!(near(of_noticeable_width((300.0, 300.00003)), (299.998_515, 300.001_515)));
+        assert!(near(of_noticeable_width((-5.000_001, -5.0)), (-5.000_025_5, -4.999_975_5)));
+        for range in [(300.0, 300.1), (0.0, 1e-20), (-1e-9, 1e-9), (1.0, 1.000_011)] {
+            assert_eq!(of_noticeable_width(range), range);
+        }
     }
 }

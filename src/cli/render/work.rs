@@ -17,10 +17,15 @@ impl Work {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
+    /// The steps that are done, and all steps; 0 if their number is not known.
+    pub fn counts(&self) -> (u64, u64) {
+        (self.done.load(Ordering::Relaxed), self.steps.load(Ordering::Relaxed))
+    }
+
     /// How much of the work is done, 0 to 1, as far as that is known.
     pub fn share(&self) -> f64 {
-        let [done, steps] = [&self.done, &self.steps].map(|count| count.load(Ordering::Relaxed) as f64);
-        if steps > 0.0 { (done / steps).min(1.0) } else { 0.0 }
+        let (done, steps) = self.counts();
+        if steps > 0 { (done as f64 / steps as f64).min(1.0) } else { 0.0 }
     }
 }
 

@@ -81,11 +81,16 @@ impl Canvas<'_> {
 
     /// Writes a text around a point, if it fits in the picture and the place is free. Returns whether it does.
     pub(super) fn write(&mut self, text: &str, middle: [f64; 2]) -> bool {
-        let half = [self.letters.width(text) / 2.0, self.letters.size / 2.0];
+        self.write_in(&self.letters.clone(), text, middle)
+    }
+
+    /// The same in letters of another size.
+    pub(super) fn write_in(&mut self, letters: &Letters, text: &str, middle: [f64; 2]) -> bool {
+        let half = [letters.width(text) / 2.0, letters.size / 2.0];
         let place = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
         let fits = !text.is_empty() && self.is_free(&place);
         if fits {
-            let (letters, ink) = (self.letters.clone(), self.ink);
+            let ink = self.ink;
             letters.draw(text, middle, |x, y, share| self.put(x, y, ink, share));
             self.taken.push(place);
         }

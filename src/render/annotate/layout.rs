@@ -47,7 +47,7 @@ pub struct Margins {
 
 /// The height of a line of letters, as a share of the picture's shorter side, and the least that is legible.
 const LINE: f64 = 0.03;
-const LEAST_LINE: f64 = 10.0;
+pub(super) const LEAST_LINE: f64 = 10.0;
 
 /// Lines that a part takes: the colour bar with values and name, the values and the name of an axis, and the time.
 pub(super) const BAR: f64 = 7.0;

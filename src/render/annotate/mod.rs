@@ -7,6 +7,7 @@ mod text;
 mod ticks;
 mod canvas;
 mod layout;
+mod title;
 mod volume;
 
 pub use layout::{Margins, Parts, margins};
@@ -19,6 +20,8 @@ use crate::render::ViewReport;
 use crate::view::camera::{Camera, View};
 use canvas::{Canvas, Rectangle, over};
 use layout::{BAR, has_axes, has_bar, has_time};
+use text::{Letters, shortened};
+use title::Title;
 
 /// The annotations of a run's pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -83,7 +86,7 @@ impl Annotation {
         let Finished { pixels, size, background, frame, view, with_angles, scale, opacity } = picture;
         let mut canvas = Canvas::new(pixels, size, background);
         if has_time(size) {
-            self.draw_texts(&mut canvas, &self.labels(frame, view.filter(|_| with_angles)));
+            self.draw_texts(&mut canvas, (frame, view.filter(|_| with_angles)));
         }
         if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
             self.draw_bar(&mut canvas, scale);
@@ -141,15 +144,47 @@ impl Annotation {
     }
 
     /// The title at the top, and the longest of the labels that fits at the top left.
-    fn draw_texts(&self, canvas: &mut Canvas<'_>, labels: &[String]) {
-        let (size, width) = (canvas.letters.size, canvas.size()[0]);
-        for text in labels {
-            let half = canvas.letters.width(text) / 2.0;
-            if canvas.write(text, [0.6 * size + half, size]) {
+    fn draw_texts(&self, canvas: &mut Canvas<'_>, (frame, angles): (usize, Option<&ViewReport>)) {
+        let size = canvas.letters.size;
+        for text in self.labels(frame, angles) {
+            let half = canvas.letters.width(&text) / 2.0;
+            if canvas.write(&text, [SIDE * size + half, size]) {
                 break;
             }
         }
-        canvas.write(&self.title, [width / 2.0, size]);
+        if let Some(title) = self.placed_title(&canvas.letters, canvas.size()[0], (frame, angles)) {
+            title.write(canvas, size);
+        }
+    }
+
+    /// Where the title stands: at the same place for all frames.
+    fn placed_title(
+        &self,
+        letters: &Letters,
+        width: f64,
+        (frame, angles): (usize, Option<&ViewReport>),
+    ) -> Option<Title> {
+        let side = SIDE * letters.size;
+        let fits = |text: &String| side + letters.width(text) <= width;
+        let ends = |frame: usize| self.labels(frame, angles).into_iter().find(fits).map(|text| letters.width(&text));
+        let longest = [frame].into_iter().chain(self.some_frames()).filter_map(ends).fold(0.0, f64::max);
+        let left = if longest > 0.0 { longest + side + letters.size } else { side };
+        Title::new(&self.title, letters, width, [left, width - side])
+    }
+
+    /// Frames among which one has about the longest label.
+    fn some_frames(&self) -> impl Iterator<Item = usize> {
+        const FRAMES: usize = 32;
+        let count = self.times.times().len();
+        let step = count.div_ceil(FRAMES).max(1);
+        (0..count).step_by(step).chain(count.checked_sub(1)).chain((count == 0).then_some(999))
+    }
+
+    /// The beginning of the title that pictures of a size show, if they do not show it whole.
+    pub(crate) fn cut_title(&self, size: [usize; 2], frame: usize) -> Option<String> {
+        let letters = Letters::new(layout::line(size));
+        let title = self.placed_title(&letters, size[0] as f64, (frame, None)).filter(|_| has_time(size))?;
+        Some(title.text).filter(|text| *text != self.title)
     }
 
     /// The colour bar at the right, with its values to the left and their name to the right.
@@ -170,8 +205,9 @@ impl Annotation {
         for row in 0..h {
             canvas.fill([x, y + row], [w, 1], scale.colour_at(1.0 - row as f64 / (h - 1).max(1) as f64));
         }
-        for value in ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8)) {
-            let (at, text) = (top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5, volume::text(value));
+        let values = ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8));
+        for (text, value) in ticks::texts(&values).into_iter().zip(values) {
+            let at = top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5;
             canvas.line([left - rim - 0.4 * size, at], [left - rim, at], rim);
             let half = canvas.letters.width(&text) / 2.0;
             if 2.0 * half <= (BAR - name - 1.7) * size + 1.0 {
@@ -204,18 +240,11 @@ fn behind(canvas: &mut Canvas<'_>, opacity: &dyn Fn(usize) -> f64, draw: impl Fn
     canvas.taken = drawn;
 }
 
+/// The distance of texts from the side of a picture, in lines of letters.
+const SIDE: f64 = 0.6;
+
 /// How much lines of the box differ from the background.
 const BOX: f64 = 0.6;
-
-/// The longest beginning of a text that fits, with dots if something is left out.
-fn shortened(text: &str, fits: impl Fn(&str) -> bool) -> String {
-    if fits(text) {
-        return text.into();
-    }
-    let letters: Vec<char> = text.chars().collect();
-    let beginning = |count: usize| letters[..count].iter().chain(['…'].iter()).collect::<String>();
-    (0..letters.len()).rev().map(beginning).find(|text| fits(text)).unwrap_or_default()
-}
 
 /// The camera of a view.
 fn camera(axes: &VolumeAxes, size: [usize; 2], view: &ViewReport) -> Option<Camera> {
@@ -353,10 +382,5 @@ mod tests {
         assert_eq!(stamps(Some("s"))[1], ["t = 0.0125 s", "t = 0.0125"]);
         assert_eq!(stamps(Some("hours since 1900-01-01"))[3], ["2020-01-03 12:00:00", "2020-01-03"]);
         assert_eq!(long(Some("months since 1900-01-01"))[1], "t = 0.0125 months since 1900-01-01");
-    }
-
-    #[test]
-    fn long_names_are_shortened() {
-        assert_eq!([shortened("abcdef", |t| t.chars().count() <= 4), shortened("ab", |_| true)], ["abc…", "ab"]);
     }
 }

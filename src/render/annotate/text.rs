@@ -20,6 +20,11 @@ impl Letters {
         Self { font: font.into_scaled(size as f32), size }
     }
 
+    /// The same letters in another size.
+    pub(super) fn of_size(&self, size: f64) -> Self {
+        Self { font: self.font.font.clone().into_scaled(size as f32), size }
+    }
+
     /// The width of a text in pixels.
     pub(super) fn width(&self, text: &str) -> f64 {
         text.chars().map(|letter| f64::from(self.font.h_advance(self.font.glyph_id(known(letter))))).sum()
@@ -41,6 +46,16 @@ impl Letters {
             }
         }
     }
+}
+
+/// The longest beginning of a text that fits, with dots if something is left out.
+pub(super) fn shortened(text: &str, fits: impl Fn(&str) -> bool) -> String {
+    if fits(text) {
+        return text.into();
+    }
+    let letters: Vec<char> = text.chars().collect();
+    let beginning = |count: usize| letters[..count].iter().chain(['…'].iter()).collect::<String>();
+    (0..letters.len()).rev().map(beginning).find(|text| fits(text)).unwrap_or_default()
 }
 
 /// A letter of the font: others become a question mark.
@@ -78,6 +93,11 @@ mod tests {
             }
             assert!(letters.width("mm") > letters.width("m") && letters.width("") == 0.0);
         }
+    }
+
+    #[test]
+    fn long_names_are_shortened() {
+        assert_eq!([shortened("abcdef", |t| t.chars().count() <= 4), shortened("ab", |_| true)], ["abc…", "ab"]);
     }
 
     #[test]

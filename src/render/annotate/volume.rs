@@ -2,7 +2,8 @@
 
 use super::canvas::{Canvas, line};
 use super::layout::BAR;
-use super::ticks::{round_below, round_values};
+use super::text::Letters;
+use super::ticks::{all_round_values, round_below, texts};
 use crate::base::decimal;
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
@@ -45,6 +46,38 @@ struct Edge {
     to: [f64; 2],
     /// The direction away from the box.
     out: [f64; 2],
+}
+
+/// The most values along an edge. So many are taken only if a coarser step gives fewer than four.
+const MOST_TICKS: usize = 7;
+
+/// A value beside an edge.
+#[derive(Debug, Clone)]
+struct Tick {
+    text: String,
+    /// Its place as a share of the edge.
+    share: f64,
+    /// The middle of its text in the picture, and half of the text's width and height.
+    middle: [f64; 2],
+    half: [f64; 2],
+}
+
+impl Tick {
+    /// Whether two texts touch, or nearly so.
+    fn touches(&self, other: &Self) -> bool {
+        let gap = [self.half[1], 0.0];
+        (0..2).all(|i| (self.middle[i] - other.middle[i]).abs() < self.half[i] + other.half[i] + gap[i])
+    }
+}
+
+/// Those that do not touch, from the first on: values of uneven axes may touch whatever their step is.
+fn thinned(ticks: Vec<Tick>) -> Vec<Tick> {
+    ticks.into_iter().fold(Vec::new(), |mut kept: Vec<Tick>, tick| {
+        if kept.last().is_none_or(|last| !last.touches(&tick)) {
+            kept.push(tick);
+        }
+        kept
+    })
 }
 
 impl VolumeAxes {
@@ -113,30 +146,41 @@ impl VolumeAxes {
         }
         canvas.line(edge.from, edge.to, (THIN * size).max(1.0));
         let mut widest: f64 = 0.0;
-        for (text, share) in self.ticks(edge.axis, (length / (3.2 * size)) as usize) {
+        for Tick { text, share, middle, half } in self.ticks(edge, &canvas.letters, rim) {
             let at = point(edge.from, edge.to, share);
             canvas.line(at, moved(at, edge.out, rim + 0.4 * size), (THIN * size).max(1.0));
-            let half = reach(edge.out, [canvas.letters.width(&text) / 2.0, size / 2.0]);
-            canvas.write(&text, moved(at, edge.out, rim + 0.6 * size + half));
-            widest = widest.max(2.0 * half);
+            canvas.write(&text, middle);
+            widest = widest.max(2.0 * reach(edge.out, half));
         }
         let name = self.labels[edge.axis].title();
         let half = reach(edge.out, [canvas.letters.width(&name) / 2.0, size / 2.0]);
         canvas.write(&name, moved(point(edge.from, edge.to, 0.5), edge.out, rim + 0.9 * size + widest + half));
     }
 
-    /// The values along an edge, and their places as shares of its length.
-    fn ticks(&self, axis: usize, wanted: usize) -> Vec<(String, f64)> {
-        let ([first, last], labels) = (self.ends(axis), &self.labels[axis]);
-        let [from, to] = [first, last].map(|voxel| labels.coordinate(voxel));
-        let share = |value: f64| (labels.voxel(value) - first) / (last - first);
-        let within = |share: &f64| (-1e-9..=1.0 + 1e-9).contains(share);
-        let values = |wanted: usize| -> Vec<(String, f64)> {
-            let values = round_values(from.min(to), from.max(to), wanted).into_iter();
-            values.map(|value| (text(value), share(value))).filter(|(_, at)| within(at)).collect()
+    /// The values along an edge: as many as fit up to [`MOST_TICKS`], or none, since one alone tells no scale.
+    fn ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
+        let [first, last] = self.ends(edge.axis).map(|voxel| self.labels[edge.axis].coordinate(voxel));
+        let all = all_round_values(first.min(last), first.max(last), MOST_TICKS);
+        let mut all: Vec<Vec<Tick>> = all.map(|values| self.placed(&values, edge, letters, rim)).collect();
+        if all.first().is_some_and(|ticks| ticks.len() == MOST_TICKS) && all.get(1).is_some_and(|next| next.len() > 3) {
+            all.remove(0);
+        }
+        let fits = |ticks: &&Vec<Tick>| ticks.len() > 1 && ticks.windows(2).all(|pair| !pair[0].touches(&pair[1]));
+        let found = all.iter().find(fits).cloned().or_else(|| all.into_iter().next().map(thinned));
+        found.filter(|ticks| ticks.len() > 1).unwrap_or_default()
+    }
+
+    /// Values at their places beside an edge.
+    fn placed(&self, values: &[f64], edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
+        let ([first, last], labels, size) = (self.ends(edge.axis), &self.labels[edge.axis], letters.size);
+        let tick = |(text, value): (String, &f64)| {
+            let share = (labels.voxel(*value) - first) / (last - first);
+            let half = [letters.width(&text) / 2.0, size / 2.0];
+            let away = rim + 0.6 * size + reach(edge.out, half);
+            Tick { text, share, middle: moved(point(edge.from, edge.to, share), edge.out, away), half }
         };
-        // One value alone tells no scale.
-        (wanted.clamp(1, 8)..=8).map(values).find(|values| values.len() > 1).unwrap_or_default()
+        let within = |tick: &Tick| (-1e-9..=1.0 + 1e-9).contains(&tick.share);
+        texts(values).into_iter().zip(values).map(tick).filter(within).collect()
     }
 
     /// Coordinates per world unit and their unit, if they are the same along all axes.
@@ -270,16 +314,42 @@ mod tests {
     fn values_are_those_of_the_voxels() {
         let grid = Grid { dims: [11, 5, 4], spacing: [0.5, 1.0, 1.0], origin: [-1.0, 0.0, 0.0] };
         let mut volume = axes(grid);
-        let ticks = volume.ticks(0, 6);
+        let ticks = beside(&volume, 0, 800.0);
         let place = |share: f64| -1.0 + (share * 11.0 - 0.5) * 0.5;
-        assert!(ticks.len() > 3 && ticks[0].0 == "−1", "{ticks:?}");
-        for (text, share) in &ticks {
+        assert!(ticks.len() > 3 && ticks[0].text == "−1", "{ticks:?}");
+        for Tick { text, share, .. } in &ticks {
             let value: f64 = text.replace('−', "-").parse().expect("a number");
             assert!((place(*share) - value).abs() < 1e-9, "{text} at {share}");
         }
         volume.labels[2].at = vec![0.0, -10.0, -100.0, -1000.0];
-        let depth = volume.ticks(2, 4);
-        assert!(depth.iter().any(|(text, share)| text == "−1000" && (share * 4.0 - 3.5).abs() < 1e-9), "{depth:?}");
+        for length in [800.0, 100.0] {
+            let depth = beside(&volume, 2, length);
+            let is_last = |tick: &Tick| tick.text == "−1000" && (tick.share * 4.0 - 3.5).abs() < 1e-9;
+            assert!(depth.len() > 1 && depth.iter().any(is_last), "{depth:?}");
+        }
+    }
+
+    /// The values along an axis below an edge of some length, which ascends to the right.
+    fn beside(volume: &VolumeAxes, axis: usize, length: f64) -> Vec<Tick> {
+        let (along, out) = ([0.9 * length, -0.436 * length], [0.436, 0.9]);
+        volume.ticks(&Edge { axis, from: [0.0; 2], to: along, out }, &Letters::new(15.0), 0.0)
+    }
+
+    #[test]
+    fn there_are_as_many_values_as_fit() {
+        let volume = axes(Grid::unit([96, 1000, 7]));
+        let texts = |axis: usize, length: f64| -> Vec<String> {
+            beside(&volume, axis, length).into_iter().map(|tick| tick.text).collect()
+        };
+        assert_eq!(texts(0, 200.0), ["0", "20", "40", "60", "80"]);
+        assert_eq!(texts(0, 60.0), ["0", "50"]);
+        assert_eq!(texts(1, 200.0), ["0", "200", "400", "600", "800"]);
+        assert!(texts(0, 10.0).is_empty() && texts(2, 200.0).len() > 3);
+        for (axis, length) in (0..3).flat_map(|axis| (1..40).map(move |n| (axis, 10.0 * f64::from(n)))) {
+            let ticks = beside(&volume, axis, length);
+            assert!(ticks.len() <= MOST_TICKS && ticks.len() != 1, "{ticks:?}");
+            assert!(ticks.windows(2).all(|pair| !pair[0].touches(&pair[1])), "{ticks:?}");
+        }
     }
 
     #[test]

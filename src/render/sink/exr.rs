@@ -35,8 +35,8 @@ mod with_crate {
     ) -> io::Result<()> {
         let lines: Vec<String> = texts.iter().map(|(name, text)| format!("{name}: {text}")).collect();
         let attributes = LayerAttributes {
-            software_name: Text::new_or_none(&config.provenance.software),
-            comments: Text::new_or_none(lines.join("\n")),
+            software_name: Some(text(&config.provenance.software)),
+            comments: Some(text(&lines.join("\n"))),
             ..LayerAttributes::default()
         };
         let [width, height] = config.size;
@@ -45,6 +45,11 @@ mod with_crate {
         let mut bytes = Cursor::new(Vec::new()); // the encoder seeks
         Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(cause)?;
         out.write_all(bytes.get_ref())
+    }
+
+    /// A text in Latin-1, or in UTF-8 if it has other letters.
+    fn text(text: &str) -> Text {
+        Text::new_or_none(text).unwrap_or_else(|| Text::from_slice_unchecked(text.as_bytes()))
     }
 
     fn channels(pixel: Pixel, picture: Picture<'_>) -> AnyChannels<FlatSamples> {

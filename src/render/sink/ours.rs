@@ -57,15 +57,22 @@ fn has_mark(start: &[u8]) -> bool {
 fn png_software(mut chunks: &[u8]) -> bool {
     while let Some((head, rest)) = chunks.split_first_chunk::<8>() {
         let length = head[..4].iter().fold(0, |length, byte| length << 8 | usize::from(*byte));
-        let text =
-            rest.get(..length).filter(|_| &head[4..] == b"tEXt").and_then(|text| text.strip_prefix(b"Software\0"));
-        if let Some(name) = text {
+        if let Some(name) = rest.get(..length).and_then(|data| software_of(&head[4..], data)) {
             return name.starts_with(SOFTWARE);
         }
         const CHECKSUM: usize = 4;
         chunks = rest.get(length.saturating_add(CHECKSUM)..).unwrap_or_default();
     }
     false
+}
+
+/// The text "Software" of a chunk of this kind: plain in Latin-1, or in UTF-8 behind a language and a translated name.
+fn software_of<'a>(kind: &[u8], data: &'a [u8]) -> Option<&'a [u8]> {
+    match kind {
+        b"tEXt" => data.strip_prefix(b"Software\0"),
+        b"iTXt" => data.strip_prefix(b"Software\0\0\0")?.splitn(3, |byte| *byte == 0).nth(2),
+        _ => None,
+    }
 }
 
 /// Whether the attribute `software` of an EXR begins with our name: name, type and length stand before the value.
@@ -95,6 +102,24 @@ mod tests {
         let exr = |name: &[u8]| [EXR, b"\x02\0\0\0software\0string\0\x05\0\0\0", name].concat();
         assert!(has_mark(&exr(b"wavesplat-render 0.1")) && !has_mark(&exr(b"blender")));
         assert!(has_mark(b"{\n  \"software\": \"wavesplat-render 0.1.0\"}") && !has_mark(b"{\"software\": \"other\"}"));
+    }
+
+    #[test]
+    fn international_texts_are_recognised() {
+        let international = |data: &[u8]| {
+            let whole = png(&[data]);
+            let at = whole.windows(4).position(|kind| kind == b"tEXt").expect("a text");
+            [&whole[..at], b"iTXt", &whole[at + 4..]].concat()
+        };
+        for ours in [&b"Software\0\0\0\0\0wavesplat-render 0.1"[..], b"Software\0\0\0en\0x\0wavesplat"] {
+            assert!(has_mark(&international(ours)));
+        }
+        let packed = b"Software\0\x01\0\0\0wavesplat";
+        for foreign in
+            [&b"Software\0\0\0\0\0gimp"[..], packed, b"Software\0\0\0\0wavesplat", b"Title\0\0\0\0\0wavesplat"]
+        {
+            assert!(!has_mark(&international(foreign)));
+        }
     }
 
     #[test]

@@ -86,8 +86,21 @@ fn encoder<W: Write>(
     let (colours, depth) = Samples::of(config).kind();
     encoder.set_color(colours);
     encoder.set_depth(depth);
-    texts.iter().try_for_each(|(key, text)| encoder.add_text_chunk(key.clone(), text.clone()))?;
+    texts.iter().try_for_each(|(key, text)| add_text(&mut encoder, key.clone(), text.clone()))?;
     Ok(encoder)
+}
+
+/// Adds a text: as tEXt if its letters are in Latin-1, for old readers, and else as iTXt.
+fn add_text<W: Write>(
+    encoder: &mut png::Encoder<'_, W>,
+    key: String,
+    text: String,
+) -> std::result::Result<(), png::EncodingError> {
+    if text.chars().all(|letter| u8::try_from(letter).is_ok()) {
+        encoder.add_text_chunk(key, text)
+    } else {
+        encoder.add_itxt_chunk(key, text)
+    }
 }
 
 /// An animated PNG that loops forever.

@@ -74,6 +74,8 @@ pub struct Provenance {
     pub annotate: Option<String>,
     /// The title drawn above the volume.
     pub title: Option<String>,
+    /// The words beside the colour bar, if they are not those of the source.
+    pub bar_title: Option<String>,
     /// Numbers of the frames.
     pub frames: Vec<usize>,
     /// Times of the frames, or empty.

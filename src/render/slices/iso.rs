@@ -1,12 +1,14 @@
 //! Isosurfaces: where the field passes a value between two slices. The light of each such point is that of its gradient,
-//! and goes behind the surfaces in front of it.
+//! and goes behind the surfaces in front of it. Surfaces end at the faces of the volume. At their edges they cover a part of
+//! a cell ([`super::cover`]).
 
 use super::GROUP;
 use super::blend::{off_light, pixel_of_light};
-use super::filter::Sixteen;
+use super::cover::{Place, Rays, Slope};
 use super::row::{Blend, Point, Row};
 use super::shade::Shader;
 use super::units::Units;
+use super::view::SlicedView;
 use crate::render::light::Surface;
 
 /// Surfaces of several values.
@@ -16,6 +18,7 @@ pub(in crate::render) struct Isosurfaces {
     /// Their values in units.
     values: Vec<f32>,
     shader: Shader,
+    rays: Rays,
     units: Units,
 }
 
@@ -29,52 +32,42 @@ pub(in crate::render) struct Front {
     slice: u32,
 }
 
-/// The field at sixteen cells of a slice; NaN where there is none.
-#[derive(Debug, Clone, Copy)]
-struct Slope {
-    values: Sixteen,
-    gradient: [Sixteen; 3],
-}
-
-const NOTHING: Slope = Slope { values: [f32::NAN; GROUP], gradient: [[0.0; GROUP]; 3] };
-
 /// Rays with less transmittance are opaque.
 const CLOSED: f32 = 1.0 / 8192.0;
 
 impl Isosurfaces {
-    pub(in crate::render) fn new(surfaces: &[Surface], shader: Shader) -> Self {
+    pub(in crate::render) fn new(surfaces: &[Surface], view: &SlicedView, shader: Shader) -> Self {
         let mut surfaces = surfaces.to_vec();
         surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
         let most = surfaces.iter().map(|surface| surface.value.abs()).fold(0.0, f64::max);
         let zero = surfaces[0].value;
         let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
         let values = surfaces.iter().map(|surface| units.of(surface.value)).collect();
-        Self { surfaces, values, shader, units }
+        Self { surfaces, values, shader, rays: Rays::new(view), units }
     }
 
-    /// Adds the surfaces between two points of a ray behind those in front of them. `cross` gives the gradient at a share
-    /// of the way.
-    fn pass(&self, light: &mut [f32; 4], [from, to]: [f32; 2], gradient_at: impl Fn(f32) -> [f64; 3]) {
-        let (below, above) = (from.min(to), from.max(to));
-        let passed = |n: &usize| below < self.values[*n] && self.values[*n] <= above;
+    /// Adds the surfaces between two points of a ray behind those in front of them.
+    fn pass(&self, light: &mut [f32; 4], from: &Place, to: &Place) {
+        if from.value.is_nan() || to.value.is_nan() {
+            return;
+        }
         let mut add = |n: usize| {
-            let surface = &self.surfaces[n];
-            let [colour, gloss] = self.shader.shade_one(gradient_at((self.values[n] - from) / (to - from)));
-            let through = light[3] * surface.opacity as f32;
-            for (sum, c) in light.iter_mut().zip(surface.colour) {
-                *sum += through * (c * colour + gloss).min(1.0) as f32;
+            if let Some(meeting) = self.rays.meeting(self.values[n], from, to) {
+                self.put(light, n, meeting.gradient, meeting.opacity(self.surfaces[n].opacity as f32));
             }
-            light[3] -= through;
         };
         let all = 0..self.values.len();
-        if from < to { all.filter(passed).for_each(&mut add) } else { all.rev().filter(passed).for_each(&mut add) }
+        if from.value < to.value { all.for_each(&mut add) } else { all.rev().for_each(&mut add) }
     }
 
-    /// Whether any surface lies between two values.
-    #[inline(always)]
-    fn any_between(&self, from: &Sixteen, to: &Sixteen) -> bool {
-        let crossed = |value: &f32| (0..GROUP).any(|i| (from[i] < *value) != (to[i] < *value));
-        self.values.iter().any(crossed)
+    /// Adds the light of a surface with this opacity.
+    fn put(&self, light: &mut [f32; 4], n: usize, gradient: [f32; 3], opacity: f32) {
+        let [colour, gloss] = self.shader.shade_one(gradient.map(f64::from));
+        let through = light[3] * opacity;
+        for (sum, c) in light.iter_mut().zip(self.surfaces[n].colour) {
+            *sum += through * (c * colour + gloss).min(1.0) as f32;
+        }
+        light[3] -= through;
     }
 }
 
@@ -82,7 +75,7 @@ impl Blend for Isosurfaces {
     type Group = Front;
     type Cell = [f32; 4];
 
-    const EMPTY: Front = Front { light: [Self::NOTHING; GROUP], last: NOTHING, slice: u32::MAX - 1 };
+    const EMPTY: Front = Front { light: [Self::NOTHING; GROUP], last: Slope::NOTHING, slice: u32::MAX - 1 };
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is the largest transmittance of a group.
     const OPEN: f32 = 1.0;
@@ -115,16 +108,13 @@ impl Blend for Isosurfaces {
         for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate().filter(|(n, _)| row.live[*n]) {
             let next = slope(row, n);
             let follows = group.slice.wrapping_add(1) == row.slice;
-            if follows && self.any_between(&group.last.values, &next.values) {
-                for i in 0..GROUP {
-                    let (from, to) = (&group.last, &next);
-                    let mix = |share: f32| {
-                        [0, 1, 2].map(|axis| {
-                            let (a, b) = (from.gradient[axis][i], to.gradient[axis][i]);
-                            f64::from(a + share * (b - a))
-                        })
-                    };
-                    self.pass(&mut group.light[i], [from.values[i], to.values[i]], mix);
+            let marked = if follows { self.rays.near(&self.values, &group.last, &next) } else { [false; GROUP] };
+            if marked.contains(&true) {
+                for i in (0..GROUP).filter(|i| marked[*i]) {
+                    let [b, c, a] = row.place;
+                    let at = [b + (n * GROUP + i) as f32, c, a];
+                    let before = std::array::from_fn(|axis| at[axis] - self.rays.between * self.rays.direction[axis]);
+                    self.pass(&mut group.light[i], &group.last.place(i, before), &next.place(i, at));
                 }
                 *limit = group.light.iter().map(|cell| cell[3]).fold(0.0, f32::max);
             }
@@ -144,22 +134,20 @@ impl Blend for Isosurfaces {
         out.fill(0.0);
     }
 
-    /// The light, and the value and the gradient of the last point.
-    type Exact = ([f32; 4], Option<(f32, [f64; 3])>);
+    /// The light, and the last point.
+    type Exact = ([f32; 4], Option<Place>);
 
     fn exact(&self) -> Self::Exact {
         (Self::NOTHING, None)
     }
 
     fn step(&self, (light, last): &mut Self::Exact, point: &Point, _: f64) {
-        let to = self.units.of(point.value);
-        if let Some((from, gradient)) = *last {
-            let mix = |share: f32| {
-                std::array::from_fn(|i| gradient[i] + f64::from(share) * (point.gradient[i] - gradient[i]))
-            };
-            self.pass(light, [from, to], mix);
+        let [at, gradient] = [point.place, point.gradient].map(|numbers| numbers.map(|n| n as f32));
+        let to = Place { at, value: self.units.of(point.value), gradient };
+        if let Some(from) = last {
+            self.pass(light, from, &to);
         }
-        *last = Some((to, point.gradient));
+        *last = Some(to);
     }
 
     fn off((light, last): &Self::Exact, pixel: &[f32]) -> Option<f64> {

@@ -49,6 +49,7 @@ pub(super) mod row;
 pub(super) mod shade;
 pub(super) mod blend;
 pub(super) mod iso;
+mod cover;
 pub(super) mod mip;
 mod sweep;
 mod finish;

@@ -59,7 +59,8 @@ impl<B: Blend> Probe<B> {
                     let gradient =
                         if blend.is_shaded() { gradient(layers, &taps, self.view.count, mean) } else { [0.0; 3] };
                     let value = mean / units.per + units.zero;
-                    blend.step(&mut ray.state, &Point { density, value, gradient }, self.share);
+                    let place = [0, 1, 2].map(|axis| taps[axis].position);
+                    blend.step(&mut ray.state, &Point { place, density, value, gradient }, self.share);
                 }
             }
         }

@@ -35,6 +35,9 @@ pub(in crate::render) struct Row<'a> {
     pub(super) live: &'a [bool],
     pub(super) whole: &'a [bool],
     pub(super) slice: u32,
+    /// The place of the first cell in voxels along b, c and a, of which those along a are counted along the ray. The
+    /// cells of a row are a voxel apart along b.
+    pub(super) place: [f32; 3],
     /// The stops of each group; none if no ray ends early.
     pub(super) stops: &'a [Sixteen],
 }
@@ -151,6 +154,8 @@ fn sixteen_of(numbers: &[f32], group: usize) -> Sixteen {
 
 /// The field at a point.
 pub(in crate::render) struct Point {
+    /// Its place in voxels along b, c and a, as in [`Row::place`].
+    pub(super) place: [f64; 3],
     pub(super) density: f64,
     pub(super) value: f64,
     /// The change of the value per voxel along b, c and a; zero unless the blend is shaded.

@@ -245,6 +245,8 @@ impl<B: Blend> Band<'_, B> {
 
 /// The weights along b of one phase, for all cells of a row.
 struct Across {
+    /// The position of the first cell.
+    position: f64,
     density: f64,
     /// The sums of weights that meet the region, and their derivatives.
     shares: Vec<f32>,
@@ -259,12 +261,14 @@ impl Across {
         let shares: Vec<f32> = cells().map(|cell| taps.presence(cell, view.count[0])).collect();
         let slopes = cells().map(|cell| taps.presence_slope(cell, view.count[0])).collect();
         let whole = shares.chunks_exact(GROUP).map(|group| group.iter().all(|share| *share == 1.0)).collect();
-        Self { density: taps.density, shares, slopes, whole }
+        Self { position: taps.position, density: taps.density, shares, slopes, whole }
     }
 }
 
 /// The weights along c of a row of cells, and what they make of those along a.
 struct Down<'a> {
+    /// The positions along c and a.
+    position: [f64; 2],
     /// The first row of voxels that the weights meet.
     first: usize,
     weights: &'a [f32],
@@ -285,6 +289,7 @@ impl<'a> Down<'a> {
         let (of_row, slope) =
             (taps.presence(row as i64, view.count[1]), taps.presence_slope(row as i64, view.count[1]));
         Some(Self {
+            position: [taps.position + row as f64, part.slice.along.position],
             first,
             weights: &taps.weights[met.clone()],
             slopes: &taps.slopes[met],
@@ -331,6 +336,7 @@ impl<'a> Down<'a> {
             live,
             whole: &across.whole,
             slice: part.slice.number,
+            place: [across.position, self.position[0], self.position[1]].map(|at| at as f32),
             stops: &[],
         }
     }

@@ -16,6 +16,8 @@ pub(super) fn reach(sigma: f64) -> usize {
 /// The weights of the voxels around a position.
 #[derive(Debug, Clone)]
 pub(super) struct Taps {
+    /// The position in voxels.
+    pub(super) position: f64,
     /// The voxel of the first weight.
     pub(super) first: i64,
     /// Weights of sum 1.
@@ -43,7 +45,7 @@ impl Taps {
         let slopes = (1 - reach..=reach).zip(&weights).map(|(n, weight)| (weight * (pull(n) - mean)) as f32).collect();
         let peak = libm::exp(-nearest * decay) / ((2.0 * std::f64::consts::PI).sqrt() * sigma);
         let weights = weights.into_iter().map(|weight| weight as f32).collect();
-        Self { first: below as i64 + 1 - reach, weights, slopes, density: (sum + cut) * peak }
+        Self { position, first: below as i64 + 1 - reach, weights, slopes, density: (sum + cut) * peak }
     }
 
     /// The weights that meet the voxels from 0 to `count`, for a kernel moved by `by` voxels: the first such voxel, and

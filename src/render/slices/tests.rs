@@ -10,6 +10,7 @@ use crate::source::ArraySource;
 use crate::view::camera::{Camera, View};
 use lit::LAMP;
 
+mod edges;
 mod lit;
 
 /// A volume in one view.

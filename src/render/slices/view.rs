@@ -255,6 +255,23 @@ impl SlicedView {
         [b, c, if self.reversed { -a } else { a }]
     }
 
+    /// The voxels along b, c and a that a ray passes from one voxel along a to the next.
+    pub(super) fn direction(&self) -> [f64; 3] {
+        let back = if self.reversed { 1.0 } else { -1.0 };
+        [back * self.shear.slopes[0], back * self.shear.slopes[1], 1.0]
+    }
+
+    /// Voxels of the lattice that a cell or a pixel takes, whichever is larger.
+    pub(super) fn grain(&self) -> f64 {
+        let pixels = self.shear.pixels.map(|step| step[0].hypot(step[1])).into_iter().fold(0.0, f64::max);
+        (1.0 / self.cells as f64).max(1.0 / pixels)
+    }
+
+    /// The distance of two slices, in voxels along a.
+    pub(super) fn between(&self) -> f64 {
+        1.0 / self.fineness as f64
+    }
+
     /// The same view with a number of slices per voxel, and how many slices of this view make one of those.
     pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
         (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)

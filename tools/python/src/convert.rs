@@ -1,18 +1,19 @@
 //! Conversions of what Python holds.
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
-use crate::described::GivenValues;
-use crate::errors::raised;
-use crate::frames::{FrameReader, Raised};
-use crate::job;
+use crate::advice;
+use crate::described::{GivenValues, given_attributes};
+use crate::frames::FrameReader;
+use crate::job::{self, Caller};
 use crate::named::{GivenArray, PythonArrays};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat::base::progress::Progress;
 use wavesplat::base::sample::SampleType;
+use wavesplat::convert::shard::{Shard, sharded};
 use wavesplat::convert::{Bound as ErrorBound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, open_partial};
+use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::{self, Earlier};
 use wavesplat::source::{self, FrameSource, GivenTimes, NamedArrays, OpenOptions};
 use wavesplat::{Error, Result};
@@ -34,6 +35,9 @@ pub(crate) struct Settings {
     missing_value: Option<f64>,
     clip: bool,
     window: usize,
+    chain: usize,
+    /// Which of how many shards, from 1.
+    shard: Option<(usize, usize)>,
     block: Option<usize>,
     level: i32,
     memory: usize,
@@ -43,16 +47,16 @@ pub(crate) struct Settings {
 const SHARE: usize = 4;
 
 impl Settings {
-    fn bound(&self) -> PyResult<ErrorBound> {
+    fn bound(&self) -> Result<ErrorBound> {
         match self.bound.as_str() {
             "pointwise" => Ok(ErrorBound::Pointwise),
             "rms" => Ok(ErrorBound::Rms),
             "relative" => Ok(ErrorBound::Relative { floor: self.floor }),
-            other => Err(PyValueError::new_err(format!("bound: 'pointwise', 'rms' or 'relative', not {other:?}"))),
+            other => Err(Error::setting("bound", format!("'pointwise', 'rms' or 'relative', not {other:?}"))),
         }
     }
 
-    fn config(&self, source: &dyn FrameSource) -> PyResult<ConvertConfig> {
+    fn config(&self, source: &dyn FrameSource) -> Result<ConvertConfig> {
         let archive = source.archive();
         let is_declared = archive.missing.is_some() || self.missing_value.is_some();
         let missing = match self.missing.as_deref() {
@@ -60,10 +64,11 @@ impl Settings {
             Some("error") => MissingPolicy::Error,
             None if is_declared => MissingPolicy::Mask,
             None => MissingPolicy::Error,
-            Some(other) => return Err(PyValueError::new_err(format!("missing: 'error' or 'mask', not {other:?}"))),
+            Some(other) => return Err(Error::setting("missing", format!("'error' or 'mask', not {other:?}"))),
         };
         Ok(ConvertConfig {
             window: self.window,
+            chain: self.chain,
             max_error: self.max_error,
             bound: self.bound()?,
             range: self.range,
@@ -103,21 +108,45 @@ impl Settings {
         }
     }
 
-    /// Converts what was opened. Exceptions of the frames come before those of the conversion.
+    /// The frames of the shard, if one is meant.
+    fn sharded(
+        &self,
+        source: Box<dyn FrameSource>,
+        config: ConvertConfig,
+    ) -> Result<(Box<dyn FrameSource>, ConvertConfig)> {
+        let Some((number, of)) = self.shard else { return Ok((source, config)) };
+        if !(1..=of).contains(&number) {
+            return Err(Error::setting(
+                "shard",
+                format!("takes (I, N), the I-th of N, from (1, {of}) to ({of}, {of})"),
+            ));
+        }
+        if config.range.is_none() && config.max_error.is_none() {
+            return Err(Error::setting(
+                "shard",
+                "needs range=... or max_error=..., since a shard does not know all frames",
+            ));
+        }
+        let (source, settings) = sharded(source, Shard { number, of }, (config.window, config.chain))?;
+        Ok((source, ConvertConfig { settings, ..config }))
+    }
+
+    /// Opens frames and converts them. `open` may call Python.
     fn run(
         &self,
         py: Python<'_>,
-        source: Result<Box<dyn FrameSource>>,
-        raised_by_frames: &Raised,
+        open: impl FnOnce(Caller) -> Result<Box<dyn FrameSource>> + Send,
         report: Option<&Py<PyAny>>,
     ) -> PyResult<Converted> {
-        let first = |error: PyErr| raised_by_frames.take().unwrap_or(error);
-        let mut source = source.map_err(|e| first(raised(e)))?;
-        let config = self.config(source.as_ref())?;
-        let mut notes: Vec<String> = source.archive().notes.iter().map(|note| note.text.clone()).collect();
-        let done = job::run(py, report, |progress| self.convert(source.as_mut(), &config, progress)).map_err(first)?;
-        notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(|warning| warning.text.clone())));
-        Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
+        job::run(py, report, |progress, caller| {
+            let source = open(caller)?;
+            let config = self.config(source.as_ref())?;
+            let (mut source, config) = self.sharded(source, config)?;
+            let mut notes: Vec<String> = source.archive().notes.iter().map(advice::of_note).collect();
+            let done = self.convert(source.as_mut(), &config, progress)?;
+            notes.extend(done.iter().flat_map(|report| report.warnings.iter().map(advice::of_note)));
+            Ok((done.map(|report| serde_json::to_string(&report).unwrap_or_default()), notes))
+        })
     }
 }
 
@@ -148,14 +177,12 @@ pub(crate) fn convert_frames(
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
     let Layout { dims, sample, spacing, origin, times, time_unit } = layout;
-    let kept = Raised::default();
     let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
     let times = times.map(|times| GivenTimes::List(times.into()));
     let (dims, memory) = (Some(dims), settings.memory / SHARE);
     let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
-    let reader = FrameReader::new(iterator, kept.clone());
-    let source = py.detach(|| source::open_stream(reader, &options));
-    settings.run(py, source, &kept, report.as_ref())
+    let open = |caller| source::open_stream(FrameReader::new(iterator, caller), &options);
+    settings.run(py, open, report.as_ref())
 }
 
 /// Which variable is converted.
@@ -180,10 +207,33 @@ pub(crate) fn convert_arrays(
     settings: Settings,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let kept = Raised::default();
-    let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(&arrays, &attributes, read, kept.clone())?);
+    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
+    let attributes = given_attributes(&attributes)?;
     let Chosen { source: name, variable, axes } = chosen;
     let options = OpenOptions { variable, axes, memory: settings.memory / SHARE, ..OpenOptions::default() };
-    let source = py.detach(|| source::open_arrays(Path::new(&name), &arrays, &options));
-    settings.run(py, source, &kept, report.as_ref())
+    let open = |caller| {
+        let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
+        source::open_arrays(Path::new(&name), &arrays, &options)
+    };
+    settings.run(py, open, report.as_ref())
+}
+
+/// Joins shards to one file, and returns a report as JSON.
+#[pyfunction]
+#[pyo3(signature = (shards, path, resume, overwrite, report_to = None))]
+pub(crate) fn merge(
+    py: Python<'_>,
+    shards: Vec<PathBuf>,
+    path: PathBuf,
+    resume: bool,
+    overwrite: bool,
+    report_to: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    job::run(py, report_to.as_ref(), |progress, _| {
+        let shards = Shards::open(&shards, progress)?;
+        let (mut out, begun) = resume::open(&path, overwrite, Earlier::by(overwrite, resume))?;
+        let report = shards.merge(begun, false, (&path, &mut out), progress)?;
+        out.commit_if(resume::check)?;
+        Ok(serde_json::to_string(&report).unwrap_or_default())
+    })
 }

@@ -1,5 +1,6 @@
 //! The library's errors as exceptions of Python, with the library's words.
 
+use crate::advice;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -21,7 +22,7 @@ create_exception!(wavesplat, BoundMissedError, WavesplatError, "Samples are outs
 
 /// The exception of an error.
 pub(crate) fn raised(error: Error) -> PyErr {
-    let words = error.to_string();
+    let words = advice::of_error(&error);
     match error {
         Error::Io { source, .. } => of_system(&source, words),
         Error::CoefficientFile { source, .. } => match source {

@@ -143,7 +143,7 @@ impl File {
     /// Checks every byte of the file.
     #[pyo3(signature = (report = None))]
     fn check(&self, py: Python<'_>, report: Option<Py<PyAny>>) -> PyResult<()> {
-        job::run(py, report.as_ref(), |_| self.file.check_stored())
+        job::run(py, report.as_ref(), |_, _| self.file.check_stored())
     }
 
     /// Writes the samples of a box of some ascending frames into the bytes of an array, frame after frame, x fastest.
@@ -170,7 +170,7 @@ impl File {
         };
         match is_short {
             true => py.detach(|| extract_to(&self.file, &config, &mut write, &Silent)).map_err(raised)?,
-            false => job::run(py, None, |progress| extract_to(&self.file, &config, &mut write, progress))?,
+            false => job::run(py, None, |progress, _| extract_to(&self.file, &config, &mut write, progress))?,
         };
         Ok(())
     }

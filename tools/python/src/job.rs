@@ -3,78 +3,98 @@
 use crate::errors::raised;
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use wavesplat::base::progress::Progress;
+use wavesplat::cli::render::Work;
 
 /// The time between two looks at the work.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How far the work is, and whether its result is wanted.
-#[derive(Debug, Default)]
-struct Job {
-    steps: AtomicU64,
-    done: AtomicU64,
-    is_cancelled: AtomicBool,
+/// A call of Python.
+type Call = Box<dyn FnOnce(Python<'_>) + Send>;
+
+/// Calls Python on the thread that asked for the work. So Ctrl-C ends a call, and frames need not be made on other threads.
+#[derive(Clone)]
+pub(crate) struct Caller {
+    calls: Sender<Call>,
+    /// The first exception of a call.
+    raised: Arc<Mutex<Option<PyErr>>>,
 }
 
-impl Progress for Job {
-    fn start(&self, steps: Option<u64>) {
-        self.done.store(0, Ordering::Relaxed);
-        self.steps.store(steps.unwrap_or(0), Ordering::Relaxed);
+impl Caller {
+    /// What a call returns.
+    ///
+    /// # Errors
+    /// The words of the exception, which [`run`] raises again; or that the work is cancelled.
+    pub(crate) fn call<T: Send + 'static>(
+        &self,
+        call: impl FnOnce(Python<'_>) -> PyResult<T> + Send + 'static,
+    ) -> Result<T, String> {
+        let (answer, answered) = channel();
+        let send = move |py: Python<'_>| drop(answer.send(call(py)));
+        let cancelled = "cancelled".to_string();
+        if self.calls.send(Box::new(send)).is_err() {
+            return Err(cancelled);
+        }
+        answered.recv().map_or(Err(cancelled), |answer| answer.map_err(|error| self.keep(error)))
     }
 
-    fn advance(&self, steps: u64) {
-        self.done.fetch_add(steps, Ordering::Relaxed);
-    }
-
-    fn finish(&self) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.is_cancelled.load(Ordering::Relaxed)
+    fn keep(&self, error: PyErr) -> String {
+        let words = error.to_string();
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        words
     }
 }
 
-/// Does work on another thread without the interpreter's lock. Meanwhile this thread calls `report(done, steps)`, with 0 steps
-/// if their number is not known, and lets signals raise their exceptions, which cancel the work.
+/// Does work on another thread without the interpreter's lock. Meanwhile this thread makes the calls that the work asks for,
+/// calls `report(done, steps)`, with 0 steps if their number is not known, and lets signals raise their exceptions, which
+/// cancel the work.
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
     report: Option<&Py<PyAny>>,
-    work: impl FnOnce(&dyn Progress) -> wavesplat::Result<T> + Send,
+    work: impl FnOnce(&dyn Progress, Caller) -> wavesplat::Result<T> + Send,
 ) -> PyResult<T> {
-    let job = Job::default();
-    py.detach(|| {
+    let (job, (calls, called)) = (Work::default(), channel());
+    let caller = Caller { calls, raised: Arc::default() };
+    let raised_by_calls = caller.raised.clone();
+    let (done, raising) = py.detach(|| {
         thread::scope(|scope| {
-            let (ended, end) = channel::<()>();
-            let worker = scope.spawn(|| {
-                let _ended = ended; // its end ends the loop below, also after a panic
-                work(&job)
-            });
-            let mut raising = None;
-            while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
-                if raising.is_none()
-                    && let Err(raised) = Python::attach(|py| look(py, &job, report))
-                {
-                    job.is_cancelled.store(true, Ordering::Relaxed);
-                    raising = Some(raised);
-                }
-            }
-            let done = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
-            match raising {
-                Some(raising) => Err(raising),
-                None => Python::attach(|py| {
-                    report.map_or(Ok(()), |_| look(py, &job, report))?;
-                    done.map_err(raised)
-                }),
-            }
+            let worker = scope.spawn(|| work(&job, caller)); // when it ends, nobody can call
+            let raising = serve(&called, &job, report);
+            drop(called);
+            (worker.join().unwrap_or_else(|panic| resume_unwind(panic)), raising)
         })
-    })
+    });
+    if let Some(raising) = raising {
+        return Err(raising);
+    }
+    let first = || raised_by_calls.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let done = done.map_err(|error| first().unwrap_or_else(|| raised(error)))?;
+    look(py, &job, report)?;
+    Ok(done)
 }
 
-fn look(py: Python<'_>, job: &Job, report: Option<&Py<PyAny>>) -> PyResult<()> {
+/// Makes calls and reports progress until nobody can call any more. Returns the exception that cancelled the work.
+fn serve(called: &Receiver<Call>, job: &Work, report: Option<&Py<PyAny>>) -> Option<PyErr> {
+    let (mut raising, mut looked) = (None, Instant::now());
+    loop {
+        match called.recv_timeout(LOOK) {
+            Ok(call) if raising.is_none() => Python::attach(call),
+            Ok(_) | Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return raising,
+        }
+        if raising.is_none() && looked.elapsed() >= LOOK {
+            raising = Python::attach(|py| look(py, job, report)).err();
+            raising.iter().for_each(|_| job.cancel());
+            looked = Instant::now();
+        }
+    }
+}
+
+fn look(py: Python<'_>, job: &Work, report: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
-    let [done, steps] = [&job.done, &job.steps].map(|count| count.load(Ordering::Relaxed));
-    report.map_or(Ok(()), |report| report.call1(py, (done, steps)).map(drop))
+    report.map_or(Ok(()), |report| report.call1(py, job.counts()).map(drop))
 }

@@ -3,6 +3,7 @@
 //! Python names axes, chooses items and builds objects. This half moves numbers: it reads into arrays of numpy, takes frames
 //! from Python, and releases the interpreter's lock meanwhile.
 
+mod advice;
 mod convert;
 mod described;
 mod errors;
@@ -17,7 +18,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _wavesplat {
     #[pymodule_export]
-    use super::convert::{convert_arrays, convert_frames};
+    use super::convert::{convert_arrays, convert_frames, merge};
     #[pymodule_export]
     use super::errors::{BoundMissedError, ChangedError, DamagedError, InputError, UnsupportedError, WavesplatError};
     #[pymodule_export]

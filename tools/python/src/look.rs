@@ -15,7 +15,7 @@ use wavesplat::cli::view::{self, Serving};
 #[pyfunction]
 #[pyo3(signature = (words, report = None))]
 pub(crate) fn render(py: Python<'_>, words: Vec<OsString>, report: Option<Py<PyAny>>) -> PyResult<()> {
-    job::run(py, report.as_ref(), |progress| run_within(words, progress))
+    job::run(py, report.as_ref(), |progress, _| run_within(words, progress))
 }
 
 /// A viewer that answers the browser until it is closed.

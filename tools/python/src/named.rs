@@ -1,10 +1,11 @@
 //! Named arrays of a dataset in Python, as the library reads them.
 
 use crate::described::{GivenValues, given_attributes, number_type};
-use crate::frames::Raised;
+use crate::job::Caller;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 use wavesplat::base::description::{Attribute, Dimension};
 use wavesplat::source::{ArrayType, NamedArray, NamedArrays};
 
@@ -22,7 +23,7 @@ pub(crate) struct GivenArray<'py> {
 }
 
 impl GivenArray<'_> {
-    fn array(&self) -> PyResult<NamedArray> {
+    pub(crate) fn array(&self) -> PyResult<NamedArray> {
         let dimension = |(name, length, unlimited): &(String, u64, bool)| Dimension {
             name: name.clone(),
             length: *length,
@@ -50,19 +51,13 @@ pub(crate) struct PythonArrays {
     arrays: Vec<NamedArray>,
     attributes: Vec<Attribute>,
     /// `read(name, [(start, end), ...])` gives the bytes of a box.
-    read: Py<PyAny>,
-    raised: Raised,
+    read: Arc<Py<PyAny>>,
+    caller: Caller,
 }
 
 impl PythonArrays {
-    pub(crate) fn new(
-        arrays: &[GivenArray<'_>],
-        attributes: &[(String, GivenValues<'_>)],
-        read: Py<PyAny>,
-        raised: Raised,
-    ) -> PyResult<Self> {
-        let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<_>>()?;
-        Ok(Self { arrays, attributes: given_attributes(attributes)?, read, raised })
+    pub(crate) fn new(arrays: Vec<NamedArray>, attributes: Vec<Attribute>, read: Py<PyAny>, caller: Caller) -> Self {
+        Self { arrays, attributes, read: Arc::new(read), caller }
     }
 }
 
@@ -77,10 +72,10 @@ impl NamedArrays for PythonArrays {
 
     fn read(&self, name: &str, ranges: &[Range<usize>]) -> Result<Vec<u8>, String> {
         let ranges: Vec<(usize, usize)> = ranges.iter().map(|range| (range.start, range.end)).collect();
-        let read = |py: Python<'_>| {
-            let bytes = self.read.bind(py).call1((name, ranges))?.cast_into::<PyArray1<u8>>()?;
+        let (function, name) = (self.read.clone(), name.to_string());
+        self.caller.call(move |py| {
+            let bytes = function.bind(py).call1((name, ranges))?.cast_into::<PyArray1<u8>>()?;
             Ok(bytes.readonly().as_slice()?.to_vec())
-        };
-        Python::attach(read).map_err(|e: PyErr| self.raised.keep(e))
+        })
     }
 }

@@ -12,7 +12,7 @@ With xarray, ``xr.open_dataset("run.wspl")`` opens a file lazily, and ``ds.to_wa
 
 import sys as _sys
 
-from ._convert import convert
+from ._convert import convert, merge
 from ._figure import Figure
 from ._file import File, Viewer, open
 from ._wavesplat import (
@@ -40,5 +40,6 @@ __all__ = [
     "WavesplatError",
     "__version__",
     "convert",
+    "merge",
     "open",
 ]

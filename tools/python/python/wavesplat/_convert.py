@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -42,6 +43,8 @@ class Settings:
     missing_value: float | None
     clip: bool
     window: int
+    chain: int
+    shard: tuple[int, int] | None
     block: int | None
     level: int
     memory: int
@@ -67,6 +70,8 @@ def convert(
     resume: bool = False,
     overwrite: bool = False,
     window: int = 32,
+    chain: int = 8,
+    shard: tuple[int, int] | None = None,
     block: int | None = None,
     level: int = 3,
     memory: int = MEMORY,
@@ -102,6 +107,9 @@ def convert(
         resume: Whether to continue an unfinished conversion. Nothing is done if the file is complete already.
         overwrite: Whether to replace a file of this name.
         window: Frames that are coded together.
+        chain: Windows in a row that may share how they are coded; shards are runs of these.
+        shard: (I, N) converts the I-th of N shards of a Dataset, from 1, for `wavesplat.merge`. It needs ``range`` or
+            ``max_error``, since a shard does not know the range of all frames.
         block: Voxels a side of a block; as many as suit the window by default.
         level: Level of zstd, 1 to 19.
         memory: Bytes that the conversion may take.
@@ -129,6 +137,8 @@ def convert(
         missing_value=None if value is None else float(value),
         clip=clip,
         window=window,
+        chain=chain,
+        shard=shard,
         block=block,
         level=level,
         memory=memory,
@@ -141,8 +151,8 @@ def convert(
             if extra is not None:
                 raise ValueError(f"{name}: a Dataset has coordinates of its own; change those with assign_coords")
         return convert_dataset(source, given, allowed, variable=variable, axes=axes, progress=progress)
-    if variable is not None or axes is not None:
-        raise ValueError("variable and axes are for a Dataset: an array is (time, z, y, x)")
+    if variable is not None or axes is not None or shard is not None:
+        raise ValueError("variable, axes and shard are for a Dataset: an array is (time, z, y, x)")
     times, time_unit = _numbers(times, time_unit)
     frames = Frames.of(source, memory)
     layout = {
@@ -158,6 +168,37 @@ def convert(
         return told(*_wavesplat.convert_frames(frames.parts, layout, settings, report))
 
 
+def merge(
+    shards: Iterable[str | PathLike[str]],
+    path: str | PathLike[str],
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress = False,
+) -> dict[str, Any]:
+    """Joins shards, in any order, to the file that one conversion would make, byte for byte.
+
+    Args:
+        shards: The files that ``convert(..., shard=(I, N))`` made.
+        path: The ``.wspl`` file to write.
+        resume: Whether to continue an unfinished merge.
+        overwrite: Whether to replace a file of this name.
+        progress: Whether to show progress, or a function of (done, all).
+
+    Returns:
+        The report, as ``wavesplat merge --json`` prints it.
+
+    Raises:
+        ValueError: Shards are missing, given twice, of another archive or made otherwise; the message names them.
+        DamagedError: A shard is damaged.
+
+    """
+    with reporting(progress, "merge") as report:
+        names = [os.fspath(shard) for shard in shards]
+        found: dict[str, Any] = json.loads(_wavesplat.merge(names, os.fspath(path), resume, overwrite, report))
+    return found
+
+
 @dataclass(frozen=True)
 class Allowed:
     """The error allowed, perhaps for each variable."""
@@ -171,7 +212,9 @@ class Allowed:
             raise ValueError("tolerance is a share of a range, and max_error is in the samples' unit; give one")
         tolerance, error = (_of_variable(name, getattr(self, name), variable) for name in ("tolerance", "max_error"))
         exact = 0.0 if error is not None else 0.01
-        return Settings(**{**asdict(settings), "tolerance": exact if tolerance is None else tolerance, "max_error": error})
+        return Settings(
+            **{**asdict(settings), "tolerance": exact if tolerance is None else tolerance, "max_error": error}
+        )
 
 
 def _of_variable(name: str, given: float | dict[str, float] | None, variable: str | None) -> float | None:
@@ -185,8 +228,17 @@ def _of_variable(name: str, given: float | dict[str, float] | None, variable: st
 def told(report: str | None, notes: list[str]) -> dict[str, Any]:
     """The report of a conversion. Warns of what is worth knowing."""
     for note in notes:
-        warnings.warn(note, stacklevel=3)
+        warnings.warn(note, stacklevel=_caller())
     return json.loads(report) if report is not None else {}
+
+
+def _caller() -> int:
+    """How far up the caller of this package is, for warnings."""
+    folder = os.path.dirname(__file__)
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == folder:
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _is_of_xarray(source: Any) -> bool:
@@ -263,8 +315,9 @@ def _sample(dtype: Any) -> str:
 def _chunk(array: Any) -> tuple[int, ...] | None:
     """Lengths of the pieces that an array is made of: Dask's or Zarr's."""
     chunk = getattr(array, "chunksize", None) or getattr(array, "chunks", None)
-    is_plain = isinstance(chunk, tuple) and all(isinstance(n, (int, np.integer)) for n in chunk)
-    return tuple(int(n) for n in chunk) if is_plain else None
+    if not isinstance(chunk, tuple) or not all(isinstance(n, (int, np.integer)) for n in chunk):
+        return None
+    return tuple(int(n) for n in chunk)
 
 
 _COPIES = 8

@@ -59,8 +59,7 @@ def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
 
 def _volumes(dataset: xr.Dataset) -> list[str]:
     """The variables that can be frames."""
-    found = [str(name) for name, array in dataset.data_vars.items() if array.ndim >= 3 and array.dtype.kind in "fiu"]
-    return found
+    return [str(name) for name, array in dataset.data_vars.items() if array.ndim >= 3 and array.dtype.kind in "fiu"]
 
 
 def _one(
@@ -88,7 +87,7 @@ def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], di
     for key, var in alone.variables.items():
         kept = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
         alone[key].encoding = kept if _is_date(var) else {}
-    variables, attrs = xr.conventions.encode_dataset_coordinates(alone)  # type: ignore[no-untyped-call]
+    variables, attrs = xr.conventions.encode_dataset_coordinates(alone)
     encoded = {str(key): xr.conventions.encode_cf_variable(var, name=key) for key, var in variables.items()}
     return encoded, attrs
 

@@ -113,7 +113,7 @@ def along_axis(file: File, axis: SourceAxis) -> npt.NDArray[Any] | None:
     for name, dimensions, values, _ in described["variables"]:
         if name == axis.name and [described["dimensions"][at][0] for at in dimensions] == [axis.name]:
             own = array(values)
-            return file.times if own is None else own
+            return file.times if own is None else own[kept(file, axis, len(own))]
     if axis.role == "t":
         return file.times if len(file.times) else None
     if axis.role in ("z", "y", "x"):
@@ -124,9 +124,15 @@ def along_axis(file: File, axis: SourceAxis) -> npt.NDArray[Any] | None:
     return None
 
 
+def kept(file: File, axis: SourceAxis, length: int) -> slice:
+    """The items along an axis of the source, with so many items, that a level of detail has: every n-th from the low end."""
+    step = 2**file.lod if axis.role in ("z", "y", "x") else 1
+    return slice((length - 1) % step, None, step) if axis.reversed else slice(0, None, step)
+
+
 def _is_placed(file: File, along: int) -> bool:
     """Whether a grid says where voxels are, and does not only number them."""
-    return (file._file.origin[along], file._file.spacing[along]) != (0.0, 1.0)
+    return (file._file.origin[along], file._file.spacing[along]) != (0.0, float(2**file.lod))
 
 
 def regular(file: File, along: int) -> npt.NDArray[np.float64]:

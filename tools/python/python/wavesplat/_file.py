@@ -71,6 +71,11 @@ class File:
         return self._path
 
     @property
+    def lod(self) -> int:
+        """The level of detail: every 2**lod-th voxel along each axis is there."""
+        return self._lod
+
+    @property
     def id(self) -> str:
         """Its identity, which the same frames and settings share."""
         return self._file.id
@@ -200,7 +205,7 @@ class File:
         """Samples by a number, slice, list or mask along each axis: every combination of them."""
         return Outer(self)
 
-    def __array__(self, dtype: npt.DTypeLike = None, copy: bool | None = None) -> npt.NDArray[Any]:
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
         """All samples."""
         if copy is False:
             raise ValueError("samples are decoded: there is no array without a copy")
@@ -237,7 +242,9 @@ class File:
         if out is None:
             return selection.finish(self._read(selection.items, channel=channel, memory=memory))
         if out.shape != selection.shape or out.dtype != self.dtype:
-            raise ValueError(f"out: takes {self.dtype} of shape {selection.shape}, not {out.dtype} of shape {out.shape}")
+            raise ValueError(
+                f"out: takes {self.dtype} of shape {selection.shape}, not {out.dtype} of shape {out.shape}"
+            )
         self._fill(out, selection.items, channel, memory)
         return out
 
@@ -275,7 +282,8 @@ class File:
 
         Returns:
             Means and largest values: float32 (pictures, height, width) in the unit of the samples, NaN for background.
-            Composites, isosurfaces and pictures with a ``colormap``: uint8 (pictures, height, width, 3).
+            With a ``colormap``: uint8 colours (pictures, height, width, 3). Composites and isosurfaces: float32 red, green,
+            blue and what shines through (pictures, height, width, 4), each 0 to 1.
 
         Raises:
             ValueError: An option is wrong.
@@ -285,7 +293,7 @@ class File:
             path = os.path.join(folder, "pictures.npy")
             self._render(path, options, progress)
             pictures: npt.NDArray[Any] = np.load(path)
-        return pictures
+            return pictures
 
     def figure(self, format: str = "html", *, height: int = 700, progress: Progress = False, **options: Any) -> Figure:
         """A picture that a notebook shows.
@@ -378,5 +386,3 @@ def _reopened(path: str, lod: int, id: str) -> File:
     if file.id != id:
         raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled")
     return file
-
-

@@ -101,6 +101,11 @@ class _Run:
     items: Items
     """Which values these are, counted from ``start``."""
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether every value is asked for once."""
+        return np.array_equal(self.items, np.arange(self.stop - self.start))
+
 
 def _runs(items: Items, joins: Callable[[int, int], bool]) -> list[_Run]:
     """Ascending runs, each of items that ``joins`` joins to the one before."""
@@ -139,7 +144,7 @@ def read_into(
         frame_bytes = int(np.prod(size)) * out.itemsize
         for frames, places in _frames(items[0], windows, max(memory // max(frame_bytes, 1), 1)):
             target = _box_of(out, places, box)
-            if target is not None and all(len(run.items) == n for run, n in zip(box, size, strict=True)):
+            if target is not None and all(run.is_whole for run in box):
                 read(frames, (start, stop), target)
                 continue
             samples = np.empty((len(frames), *size), out.dtype)

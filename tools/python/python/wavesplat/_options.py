@@ -63,7 +63,7 @@ def colours(given: Any) -> str:
         given = matplotlib.colormaps[given]
     shares = np.linspace(0.0, 1.0, STEPS)
     levels = np.round(np.asarray(given(shares))[:, :3] * 255).astype(int)
-    return ",".join("#%02x%02x%02x" % tuple(level) for level in levels)
+    return ",".join(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in levels)
 
 
 def in_python(message: str) -> str:

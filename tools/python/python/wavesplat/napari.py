@@ -25,7 +25,7 @@ def _layer(path: str) -> Layer:
     from ._file import open
 
     file = open(path)
-    samples = da.from_array(file, chunks=file.chunks, name=f"wavesplat-{file.id}", asarray=False)
+    samples = da.from_array(file, chunks=file.chunks, name=f"wavesplat-{file.id}", asarray=False)  # type: ignore[no-untyped-call]
     times = file.times
     step = float(times[1] - times[0]) if len(times) > 1 and times[1] > times[0] else 1.0
     spacing, origin = file._file.spacing[::-1], file._file.origin[::-1]

@@ -1,9 +1,9 @@
-"""Coefficient files in xarray: ``xr.open_dataset("run.wspl")`` and, with this module imported, ``ds.to_wavesplat(...)``."""
+"""Coefficient files in xarray: ``xr.open_dataset("run.wspl")`` and, once this is imported, ``ds.to_wavesplat(...)``."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,7 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
 from ._convert import convert
-from ._description import ROLES, along_axis, array, attributes
+from ._description import ROLES, along_axis, array, attributes, kept
 from ._file import File, open
 
 _COLOURS = ("red", "green", "blue")
@@ -60,7 +60,6 @@ class WavesplatBackend(BackendEntrypoint):
         "mask_and_scale",
         "decode_times",
         "decode_timedelta",
-        "use_cftime",
         "decode_coords",
         "lod",
     )
@@ -73,7 +72,6 @@ class WavesplatBackend(BackendEntrypoint):
         mask_and_scale: bool = True,
         decode_times: Any = True,
         decode_timedelta: Any = None,
-        use_cftime: bool | None = None,
         decode_coords: Any = True,
         lod: int = 0,
     ) -> xr.Dataset:
@@ -82,14 +80,12 @@ class WavesplatBackend(BackendEntrypoint):
         variables, attrs = _variables(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
-        times = {} if use_cftime is None else {"use_cftime": use_cftime}
         dataset: xr.Dataset = xr.conventions.decode_cf(
             xr.Dataset(variables, attrs=attrs),
             mask_and_scale=mask_and_scale,
             decode_times=decode_times,
             decode_timedelta=decode_timedelta,
             decode_coords=decode_coords,
-            **times,
         )
         dataset.encoding["source"] = os.path.abspath(file.path)
         return dataset
@@ -105,33 +101,27 @@ def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
     described = file.description
     if described is None:
         return {**samples, **_coordinates(file, set(samples))}, {}
-    names = {axis.name for axis in file._axes.source}
-    dimensions = [dimension[0] for dimension in described["dimensions"]]
-    others = {}
-    for name, along, values, attrs in described["variables"]:
-        data = array(values)
-        data = file.times if data is None else data
-        is_of_file = np.shape(data) == () or len(along) == 0 or _fits(file, along, dimensions, described)
-        if name not in samples and is_of_file:
-            dims = [dimensions[at] for at in along]
-            shape = [described["dimensions"][at][1] for at in along]
-            others[name] = xr.Variable(dims, _typed(data, values).reshape(shape), attributes(attrs))
-    others = {name: var for name, var in others.items() if var.ndim > 0 or name not in names}
+    others = {name: variable for name, variable in _kept(file, described) if name not in samples}
     return {**samples, **others, **_coordinates(file, {*samples, *others})}, attributes(described["global"])
 
 
-def _typed(data: npt.NDArray[Any], values: Any) -> npt.NDArray[Any]:
+def _kept(file: File, described: dict[str, Any]) -> Iterator[tuple[str, xr.Variable]]:
+    """The variables beside the samples, thinned as a level of detail thins the samples."""
+    axes = {axis.name: axis for axis in file._axes.source}
+    for name, along, values, attrs in described["variables"]:
+        data = array(values)
+        data = _typed(file.times, values) if data is None else data
+        dims = [described["dimensions"][at][0] for at in along]
+        shape = [described["dimensions"][at][1] for at in along]
+        pairs = zip(dims, shape, strict=True)
+        thinned = tuple(kept(file, axes[dim], length) if dim in axes else slice(None) for dim, length in pairs)
+        yield name, xr.Variable(dims, data.reshape(shape)[thinned], attributes(attrs))
+
+
+def _typed(times: npt.NDArray[np.float64], dtype: str) -> npt.NDArray[Any]:
     """Times in the type that they had."""
-    if not isinstance(values, str):
-        return data
-    typed = data.astype(values)
-    return typed if np.array_equal(typed, data) else data
-
-
-def _fits(file: File, along: list[int], dimensions: list[str], described: dict[str, Any]) -> bool:
-    """Whether the lengths of a variable are those of the axes: at a level of detail they are not."""
-    own = {axis.name: _length(file, axis.role) for axis in file._axes.source}
-    return all(own.get(dimensions[at], described["dimensions"][at][1]) == described["dimensions"][at][1] for at in along)
+    typed = times.astype(dtype)
+    return typed if np.array_equal(typed, times) else times
 
 
 def _samples(file: File) -> dict[str, xr.Variable]:
@@ -167,21 +157,14 @@ def _coordinates(file: File, taken: set[str]) -> dict[str, xr.Variable]:
         if axis.name in taken:
             continue
         along = along_axis(file, axis)
-        if along is None or len(along) != _length(file, axis.role):
-            along = along_axis_of_grid(file, axis.role)
         if along is not None:
             unit = {"units": file.time_unit, "calendar": file.calendar} if axis.role == "t" else {}
             found[axis.name] = xr.Variable(axis.name, along, {name: value for name, value in unit.items() if value})
     return found
 
 
-def along_axis_of_grid(file: File, role: str) -> npt.NDArray[Any] | None:
-    """The places of voxels at a level of detail of a grid that is more than numbers."""
-    return None
-
-
-@xr.register_dataset_accessor("to_wavesplat")
-@xr.register_dataarray_accessor("to_wavesplat")
+@xr.register_dataset_accessor("to_wavesplat")  # type: ignore[no-untyped-call]
+@xr.register_dataarray_accessor("to_wavesplat")  # type: ignore[no-untyped-call]
 class ToWavesplat:
     """``ds.to_wavesplat("run.wspl", tolerance=1e-3)``: see `wavesplat.convert`."""
 

@@ -1,0 +1,58 @@
+//! `wavesplat merge`
+
+use clap::Args;
+use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::STANDARD;
+use wavesplat::cli::{CommonArgs, spare_inputs};
+use wavesplat::file::merge::{MergeReport, Shards};
+use wavesplat::file::resume::{self, Earlier};
+
+/// Join shards to one coefficient file
+#[derive(Debug, Args)]
+#[command(
+    before_help = "\
+Examples:
+  wavesplat merge part-*.wspl -o run.wspl
+  wavesplat merge part-*.wspl -o run.wspl --resume",
+    after_help = "\
+The shards are those of wavesplat convert --shard, in any order. Blocks are copied as they are stored, so nothing is coded anew: \
+the file has the bytes of one conversion with the same options. Shards that are missing, given twice, of another archive, made \
+otherwise or damaged are named."
+)]
+pub(crate) struct MergeArgs {
+    /// Shards, in any order
+    #[arg(required = true)]
+    shards: Vec<PathBuf>,
+    /// Coefficient file to write, or - for standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
+    #[arg(long)]
+    force: bool,
+    /// Continue an unfinished earlier run of this command, to the same bytes
+    #[arg(long)]
+    resume: bool,
+    /// Keep the blocks that are whole; damaged ones are lost. Exit code 3 if there are any
+    #[arg(long)]
+    skip_damaged: bool,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &MergeArgs) -> Result<()> {
+    args.common.start()?;
+    spare_inputs(&args.shards, &args.output)?;
+    let shards = Shards::open(&args.shards, &args.common.progress("open", "shards"))?;
+    let (mut out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
+    let progress = args.common.progress("merge", "windows");
+    let report = shards.merge(begun, args.skip_damaged, (&args.output, &mut out), &progress)?;
+    out.commit_if(resume::check)?;
+    let MergeReport { shards, frames, output_bytes, blocks_lost, .. } = report;
+    args.common.note(format_args!("{shards} shards, {frames} frames, {output_bytes} bytes"));
+    args.common.report(&report, args.output == Path::new(STANDARD))?;
+    match blocks_lost {
+        0 => Ok(()),
+        lost => Err(Error::input(&args.output, format!("blocks of damaged shards are lost: {lost}"))),
+    }
+}

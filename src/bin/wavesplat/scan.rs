@@ -1,0 +1,85 @@
+//! `wavesplat scan`
+
+use clap::Args;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Result};
+use wavesplat::base::output::Output;
+use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
+use wavesplat::convert::shard::{ArchiveScan, Shard};
+
+/// Find what conversions of shards must know of all frames: the range of values
+#[derive(Debug, Args)]
+#[command(
+    before_help = "\
+Examples:
+  wavesplat scan frames/ -o scan.json
+  wavesplat scan frames/ --shard 3/16 -o scan-3.json
+  wavesplat scan --merge scan-*.json -o scan.json
+  wavesplat convert frames/ --scan scan.json --shard 3/16 -o part-3.wspl",
+    after_help = "\
+The output is a small text in JSON. Options that choose samples (--variable, --frames, --region and so on) must be those of the \
+conversions."
+)]
+pub(crate) struct ScanArgs {
+    /// Frames as for convert; with --merge, scans of all shards
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// File to write, or - for standard output
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Read only the I-th of N parts of the frames
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
+    shard: Option<Shard>,
+    /// Make one scan of those of all shards
+    #[arg(long)]
+    merge: bool,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+    /// A value that means "missing"
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    missing_value: Option<f64>,
+    #[command(flatten)]
+    select: SelectArgs,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+pub(crate) fn run(args: &ScanArgs) -> Result<()> {
+    args.common.start()?;
+    spare_inputs(&args.inputs, &args.output)?;
+    let mut out = Output::create(&args.output, args.force)?;
+    let scan = if args.merge { args.merged()? } else { args.scan()? };
+    let failed = |e| Error::io(&args.output, "writing", e);
+    out.write_all(scan.to_json().as_bytes()).map_err(failed)?;
+    out.commit()
+}
+
+impl ScanArgs {
+    fn scan(&self) -> Result<ArchiveScan> {
+        let mut source = self.select.narrow(self.input.open(&self.inputs, &self.common)?)?;
+        let missing_value = source.archive().missing_value(self.missing_value);
+        ArchiveScan::of(source.as_mut(), self.shard, missing_value, &self.common.progress("scan", "frames"))
+    }
+
+    fn merged(&self) -> Result<ArchiveScan> {
+        let named = |path: &PathBuf| Ok((path.display().to_string(), read(path)?));
+        ArchiveScan::merged(&self.inputs.iter().map(named).collect::<Result<Vec<_>>>()?)
+    }
+}
+
+/// Most bytes of a scan.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Reads a scan.
+pub(crate) fn read(path: &Path) -> Result<ArchiveScan> {
+    let failed = |e| Error::io(path, "reading", e);
+    if path.metadata().map_err(failed)?.len() > MOST_BYTES {
+        return Err(Error::input(path, "is no scan: it is too long"));
+    }
+    let bytes = std::fs::read(path).map_err(failed)?;
+    ArchiveScan::of_json(&String::from_utf8_lossy(&bytes)).map_err(|what| Error::input(path, what))
+}

@@ -1,0 +1,42 @@
+//! Remedies of errors and notes, as arguments of Python.
+
+use wavesplat::base::error::{Error, Note, Remedy};
+
+/// The words of an error, with advice if there is some.
+pub(crate) fn of_error(error: &Error) -> String {
+    advised(error.to_string(), error.remedy().as_ref())
+}
+
+/// The words of a note, with advice if there is some.
+pub(crate) fn of_note(note: &Note) -> String {
+    advised(note.text.clone(), note.remedy.as_ref())
+}
+
+fn advised(words: String, remedy: Option<&Remedy>) -> String {
+    match remedy.and_then(advice) {
+        Some(advice) => format!("{words}; {advice}"),
+        None => words,
+    }
+}
+
+/// Advice; none for what Python does otherwise.
+fn advice(remedy: &Remedy) -> Option<String> {
+    Some(match remedy {
+        Remedy::Set("axes") => "axes=... changes this".into(),
+        Remedy::ChooseVariable => "variable=... chooses one".into(),
+        Remedy::ChooseComponent { .. } | Remedy::ChooseIndex { .. } => {
+            "choose one item of the other axes by isel".into()
+        }
+        Remedy::MaskMissing => "missing='mask' keeps them as missing samples".into(),
+        Remedy::DeclareMissing(value) => format!("if it means missing, give missing={value}"),
+        Remedy::Try(field, value) => format!("try {field}={value}"),
+        Remedy::Clip => "clip=True keeps decoded samples within the extremes of the source".into(),
+        Remedy::Allow(field) => format!("allow a larger error by {field}"),
+        Remedy::Replace => "overwrite=True replaces it".into(),
+        Remedy::BeginAnew => "overwrite=True starts over".into(),
+        Remedy::ResumeOrBeginAnew => "resume=True continues it, overwrite=True starts over".into(),
+        Remedy::RecoverOrSkip => "the program wavesplat saves the undamaged blocks: wavesplat recover".into(),
+        Remedy::ResumeOrRecover => "an unfinished conversion: resume=True continues it".into(),
+        _ => return None,
+    })
+}

@@ -1,0 +1,128 @@
+"""What a file knows, and what becomes of damaged ones."""
+
+import concurrent.futures
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+from conftest import SHAPE, smooth
+
+import wavesplat
+
+
+def test_facts(file, samples):
+    assert (file.shape, file.dtype, file.ndim, len(file)) == (SHAPE, np.float32, 4, SHAPE[0])
+    assert file.nbytes == samples.nbytes
+    assert file.chunks == ((16, 16, 8), (12, 8), (12, 6), (12, 10))
+    assert file.dims == ("time", "z", "y", "x")
+    assert file.coords == {}
+    assert file.promise["tolerance"] == 1e-3
+    assert abs(file[...] - samples).max() <= file.bound <= 1e-3 * np.ptp(samples)
+    assert file.range == pytest.approx((samples.min(), samples.max()), abs=file.bound)
+    assert "error <= " in repr(file)
+    file.check()
+
+
+def test_places_and_times(tmp_path):
+    times = np.array(["2001-02-03T04:00", "2001-02-03T05:00", "2001-02-03T07:00"], "datetime64[m]")
+    place = {"spacing": (1.0, 2.0, 0.5), "origin": (10.0, 0.0, -1.0)}
+    wavesplat.convert(smooth((3, 4, 5, 6)), tmp_path / "a.wspl", times=times, **place)
+    file = wavesplat.open(tmp_path / "a.wspl")
+    assert file.time_unit == "seconds since 2001-02-03 04:00:00"
+    assert file.coords["time"].tolist() == [0.0, 3600.0, 10800.0]
+    assert file.coords["x"].tolist() == [10.0, 11.0, 12.0, 13.0, 14.0, 15.0]
+    assert file.coords["z"].tolist() == [-1.0, -0.5, 0.0, 0.5]
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"])
+def test_every_type_comes_back_exactly(tmp_path, dtype):
+    samples = smooth((5, 4, 6, 7), np.dtype(dtype))
+    wavesplat.convert(samples, tmp_path / "a.wspl", tolerance=0)
+    back = wavesplat.open(tmp_path / "a.wspl")[...]
+    assert back.dtype == samples.dtype
+    np.testing.assert_array_equal(back, samples)
+
+
+def test_out(file, decoded):
+    out = np.empty((2, *SHAPE[1:]), file.dtype)
+    assert file.read(slice(30, 32), out=out) is out
+    np.testing.assert_array_equal(out, decoded[30:32])
+    strided = np.empty((2, 1, SHAPE[2], SHAPE[3]), file.dtype)[..., ::2]
+    file.read([3, 1], 4, slice(None), slice(0, None, 2), out=strided)
+    np.testing.assert_array_equal(strided, decoded[[3, 1], 4:5, :, ::2])
+    for wrong in (np.empty((1, *SHAPE[1:]), file.dtype), np.empty((2, *SHAPE[1:]), np.float64)):
+        with pytest.raises(ValueError, match="out: takes float32 of shape"):
+            file.read(slice(30, 32), out=wrong)
+
+
+def test_small_memory_gives_the_same(file, decoded):
+    np.testing.assert_array_equal(file.read(slice(None, None, -3), memory=10 << 20), decoded[::-3])
+
+
+def test_levels_of_detail(path, decoded):
+    coarse = wavesplat.open(path, lod=1)
+    np.testing.assert_array_equal(coarse[...], decoded[:, ::2, ::2, ::2])
+    with pytest.raises(ValueError, match="lod|level|detail"):
+        wavesplat.open(path, lod=30)
+
+
+def test_several_threads(file, decoded):
+    def read(n):
+        return np.array_equal(file[n % 40, ..., n % 22], decoded[n % 40, ..., n % 22])
+
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(read, range(200)))
+
+
+def test_pickled_files_are_opened_again(path, tmp_path):
+    file = wavesplat.open(path)
+    again = pickle.loads(pickle.dumps(file))
+    assert (again.id, again.shape) == (file.id, file.shape)
+    moved = tmp_path / "a.wspl"
+    shutil.copy(path, moved)
+    packed = pickle.dumps(wavesplat.open(moved))
+    wavesplat.convert(smooth(seed=2), moved, overwrite=True)
+    with pytest.raises(wavesplat.ChangedError, match="another file"):
+        pickle.loads(packed)
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match="none.wspl"):
+        wavesplat.open(tmp_path / "none.wspl")
+    (tmp_path / "text.wspl").write_text("no coefficients" * 100)
+    with pytest.raises(wavesplat.DamagedError, match="not a wavesplat coefficient file"):
+        wavesplat.open(tmp_path / "text.wspl")
+
+
+def test_damaged_files_raise(path, tmp_path, decoded):
+    """Cut and flipped files raise an exception of wavesplat, or give the right samples."""
+    whole = path.read_bytes()
+    rng = np.random.default_rng(3)
+    damaged = tmp_path / "damaged.wspl"
+    raised = 0
+    for n in range(120):
+        bytes_ = bytearray(whole)
+        at = int(rng.integers(len(whole)))
+        if n % 3:
+            bytes_[at] ^= 1 << int(rng.integers(8))
+        else:
+            del bytes_[at:]
+        damaged.write_bytes(bytes_)
+        try:
+            samples = wavesplat.open(damaged)[...]
+        except (wavesplat.WavesplatError, ValueError) as error:
+            assert "damaged.wspl" in str(error)
+            raised += 1
+        else:
+            np.testing.assert_array_equal(samples, decoded)
+    assert raised > 100
+    with pytest.raises(wavesplat.DamagedError):
+        wavesplat.open(damaged).check()
+
+
+def test_an_array_by_numpys_protocol(file, decoded):
+    np.testing.assert_array_equal(np.asarray(file), decoded)
+    assert np.asarray(file, dtype="f8").dtype == np.float64
+    with pytest.raises(ValueError, match="decoded"):
+        file.__array__(copy=False)

@@ -1,0 +1,119 @@
+"""Pictures, figures and the viewer."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from conftest import run
+
+import wavesplat
+
+
+def test_pictures_are_those_of_the_program(tmp_path, path, file):
+    cases = [
+        ({"frames": slice(2, 9, 3), "size": (60, 40)}, "--frames 2:9:3 --size 60x40"),
+        (
+            {"frames": [1, 7], "mode": "mip", "view": (200.5, -10), "size": (50, 50)},
+            "--frames 1,7 --mode mip --view=200.5,-10 --size 50x50",
+        ),
+        (
+            {"frames": 3, "colormap": "turbo", "range": (-1, 2.5), "size": (32, 32)},
+            "--frames 3 --colormap turbo --range=-1,2.5 --size 32x32",
+        ),
+        ({"frames": 3, "slice": {"z": 0.5}, "size": (32, 32)}, "--frames 3 --slice z=0.5 --size 32x32"),
+        (
+            {"frames": 3, "mode": "composite", "shade": True, "size": (32, 32)},
+            "--frames 3 --mode composite --shade --size 32x32",
+        ),
+        ({"frames": 3, "view": [(0, 0), "top"], "size": (32, 32)}, "--frames 3 --view 0,0 --view top --size 32x32"),
+    ]
+    for n, (options, words) in enumerate(cases):
+        out = tmp_path / f"{n}.npy"
+        run(path, *words.split(), "-q", "-o", out, name="wavesplat-render")
+        np.testing.assert_array_equal(file.render(**options), np.load(out))
+
+
+def test_maps_of_matplotlib(file):
+    matplotlib = pytest.importorskip("matplotlib")
+    options = {"frames": 3, "size": (48, 48), "range": (-2, 2), "clear": "none"}
+    by_name, by_object = (file.render(colormap=map, **options) for map in ("RdBu", matplotlib.colormaps["RdBu"]))
+    np.testing.assert_array_equal(by_name, by_object)
+    values = file.render(**{key: options[key] for key in ("frames", "size")})[0]
+    expected = matplotlib.colormaps["RdBu"](np.clip((values + 2) / 4, 0, 1))[..., :3] * 255
+    inside = np.isfinite(values)
+    assert abs(by_name[0][inside] - expected[inside]).max() <= 4  # it has steps, and these are interpolated
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"nonsense": 1}, "nonsense"),
+        ({"frames": 99}, "frames are numbered 0 to 39"),
+        ({"size": "large"}, "size"),
+        ({"colormap": "nothing"}, "no such colour map"),
+        ({"mode": "composite", "colormap": "turbo"}, "transfer_function"),
+    ],
+)
+def test_wrong_options(file, options, words):
+    with pytest.raises(ValueError, match=words) as raised:
+        file.render(**options)
+    assert "--" not in str(raised.value)
+
+
+def test_figures(tmp_path, file):
+    png = file.figure("png", size=(200, 150))
+    assert png.data.startswith(b"\x89PNG")
+    assert png._repr_png_() == png.data
+    page = file.figure(size=(100, 80), frames=slice(0, 3))
+    assert "<iframe srcdoc=" in page._repr_html_()
+    assert "sandbox" in page._repr_html_()
+    assert b"acTL" in file.figure("apng", frames=slice(0, 2), size=(80, 60)).data
+    assert page.save(tmp_path / "a.html").read_bytes() == page.data
+    with pytest.raises(ValueError, match="format"):
+        file.figure("bmp")
+
+
+def test_the_viewer_answers_until_it_is_closed(file):
+    with file.view(browser=False) as viewer:
+        with urllib.request.urlopen(viewer.address) as answer:
+            assert answer.status == 200
+            assert b"<canvas" in answer.read()
+        with pytest.raises(urllib.error.HTTPError):
+            urllib.request.urlopen(viewer.address[:-3])
+        assert viewer.address in viewer._repr_html_()
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(viewer.address)
+
+
+LONG = """
+    import wavesplat
+    def report(done, steps):
+        print("began", flush=True)
+    wavesplat.open("{path}").render(mode="composite", size=(1500, 1500), slices=8, progress=report)
+"""
+
+
+def test_long_rendering_can_be_interrupted(path, tmp_path):
+    code = textwrap.dedent(LONG.format(path=path))
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "began\n"
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert "KeyboardInterrupt" in errors
+
+
+def test_napari_gets_a_dask_array(path, decoded):
+    from wavesplat.napari import get_reader
+
+    ((samples, settings, kind),) = get_reader([str(path)])([str(path)])
+    assert kind == "image"
+    assert samples.chunks == wavesplat.open(path).chunks
+    np.testing.assert_array_equal(samples.compute(), decoded)
+    assert len(settings["scale"]) == 4
+    assert get_reader("a.png") is None

@@ -1,0 +1,158 @@
+"""Datasets go into files and come back, lazily and with all that they say."""
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import run, smooth
+
+import wavesplat
+import wavesplat.xarray  # noqa: F401
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+
+def ocean(dtype="f4"):
+    """A dataset with dates, a descending latitude, depths, a field beside the axes, texts, and missing samples."""
+    samples = smooth((10, 5, 12, 16), np.dtype(dtype))
+    lat, lon = np.linspace(60, 5, 12), np.arange(16) * 2.5
+    coords = {
+        "time": ("time", np.datetime64("2001-03-01", "ns") + np.arange(10) * np.timedelta64(6, "h")),
+        "depth": ("depth", [0.0, 10.0, 30.0, 70.0, 150.0], {"units": "m", "positive": "down"}),
+        "lat": ("lat", lat, {"units": "degrees_north", "standard_name": "latitude"}),
+        "lon": ("lon", lon, {"units": "degrees_east"}),
+        "area": (("lat", "lon"), np.cos(np.radians(lat))[:, None] * np.ones(16), {"units": "m2"}),
+        "run": ((), 7),
+    }
+    attrs = {"units": "degC", "long_name": "sea temperature", "levels": np.array([1, 2, 3], "i4")}
+    dims = ("time", "depth", "lat", "lon")
+    return xr.Dataset({"thetao": (dims, samples, attrs)}, coords, {"title": "an ocean", "version": 3})
+
+
+def test_a_dataset_comes_back(tmp_path):
+    ds = ocean()
+    report = ds.to_wavesplat(tmp_path / "a.wspl", tolerance={"thetao": 1e-3})
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    assert list(back.data_vars) == ["thetao"]
+    xr.testing.assert_identical(back.drop_vars("thetao"), ds.drop_vars("thetao"))
+    assert back.thetao.dims == ds.thetao.dims
+    assert back.thetao.dtype == np.float32
+    np.testing.assert_equal(dict(back.thetao.attrs), dict(ds.thetao.attrs))
+    assert abs(back.thetao - ds.thetao).max() <= report["reached"] <= 1e-3 * np.ptp(ds.thetao.values)
+    assert back.sel(lat=5, method="nearest").lat == 5
+
+
+def test_the_bytes_of_the_program(tmp_path):
+    """The program makes the same file of the dataset's NetCDF file."""
+    ds = ocean()
+    ds.to_netcdf(tmp_path / "a.nc")
+    run("convert", tmp_path / "a.nc", "-o", tmp_path / "a.wspl", "-q")
+    ds.to_wavesplat(tmp_path / "b.wspl")
+    assert (tmp_path / "a.wspl").read_bytes() == (tmp_path / "b.wspl").read_bytes()
+    ds.chunk({"time": 3, "lat": 5}).to_wavesplat(tmp_path / "c.wspl")
+    assert (tmp_path / "a.wspl").read_bytes() == (tmp_path / "c.wspl").read_bytes()
+
+
+@pytest.fixture
+def opened(tmp_path):
+    ocean().to_wavesplat(tmp_path / "a.wspl", tolerance=0, window=4, block=8)
+    return xr.open_dataset(tmp_path / "a.wspl"), ocean()
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        {"time": 3},
+        {"lat": slice(None, None, -1)},
+        {"lat": slice(9, 2, -3), "time": [5, 0, 5]},
+        {"lon": [3, 1, 15], "depth": -1},
+        {"lat": np.array([True, False] * 6)},
+        {"time": slice(0, 0)},
+        {"time": xr.DataArray([1, 2, 3], dims="p"), "lat": xr.DataArray([4, 0, 11], dims="p")},
+        {"time": 1, "depth": 2, "lat": 3, "lon": 4},
+    ],
+)
+def test_lazy_indexing(opened, key):
+    back, ds = opened
+    assert not back.thetao.variable._in_memory
+    xr.testing.assert_equal(back.thetao.isel(key), ds.thetao.isel(key))
+    assert not back.thetao.variable._in_memory
+    twice = back.thetao.isel(lat=slice(None, None, -2))[..., 2:9]
+    xr.testing.assert_equal(twice, ds.thetao.isel(lat=slice(None, None, -2))[..., 2:9])
+
+
+def test_chunks_are_windows_and_blocks(tmp_path, opened):
+    chunked = xr.open_dataset(tmp_path / "a.wspl", chunks={})
+    assert chunked.thetao.chunks == ((4, 4, 2), (5,), (4, 8), (8, 8))  # the latitude descends
+    xr.testing.assert_allclose(chunked.thetao.mean("time").compute(), ocean().thetao.mean("time"), atol=1e-5)
+    again = pickle.loads(pickle.dumps(chunked))
+    xr.testing.assert_equal(again.thetao.compute(), ocean().thetao)
+    assert pickle.loads(pickle.dumps(opened[0])).thetao.isel(time=0).shape == (5, 12, 16)
+
+
+def test_missing_samples_and_packed_types(tmp_path):
+    ds = ocean()
+    ds["thetao"] = ds.thetao.where(ds.lat < 50)
+    ds.to_wavesplat(tmp_path / "a.wspl")
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    np.testing.assert_array_equal(back.thetao.isnull(), ds.thetao.isnull())
+    counts = ocean("i2")
+    counts.thetao[:, 0, 0] = -5
+    counts.to_wavesplat(tmp_path / "b.wspl", missing=-5, tolerance=0)
+    raw = xr.open_dataset(tmp_path / "b.wspl", mask_and_scale=False).thetao
+    assert raw.dtype == np.int16
+    assert raw.attrs["_FillValue"] == -5
+    assert xr.open_dataset(tmp_path / "b.wspl").thetao.isnull().sum() >= 10 * 16
+
+
+def test_several_variables(tmp_path):
+    ds = ocean()
+    ds["so"] = ds.thetao * 2
+    ds["ice"] = ds.thetao.isel(depth=0, drop=True).mean("time")
+    with pytest.raises(ValueError, match="thetao, so.*%n"):
+        ds.to_wavesplat(tmp_path / "a.wspl")
+    reports = ds.to_wavesplat(tmp_path / "a_%n.wspl", tolerance={"thetao": 1e-2, "so": 1e-4})
+    assert set(reports) == {"thetao", "so"}
+    both = xr.open_mfdataset([tmp_path / "a_thetao.wspl", tmp_path / "a_so.wspl"], engine="wavesplat")
+    assert {"thetao", "so", "ice"} >= set(both.data_vars) >= {"thetao", "so"}
+    ds.to_wavesplat(tmp_path / "one.wspl", variable="so")
+    assert wavesplat.open(tmp_path / "one.wspl").variable == "so"
+    with pytest.raises(ValueError, match="no 'sea'"):
+        ds.to_wavesplat(tmp_path / "one.wspl", variable="sea", overwrite=True)
+
+
+def test_data_arrays_and_plain_files(tmp_path, path, decoded):
+    wavesplat.convert(ocean().thetao.rename("so"), tmp_path / "a.wspl")
+    assert list(xr.open_dataset(tmp_path / "a.wspl").data_vars) == ["so"]
+    xr.DataArray(smooth((4, 5, 6, 7)), dims=("t", "k", "j", "i")).to_wavesplat(tmp_path / "b.wspl", tolerance=0)
+    back = xr.open_dataset(tmp_path / "b.wspl")
+    assert back.data.dims == ("t", "k", "j", "i")
+    np.testing.assert_array_equal(back.data, smooth((4, 5, 6, 7)))
+    plain = xr.open_dataset(path, engine="wavesplat")
+    assert plain.data.dims == ("time", "z", "y", "x")
+    np.testing.assert_array_equal(plain.data, decoded)
+    assert xr.open_dataset(path, drop_variables="data").data_vars == {}
+
+
+def test_levels_of_detail(tmp_path):
+    ds = ocean()
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    coarse = xr.open_dataset(tmp_path / "a.wspl", lod=1)
+    expected = ds.isel(depth=slice(0, None, 2), lat=slice(1, None, 2), lon=slice(0, None, 2))
+    xr.testing.assert_equal(coarse, expected)
+
+
+def test_cftime(tmp_path):
+    ds = ocean()
+    ds["time"] = xr.date_range("0100-02-28", periods=10, freq="12h", calendar="360_day", use_cftime=True)
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    xr.testing.assert_identical(xr.open_dataset(tmp_path / "a.wspl").time, ds.time)
+
+
+def test_only_coefficient_files_are_guessed(tmp_path):
+    ocean().to_netcdf(tmp_path / "a.nc")
+    assert xr.open_dataset(tmp_path / "a.nc").thetao.shape == (10, 5, 12, 16)
+    (tmp_path / "text.wspl").write_text("nothing")
+    with pytest.raises(wavesplat.DamagedError, match="text.wspl"):
+        xr.open_dataset(tmp_path / "text.wspl")
