@@ -82,6 +82,7 @@ const OPTION_OWNERS: [(&str, &[&str]); 2] = [
         &[
             "annotate",
             "background",
+            "bar-title",
             "center",
             "clear",
             "colormap",
