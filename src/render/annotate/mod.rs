@@ -181,6 +181,7 @@ impl Annotation {
     }
 
     /// The beginning of the title that pictures of a size show, if they do not show it whole.
+    #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "only programs print notes"))]
     pub(crate) fn cut_title(&self, size: [usize; 2], frame: usize) -> Option<String> {
         let letters = Letters::new(layout::line(size));
         let title = self.placed_title(&letters, size[0] as f64, (frame, None)).filter(|_| has_time(size))?;

@@ -1,6 +1,6 @@
 //! Descriptions and their values, to and from Python.
 
-use crate::errors::InputError;
+use crate::errors::{InputError, borrowed};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -85,7 +85,7 @@ impl GivenValues<'_> {
         Ok(match self {
             Self::Texts(texts) => Values::Texts(texts.clone()),
             Self::Numbers(bytes, dtype) => {
-                Values::Numbers(Numbers::new(number_type(dtype)?, bytes.readonly().as_slice()?))
+                Values::Numbers(Numbers::new(number_type(dtype)?, bytes.try_readonly().map_err(borrowed)?.as_slice()?))
             }
         })
     }

@@ -44,3 +44,9 @@ pub(crate) fn raised(error: Error) -> PyErr {
 fn of_system(source: &io::Error, words: String) -> PyErr {
     io::Error::new(source.kind(), words).into()
 }
+
+/// The exception of an array that another thread is writing.
+#[allow(clippy::needless_pass_by_value, reason = "it is passed to map_err")]
+pub(crate) fn borrowed(error: numpy::BorrowError) -> PyErr {
+    PyValueError::new_err(format!("an array is in use: {error}"))
+}

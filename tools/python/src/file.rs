@@ -4,6 +4,7 @@
 use crate::errors::raised;
 use crate::{described, job};
 use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -159,7 +160,7 @@ impl File {
     ) -> PyResult<()> {
         let region = Region { start: region.0, end: region.1 };
         let config = ExtractConfig { frames, region, channel, memory, ..ExtractConfig::new(&self.file) };
-        let mut out = out.readwrite();
+        let mut out = out.try_readwrite().map_err(|e| PyValueError::new_err(format!("out: {e}")))?;
         let out = out.as_slice_mut()?;
         let is_short = out.len() < SHORT;
         let mut at = 0;

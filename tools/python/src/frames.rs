@@ -1,5 +1,6 @@
 //! Frames that Python gives one after another, as a stream of bytes.
 
+use crate::errors::borrowed;
 use crate::job::Caller;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -23,7 +24,7 @@ impl FrameReader {
     fn copy(&mut self, out: &mut [u8]) -> PyResult<usize> {
         let Some((array, at)) = &mut self.current else { return Ok(0) };
         Python::attach(|py| {
-            let array = array.bind(py).readonly();
+            let array = array.bind(py).try_readonly().map_err(borrowed)?;
             let bytes = &array.as_slice()?[*at..];
             let count = bytes.len().min(out.len());
             out[..count].copy_from_slice(&bytes[..count]);

@@ -1,6 +1,7 @@
 //! Named arrays of a dataset in Python, as the library reads them.
 
 use crate::described::{GivenValues, given_attributes, number_type};
+use crate::errors::borrowed;
 use crate::job::Caller;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -75,7 +76,7 @@ impl NamedArrays for PythonArrays {
         let (function, name) = (self.read.clone(), name.to_string());
         self.caller.call(move |py| {
             let bytes = function.bind(py).call1((name, ranges))?.cast_into::<PyArray1<u8>>()?;
-            Ok(bytes.readonly().as_slice()?.to_vec())
+            Ok(bytes.try_readonly().map_err(borrowed)?.as_slice()?.to_vec())
         })
     }
 }

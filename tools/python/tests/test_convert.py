@@ -114,6 +114,11 @@ def test_missing_samples(tmp_path, samples):
     np.testing.assert_array_equal(file[...] == -999, filled == -999)
 
 
+def test_masks_are_not_lost(tmp_path, samples):
+    with pytest.raises(ValueError, match="filled"):
+        wavesplat.convert(np.ma.masked_less(samples, 0), tmp_path / "a.wspl")
+
+
 def test_exceptions_of_frames_come_through(tmp_path, samples):
     def frames():
         yield samples[0]

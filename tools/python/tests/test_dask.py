@@ -51,12 +51,29 @@ def test_many_workers_make_the_file_of_one_conversion(client, tmp_path):
     samples = smooth((64, 12, 12, 12))
     lazy = xr.DataArray(samples, dims=("time", "z", "y", "x"), name="u").chunk({"time": 5}) * 1.0
     settings = {"tolerance": 1e-3, "window": 8, "chain": 2}
-    report = wavesplat.dask.convert(lazy, tmp_path / "a.wspl", client=client, **settings)
+    (tmp_path / "a.wspl").write_text("mine")
+    with pytest.raises(ValueError, match="exists already"):
+        wavesplat.dask.convert(lazy, tmp_path / "a.wspl", client=client, **settings)
+    report = wavesplat.dask.convert(lazy, tmp_path / "a.wspl", client=client, overwrite=True, **settings)
     assert report["shards"] == 4
     whole = (float(samples.min()), float(samples.max()))
     wavesplat.convert(lazy, tmp_path / "b.wspl", range=whole, **settings)
     assert (tmp_path / "a.wspl").read_bytes() == (tmp_path / "b.wspl").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.wspl", "b.wspl"]
+
+
+def test_shards_of_other_frames_are_not_taken(client, tmp_path):
+    """What an earlier run left is made anew with overwrite."""
+    first, second = (samples_of(smooth((32, 8, 8, 8), seed=n)).chunk({"time": 8}) for n in (1, 2))
+    settings = {"window": 8, "chain": 1, "range": (-4, 4), "client": client}
+    folder = tmp_path / "a.wspl.shards"
+    folder.mkdir()
+    wavesplat.convert(first, folder / "part-1-of-4.wspl", shard=(1, 4), window=8, chain=1, range=(-4, 4))
+    wavesplat.dask.convert(second, tmp_path / "a.wspl", shards=4, overwrite=True, **settings)
+    assert abs(wavesplat.open(tmp_path / "a.wspl")[...] - second.values).max() <= 0.08
+    assert not folder.exists()
+    with pytest.raises(ValueError, match="Dask arrays"):
+        wavesplat.dask.convert(first.compute(), tmp_path / "b.wspl", **settings)
 
 
 def test_a_worker_that_is_killed_is_made_up_for(tmp_path):

@@ -56,6 +56,18 @@ def test_out(file, decoded):
             file.read(slice(30, 32), out=wrong)
 
 
+def test_out_that_cannot_be_written(file):
+    out = np.empty((2, *SHAPE[1:]), file.dtype)
+    out.flags.writeable = False
+    with pytest.raises(ValueError, match="out: cannot be written"):
+        file.read(slice(30, 32), out=out)
+
+
+def test_single_samples_are_numbers(file, decoded):
+    assert type(file[1, 2, 3, 4]) is type(decoded[1, 2, 3, 4]) is np.float32
+    assert file.size == decoded.size
+
+
 def test_small_memory_gives_the_same(file, decoded):
     np.testing.assert_array_equal(file.read(slice(None, None, -3), memory=10 << 20), decoded[::-3])
 

@@ -26,7 +26,7 @@ def test_pictures_are_those_of_the_program(tmp_path, path, file):
             {"frames": 3, "colormap": "turbo", "range": (-1, 2.5), "size": (32, 32)},
             "--frames 3 --colormap turbo --range=-1,2.5 --size 32x32",
         ),
-        ({"frames": 3, "slice": {"z": 0.5}, "size": (32, 32)}, "--frames 3 --slice z=0.5 --size 32x32"),
+        ({"frames": 3, "slice": {"z": "50%"}, "size": (32, 32)}, "--frames 3 --slice z=0.5 --size 32x32"),
         (
             {"frames": 3, "mode": "composite", "shade": True, "size": (32, 32)},
             "--frames 3 --mode composite --shade --size 32x32",
@@ -36,7 +36,8 @@ def test_pictures_are_those_of_the_program(tmp_path, path, file):
     for n, (options, words) in enumerate(cases):
         out = tmp_path / f"{n}.npy"
         run(path, *words.split(), "-q", "-o", out, name="wavesplat-render")
-        np.testing.assert_array_equal(file.render(**options), np.load(out))
+        pictures = file.render(**options)
+        np.testing.assert_array_equal(pictures, np.load(out).reshape(pictures.shape))
 
 
 def test_maps_of_matplotlib(file):
@@ -74,9 +75,17 @@ def test_figures(tmp_path, file):
     assert "<iframe srcdoc=" in page._repr_html_()
     assert "sandbox" in page._repr_html_()
     assert b"acTL" in file.figure("apng", frames=slice(0, 2), size=(80, 60)).data
+    sheet = file.figure("png", frames=[1, 2], view=[(30, 30), "top"], size=(80, 60), iso=[0.5, 1.5])
+    assert sheet.data.startswith(b"\x89PNG")
     assert page.save(tmp_path / "a.html").read_bytes() == page.data
     with pytest.raises(ValueError, match="format"):
         file.figure("bmp")
+
+
+@pytest.mark.parametrize("options", [{"port": 99999}, {"port": -1}])
+def test_wrong_ports(file, options):
+    with pytest.raises(ValueError, match="port"):
+        file.view(browser=False, **options)
 
 
 def test_the_viewer_answers_until_it_is_closed(file):
@@ -117,3 +126,19 @@ def test_napari_gets_a_dask_array(path, decoded):
     np.testing.assert_array_equal(samples.compute(), decoded)
     assert len(settings["scale"]) == 4
     assert get_reader("a.png") is None
+
+
+def test_numbers_of_slices_are_coordinates(file, decoded):
+    size = {"frames": 3, "size": (64, 64)}
+    np.testing.assert_array_equal(file.render(slice={"z": 1.0}, **size), file.render(slice={"z": "#1"}, **size))
+    np.testing.assert_array_equal(file.render(slice={"z": 1}, **size), file.render(slice="z=#1", **size))
+
+
+def test_frames_by_masks_and_views_by_lists(file):
+    mask = np.arange(40) == 7
+    np.testing.assert_array_equal(file.render(frames=mask, size=(20, 20)), file.render(frames=7, size=(20, 20)))
+    with pytest.raises(ValueError, match="frames: none"):
+        file.render(frames=mask & False)
+    several = file.render(view=[(30, 30), "top"], frames=[1, 2, 3], size=(20, 24))
+    assert several.shape == (2, 3, 24, 20)
+    assert file.render(orbit=4, frames=0, size=(20, 24)).shape == (4, 1, 24, 20)

@@ -122,6 +122,19 @@ def test_several_variables(tmp_path):
         ds.to_wavesplat(tmp_path / "one.wspl", variable="sea", overwrite=True)
 
 
+def test_bounds_and_other_small_variables_are_kept(tmp_path):
+    ds = ocean()
+    ds["depth_bnds"] = (("depth", "bnds"), np.arange(10.0).reshape(5, 2))
+    ds.depth.attrs["bounds"] = "depth_bnds"
+    ds["crs"] = ((), np.int32(7), {"grid_mapping_name": "latitude_longitude"})
+    ds.to_wavesplat(tmp_path / "a.wspl")
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    xr.testing.assert_identical(back.drop_vars("thetao"), ds.drop_vars("thetao"))
+    ds.to_netcdf(tmp_path / "a.nc")
+    run("convert", tmp_path / "a.nc", "-o", tmp_path / "b.wspl", "-q")
+    assert (tmp_path / "a.wspl").read_bytes() == (tmp_path / "b.wspl").read_bytes()
+
+
 def test_data_arrays_and_plain_files(tmp_path, path, decoded):
     wavesplat.convert(ocean().thetao.rename("so"), tmp_path / "a.wspl")
     assert list(xr.open_dataset(tmp_path / "a.wspl").data_vars) == ["so"]

@@ -80,6 +80,7 @@ pub(super) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Cho
 }
 
 /// The variables among which the user must choose; none if [`only`] finds the one.
+#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
 pub(super) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::VariableInfo> {
     let volumes = volumes(all, active);
     if volumes.len() > 1 { volumes.iter().map(Choice::info).collect() } else { Vec::new() }

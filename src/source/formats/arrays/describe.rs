@@ -2,8 +2,7 @@
 
 use super::{ArrayFile, Variable};
 use crate::base::description::{
-    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Values, Variable as Described, frames_of,
-    select,
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, Values, Variable as Described, frames_of, select,
 };
 use crate::source::layout::Counts;
 use crate::source::{Extent, Parsed};
@@ -207,6 +206,7 @@ fn is_users(attribute: &Attribute) -> bool {
 }
 
 /// Numbers as values.
-pub(super) fn numbers(ty: NumberType, bytes: &[u8]) -> Values {
+#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
+pub(super) fn numbers(ty: crate::base::description::NumberType, bytes: &[u8]) -> Values {
     Values::Numbers(crate::base::description::Numbers::new(ty, bytes))
 }

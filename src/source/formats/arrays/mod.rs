@@ -34,7 +34,7 @@ use crate::base::stored::StoredType;
 use crate::source::file_header::{FileHeader, Units};
 use crate::source::layout::{Axis, Counts, Layout, Shape};
 use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{self, Advised, Extent, OpenOptions, Parsed, numbering};
+use crate::source::{Advised, Extent, OpenOptions, Parsed, numbering};
 use choose::Choice;
 use chunks::Chunks;
 use in_place::InPlace;
@@ -276,7 +276,8 @@ impl ArrayArchive {
     }
 
     /// The variables among which the user must choose; none if it is clear which one is meant.
-    pub(super) fn undecided(&self) -> Result<Vec<source::VariableInfo>> {
+    #[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
+    pub(super) fn undecided(&self) -> Result<Vec<crate::source::VariableInfo>> {
         let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
         Ok(choose::undecided(&all, active(image.as_ref())))
     }

@@ -271,6 +271,8 @@ class Frames:
         """Those of an array, or of an iterable of frames."""
         if hasattr(source, "shape") and hasattr(source, "dtype") and hasattr(source, "__getitem__"):
             return cls._of_array(source, memory)
+        if isinstance(source, (str, bytes, PathLike)):
+            raise ValueError("source: takes arrays, not the name of a file; open it, say by xarray.open_dataset")
         if not isinstance(source, Iterable):
             raise ValueError(f"source: takes an array, a dataset or an iterable of frames, not {type(source).__name__}")
         return cls._of_iterable(source)
@@ -334,6 +336,8 @@ def frames_together(shape: tuple[int, ...], itemsize: int, chunk: tuple[int, ...
 
 def _bytes(frames: Any, like: npt.NDArray[Any] | None) -> npt.NDArray[np.uint8]:
     """The bytes of frames, x fastest."""
+    if isinstance(frames, np.ma.MaskedArray):
+        raise ValueError("source: masked arrays are ambiguous; convert array.filled(np.nan) with missing='mask'")
     array = np.asarray(frames)
     if like is not None and (array.shape, array.dtype) != (like.shape, like.dtype):
         what = f"a frame is {array.dtype} of shape {array.shape}"

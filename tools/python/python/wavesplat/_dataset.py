@@ -43,6 +43,8 @@ def convert_dataset(
         return _one(dataset, names[0], settings, allowed, axes, progress)
     reports = {}
     for name in names:
+        allowed.applied(settings, name)  # so that none is written if one lacks an entry
+    for name in names:
         of_name = replace(settings, path=settings.path.replace(NAME, name.replace("/", "_")))
         reports[name] = _one(dataset, name, of_name, allowed, axes, progress)
     return reports
@@ -75,7 +77,7 @@ def _one(
         part = encoded[array][tuple(slice(start, stop) for start, stop in ranges)]
         return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
 
-    chosen = {"source": f"dataset ({name})", "variable": None, "axes": axes}
+    chosen = {"source": f"dataset ({name})", "variable": name, "axes": axes}
     of_name = asdict(allowed.applied(settings, name))
     with reporting(progress, f"convert {name}") as report:
         return told(*_wavesplat.convert_arrays(arrays, _attributes(attrs), read, chosen, of_name, report))
@@ -83,7 +85,8 @@ def _one(
 
 def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], dict[Hashable, Any]]:
     """The variables that a NetCDF file of this variable would have. Lazy arrays stay lazy."""
-    alone = dataset[[name]].copy()  # not the data
+    beside = [key for key, array in dataset.data_vars.items() if array.ndim < 3]  # such as bounds of axes
+    alone = dataset[[name, *(key for key in beside if key != name)]].copy()  # not the data
     for key, var in alone.variables.items():
         kept = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
         alone[key].encoding = kept if _is_date(var) else {}

@@ -51,6 +51,8 @@ class File:
 
     def __init__(self, path: str | PathLike[str], *, lod: int = 0) -> None:
         """As `wavesplat.open`."""
+        if lod < 0:
+            raise ValueError(f"lod: takes 0 or more, not {lod}")
         self._path, self._lod = os.fspath(path), lod
         self._file = _wavesplat.File(self._path, lod)
 
@@ -103,9 +105,14 @@ class File:
         return self._file.channels
 
     @property
+    def size(self) -> int:
+        """Samples of a channel."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
     def nbytes(self) -> int:
         """Bytes of all samples of a channel."""
-        return int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
+        return self.size * self.dtype.itemsize
 
     @cached_property
     def chunks(self) -> tuple[tuple[int, ...], ...]:
@@ -195,7 +202,7 @@ class File:
         """Bytes of the file that were read so far."""
         return self._file.bytes_read
 
-    def __getitem__(self, key: Any) -> npt.NDArray[Any]:
+    def __getitem__(self, key: Any) -> Any:
         """Samples by an index of numpy's: numbers, slices, ``...``, ``None``, and one list or mask."""
         selection = select(key, self.shape)
         return selection.finish(self._read(selection.items))
@@ -209,7 +216,8 @@ class File:
         """All samples."""
         if copy is False:
             raise ValueError("samples are decoded: there is no array without a copy")
-        return self[...].astype(dtype or self.dtype, copy=False)
+        samples: npt.NDArray[Any] = self[...]
+        return samples.astype(dtype or self.dtype, copy=False)
 
     def read(
         self,
@@ -221,7 +229,7 @@ class File:
         out: npt.NDArray[Any] | None = None,
         channel: int = 0,
         memory: int = MEMORY,
-    ) -> npt.NDArray[Any]:
+    ) -> Any:
         """Samples by a number, slice, list or mask along each axis.
 
         Args:
@@ -241,6 +249,8 @@ class File:
         selection = select((t, z, y, x), self.shape, outer=True)
         if out is None:
             return selection.finish(self._read(selection.items, channel=channel, memory=memory))
+        if not out.flags.writeable:
+            raise ValueError("out: cannot be written")
         if out.shape != selection.shape or out.dtype != self.dtype:
             raise ValueError(
                 f"out: takes {self.dtype} of shape {selection.shape}, not {out.dtype} of shape {out.shape}"
@@ -277,29 +287,35 @@ class File:
         Args:
             progress: Whether to show progress, or a function of (done, all).
             options: Those of ``wavesplat-render`` with underscores: ``view=(30, 30)``, ``mode="composite"``,
-                ``frames=slice(0, 8)``, ``size=(640, 480)``, ``range=(0, 1)``, ``iso="50%"``, ``slice={"z": 0.5}``,
-                ``colormap="RdBu"`` (names and objects of matplotlib work), ``memory="1GiB"`` and so on.
+                ``frames=slice(0, 8)``, ``size=(640, 480)``, ``range=(0, 1)``, ``iso="50%"``,
+                ``slice={"z": "50%"}`` (numbers are coordinates), ``colormap="RdBu"`` (names and objects of matplotlib work),
+                ``memory="1GiB"`` and so on.
 
         Returns:
             Means and largest values: float32 (pictures, height, width) in the unit of the samples, NaN for background.
             With a ``colormap``: uint8 colours (pictures, height, width, 3). Composites and isosurfaces: float32 red, green,
             blue and what shines through (pictures, height, width, 4), each 0 to 1.
 
+            Several views, by a list or ``orbit``, add an axis before these.
+
         Raises:
             ValueError: An option is wrong.
 
         """
+        is_several = isinstance(options.get("view"), list) or options.get("orbit", 1) != 1
+        is_several = is_several and not (options.get("over_time") or options.get("key_frames"))
         with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
-            path = os.path.join(folder, "pictures.npy")
-            self._render(path, options, progress)
-            pictures: npt.NDArray[Any] = np.load(path)
-            return pictures
+            self._render(os.path.join(folder, "%05v.npy" if is_several else "pictures.npy"), options, progress)
+            views = [np.load(path) for path in sorted(Path(folder).glob("*.npy"))]
+        pictures: npt.NDArray[Any] = np.stack(views) if is_several else views[0]
+        return pictures
 
     def figure(self, format: str = "html", *, height: int = 700, progress: Progress = False, **options: Any) -> Figure:
         """A picture that a notebook shows.
 
         Args:
-            format: "html" for an interactive page with all frames, "png" for one picture, "apng" or "gif" for a movie.
+            format: "html" for an interactive page with all frames, "png" for one picture or a sheet of several, "apng" or
+                "gif" for a movie.
             height: Pixels of height that a page takes in a notebook.
             progress: Whether to show progress, or a function of (done, all).
             options: As for `render`. ``annotate`` is True by default.
@@ -308,8 +324,10 @@ class File:
         if format not in ("html", "png", "apng", "gif"):
             raise ValueError(f"format: 'html', 'png', 'apng' or 'gif', not {format!r}")
         options = {"annotate": True, **options}
-        if format == "png" and "frames" not in options:
-            options["frames"] = self.shape[0] // 2
+        if format == "png":
+            options.setdefault("frames", self.shape[0] // 2)
+            if not isinstance(options["frames"], (int, np.integer)) or isinstance(options.get("view"), list):
+                options["format"] = "sheet"  # all pictures in one
         with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
             path = Path(folder, f"figure.{format}")
             self._render(str(path), options, progress)
@@ -344,7 +362,7 @@ class Outer:
         """Of a file."""
         self._of = file
 
-    def __getitem__(self, key: Any) -> npt.NDArray[Any]:  # noqa: D105
+    def __getitem__(self, key: Any) -> Any:  # noqa: D105
         selection = select(key, self._of.shape, outer=True)
         return selection.finish(self._of._read(selection.items))
 
@@ -354,6 +372,8 @@ class Viewer:
 
     def __init__(self, path: str, options: Sequence[str], *, port: int, memory: int, browser: bool) -> None:
         """Starts the server."""
+        if not 0 <= port < 1 << 16:
+            raise ValueError(f"port: takes 0 to 65535, not {port}")
         self._viewer = _wavesplat.Viewer(path, port, memory, options)
         if browser:
             self._viewer.open_browser()

@@ -29,12 +29,12 @@ class Selection:
         """The shape with all axes."""
         return tuple(len(items) for items in self.items)
 
-    def finish(self, samples: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Drops axes of single numbers, and adds new ones."""
+    def finish(self, samples: npt.NDArray[Any]) -> Any:
+        """Drops axes of single numbers, and adds new ones. A single sample becomes a number, as in numpy."""
         result = samples[tuple(0 if dropped else slice(None) for dropped in self.dropped)]
         for axis in self.new:
             result = np.expand_dims(result, axis)
-        return result
+        return result[()] if result.ndim == 0 else result
 
 
 def select(key: Any, shape: Sequence[int], *, outer: bool = False) -> Selection:

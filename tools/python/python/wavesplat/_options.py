@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+REPEATED = ("view", "slice", "probe")
+"""Options that a list repeats. Of others it gives several values."""
+
 
 def words(options: dict[str, Any]) -> list[str]:
-    """The words of options; None and False leave an option out, True has no value, lists repeat it."""
+    """The words of options; None and False leave an option out, True has no value."""
     return [word for name, value in options.items() for word in _option(name, value)]
 
 
@@ -20,7 +23,7 @@ def _option(name: str, value: Any) -> Iterable[str]:
         return []
     if value is True:
         return [option]
-    if isinstance(value, list) and name != "frames":
+    if isinstance(value, list) and name in REPEATED:
         return [word for one in value for word in _option(name, one)]
     return [f"{option}={_text(name, value)}"]
 
@@ -31,12 +34,16 @@ def _text(name: str, value: Any) -> str:
     if name == "frames" and isinstance(value, slice):
         return ":".join("" if part is None else str(part) for part in (value.start, value.stop, value.step or 1))
     if name == "frames" and not isinstance(value, str):
-        return ",".join(str(int(frame)) for frame in np.atleast_1d(np.asarray(value)))
+        frames = np.atleast_1d(np.asarray(value))
+        frames = np.flatnonzero(frames) if frames.dtype == bool else frames
+        if len(frames) == 0:
+            raise ValueError("frames: none are chosen")
+        return ",".join(str(int(frame)) for frame in frames)
     if name == "size" and not isinstance(value, str):
         return "x".join(str(int(side)) for side in value)
-    if isinstance(value, dict):
-        return ",".join(f"{key}={_number(one)}" for key, one in value.items())
-    if isinstance(value, (tuple, np.ndarray)):
+    if isinstance(value, dict):  # numbers are coordinates, texts such as "50%" and "#12" are what the program takes
+        return ",".join(f"{key}={one if isinstance(one, str) else '@' + _number(one)}" for key, one in value.items())
+    if isinstance(value, (tuple, list, np.ndarray)):
         return ",".join(_number(one) for one in value)
     return _number(value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,12 +26,12 @@ def reporting(progress: Progress, what: str) -> Iterator[_Report | None]:
 
 
 def _shown(what: str) -> Iterator[_Report]:
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
+    if importlib.util.find_spec("tqdm") is None:
         yield _line(what)
         sys.stderr.write("\n")
         return
+    from tqdm.auto import tqdm
+
     with tqdm(desc=what, leave=True) as bar:
         yield lambda done, steps: _advance(bar, done, steps)
 

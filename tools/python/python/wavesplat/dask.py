@@ -25,6 +25,7 @@ def convert(
     variable: str | None = None,
     shards: int | None = None,
     folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
     **settings: Any,
 ) -> dict[str, Any]:
     """Converts a dataset of Dask arrays by many workers, to the bytes of one conversion with the same range.
@@ -38,7 +39,8 @@ def convert(
         client: A client of dask.distributed; the current one by default.
         variable: Which variable of a Dataset.
         shards: How many shards; by default as many as there are chains of 8 windows, at most four for each worker.
-        folder: A folder for the shards, ``path`` + ".shards" by default. It is removed in the end if it was made here.
+        folder: A folder for the shards, ``path`` + ".shards" by default. They are removed in the end.
+        overwrite: Whether to replace a file of this name, and shards that an earlier run left.
         settings: Those of `wavesplat.convert`.
 
     Returns:
@@ -47,6 +49,10 @@ def convert(
     """
     import distributed
 
+    if os.path.exists(path) and not overwrite:
+        raise ValueError(f"{os.fspath(path)}: exists already; overwrite=True replaces it")
+    if not any(chunks for chunks in source.chunksizes.values()):
+        raise ValueError("source: takes Dask arrays, as xr.open_dataset(..., chunks={}) gives them, or .chunk()")
     client = client or distributed.get_client()
     array = source if isinstance(source, xr.DataArray) else _variable(source, variable)
     if settings.get("range") is None and settings.get("max_error") is None:
@@ -56,18 +62,19 @@ def convert(
     workers = max(len(client.scheduler_info()["workers"]), 1)
     shards = shards or max(min(-(-frames // chain), 4 * workers), 1)
     place = Path(folder) if folder is not None else Path(os.fspath(path) + ".shards")
-    is_new = not place.exists()
     place.mkdir(parents=True, exist_ok=True)
     parts = [place / f"part-{n}-of-{shards}.wspl" for n in range(1, shards + 1)]
+    if overwrite:
+        for part in place.glob("part-*.wspl*"):
+            part.unlink()  # they may be of other frames
     dataset = source if isinstance(source, xr.DataArray) else source[[array.name]]
     numbers = [(n, shards) for n in range(1, shards + 1)]
     wait = client.map(_shard, numbers, [str(part) for part in parts], source=dataset, settings=settings, pure=False)
     client.gather(wait)
-    overwrite = bool(settings.get("overwrite", False))
     report = merge(parts, path, overwrite=overwrite, resume=not overwrite)
-    if is_new:
-        for part in parts:
-            part.unlink()
+    for part in parts:
+        part.unlink()
+    if folder is None and not any(place.iterdir()):
         place.rmdir()
     return report
 
@@ -93,4 +100,4 @@ def _shard(shard: tuple[int, int], path: str, *, source: Any, settings: dict[str
     import dask
 
     with dask.config.set(scheduler="threads"):
-        _convert(source, path, shard=shard, resume=True, **{**settings, "overwrite": False})
+        _convert(source, path, shard=shard, resume=True, **settings)

@@ -40,9 +40,9 @@ class _Samples(BackendArray):
         samples = self.file.read(*by_role, channel=self.channel)
         own = [ROLES.index(axis.role) for axis in self.axes if axis.role in ROLES]
         samples = samples.transpose([*own, *(n for n in range(len(ROLES)) if n not in own)])
-        return samples.reshape([items[n].size if np.ndim(items[n]) else 1 for n in range(len(items))])[
-            tuple(slice(None) if np.ndim(along) else 0 for along in items)
-        ]
+        samples = samples.reshape([np.size(along) for along in items])
+        found: npt.NDArray[Any] = samples[tuple(slice(None) if np.ndim(along) else 0 for along in items)]
+        return found
 
 
 def _length(file: File, role: str) -> int:
