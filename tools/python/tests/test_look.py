@@ -75,8 +75,10 @@ def test_figures(tmp_path, file):
     assert "<iframe srcdoc=" in page._repr_html_()
     assert "sandbox" in page._repr_html_()
     assert b"acTL" in file.figure("apng", frames=slice(0, 2), size=(80, 60)).data
-    sheet = file.figure("png", frames=[1, 2], view=[(30, 30), "top"], size=(80, 60), iso=[0.5, 1.5])
-    assert sheet.data.startswith(b"\x89PNG")
+    for several in ({"frames": [1, 2]}, {"frames": 1, "view": [(30, 30), "top"]}):
+        assert file.figure("png", size=(80, 60), iso=[0.5, 1.5], **several).data.startswith(b"\x89PNG")
+    with pytest.raises(ValueError, match="not both"):
+        file.figure("png", frames=[1, 2], view=["top", "front"])
     assert page.save(tmp_path / "a.html").read_bytes() == page.data
     with pytest.raises(ValueError, match="format"):
         file.figure("bmp")

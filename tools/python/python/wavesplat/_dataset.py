@@ -85,13 +85,14 @@ def _one(
 
 def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], dict[Hashable, Any]]:
     """The variables that a NetCDF file of this variable would have. Lazy arrays stay lazy."""
-    beside = [key for key, array in dataset.data_vars.items() if array.ndim < 3]  # such as bounds of axes
-    alone = dataset[[name, *(key for key in beside if key != name)]].copy()  # not the data
+    kept = [key for key, array in dataset.data_vars.items() if key == name or array.ndim < 3]  # such as bounds of axes
+    alone = dataset[kept].copy()  # not the data
     for key, var in alone.variables.items():
-        kept = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
-        alone[key].encoding = kept if _is_date(var) else {}
+        encoding = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
+        alone[key].encoding = encoding if _is_date(var) else {}
     variables, attrs = xr.conventions.encode_dataset_coordinates(alone)
-    encoded = {str(key): xr.conventions.encode_cf_variable(var, name=key) for key, var in variables.items()}
+    ordered = [key for key in dataset.variables if key in variables]  # as in a file of the whole dataset
+    encoded = {str(key): xr.conventions.encode_cf_variable(variables[key], name=key) for key in ordered}
     return encoded, attrs
 
 

@@ -326,7 +326,10 @@ class File:
         options = {"annotate": True, **options}
         if format == "png":
             options.setdefault("frames", self.shape[0] // 2)
-            if not isinstance(options["frames"], (int, np.integer)) or isinstance(options.get("view"), list):
+            several = (not isinstance(options["frames"], (int, np.integer)), isinstance(options.get("view"), list))
+            if all(several):
+                raise ValueError("png: shows several frames or several views, not both; take 'html'")
+            if any(several):
                 options["format"] = "sheet"  # all pictures in one
         with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
             path = Path(folder, f"figure.{format}")
