@@ -108,21 +108,21 @@ impl Rays {
     pub(super) fn meeting(&self, value: f32, from: &Place, to: &Place) -> Option<Meeting> {
         let rises = [from, to].map(|place| self.rise(&place.gradient));
         let bend = (rises[1] - rises[0]) / (to.at[2] - from.at[2]);
+        let share = rises[0] / (rises[0] - rises[1]);
+        let turn = (rises[0] * rises[1] < 0.0).then(|| turning_value(from, to, rises, share));
         let meeting = if (from.value < value) != (to.value < value) {
             let place = between(from, to, (value - from.value) / (to.value - from.value));
-            let rise = self.rise(&place.gradient);
-            let covered = self.of_height(rise * rise / (2.0 * bend.abs()), &place.gradient);
-            let is_second = rise * bend > 0.0 && covered < 1.0;
-            let sheets = if is_second { Sheets::Second } else { Sheets::One };
+            let is_turn_behind = self.rise(&place.gradient) * bend > 0.0;
+            let (end, rise) = if is_turn_behind { (from, rises[0]) } else { (to, rises[1]) };
+            let beyond = || (end.value - value).abs() + rise * rise / (2.0 * bend.abs());
+            let height = turn.map_or_else(beyond, |turn| (turn - value).abs());
+            let covered = self.of_height(height, &place.gradient);
+            let sheets = if is_turn_behind && covered < 1.0 { Sheets::Second } else { Sheets::One };
             Meeting { gradient: place.gradient, covered: covered * self.within(&place, bend), sheets }
         } else {
-            let turns = rises[0] * rises[1] < 0.0 && (rises[0] > 0.0) == (from.value < value);
-            if !turns {
-                return None;
-            }
-            let share = rises[0] / (rises[0] - rises[1]);
-            let (top, place) = (turning_value(from, to, rises, share), between(from, to, share));
-            let height = if rises[0] > 0.0 { top - value } else { value - top };
+            let turn = turn.filter(|_| (rises[0] > 0.0) == (from.value < value))?;
+            let place = between(from, to, share);
+            let height = if rises[0] > 0.0 { turn - value } else { value - turn };
             let covered = self.of_height(height, &place.gradient) * self.within(&place, bend);
             Meeting { gradient: place.gradient, covered, sheets: Sheets::Both }
         };

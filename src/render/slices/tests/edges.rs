@@ -60,7 +60,7 @@ fn silhouettes_are_smooth() {
                 let both = opacity * (2.0 - opacity);
                 let found: Vec<f64> = found.iter().map(|o| o / both).collect();
                 let name = format!("{} {} {value} {opacity}", view.azimuth, view.elevation);
-                check(&name, (&found, &expected), (0.1, 0.3));
+                check(&name, (&found, &expected), (0.1, 0.45));
             }
         }
     }
