@@ -94,9 +94,15 @@ merge=$(sed 's/.*merge \([0-9]*\);.*/\1/' jobs)
 
 # One task of the conversions is taken away, as by preemption, and queued again.
 until squeue --noheader --job "$parts" --states=running,completed --format=%T | grep -q .; do sleep 0.1; done
-scontrol requeue "${parts}_4" || scontrol requeue "${parts}_1" || true
+# Slurm lets such a task wait for two minutes; this one need not.
+task=${parts}_1
+scontrol requeue "$task" || true
+for _ in $(seq 20); do
+    scontrol update JobId="$task" StartTime=now 2>/dev/null && break
+    sleep 0.5
+done
 
-for _ in $(seq 240); do
+for _ in $(seq 400); do
     case $(state "$merge") in
     *COMPLETED*) break ;;
     *FAILED* | *CANCELLED*) break ;;
