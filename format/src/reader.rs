@@ -9,7 +9,7 @@ use crate::directory::{BlockEntry, PartEntry};
 use crate::file_id::FileId;
 use crate::footer::{FOOTER, Footer};
 use crate::geometry::BlockGeometry;
-use crate::header::{HEADER, Header, check_magic};
+use crate::header::{Features, HEADER, Header, check_magic};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
@@ -29,6 +29,7 @@ pub struct Reader<S: Storage> {
 /// What is read when a file is opened.
 #[derive(Debug)]
 struct Index {
+    features: Features,
     footer: Footer,
     metadata: Metadata,
     leaves: Vec<LeafEntry>,
@@ -44,12 +45,12 @@ impl<S: Storage> Reader<S> {
         let header = read_header(&storage)?;
         let footer = read_footer(&storage, header.id)?;
         let metadata = read_metadata(&storage, &footer)?;
-        let packing = header.features().packing;
-        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, packing));
+        let features = header.features();
+        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, features.packing));
         packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
         check_announced(&header, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;
-        Ok(Self { storage, index: Arc::new(Index { footer, metadata, leaves }) })
+        Ok(Self { storage, index: Arc::new(Index { features, footer, metadata, leaves }) })
     }
 
     /// A reader of the same file that holds the bytes of some parts already: they are read in one call of
@@ -67,6 +68,11 @@ impl<S: Storage> Reader<S> {
     /// The archive's metadata.
     pub fn metadata(&self) -> &Metadata {
         &self.index.metadata
+    }
+
+    /// The features that the header announces.
+    pub fn features(&self) -> Features {
+        self.index.features
     }
 
     /// The file's identity.

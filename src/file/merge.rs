@@ -168,10 +168,11 @@ impl Opened {
     fn of(path: &Path, first: Option<&Self>) -> Result<Self> {
         let file = CoefficientFile::open(path)?;
         let (place, description, metadata) = (Place::of(&file)?, file.description()?, file.metadata());
-        let features = Features { packing: metadata.packing(), described: description.is_some() };
+        let features = file.reader.features();
         let start = without_shard(metadata);
         if let Some(first) = first
-            && let Some(what) = difference(&first.start, &start)
+            && let Some(what) =
+                difference(&first.start, &start).or((first.features != features).then(|| "features".into()))
         {
             let other = first.part.path.display();
             return Err(Error::path(
