@@ -62,7 +62,8 @@
 //! # Ok::<(), wavesplat::Error>(())
 //! ```
 //!
-//! [`file::CoefficientFile::from_storage`] opens a file that is not on a local disk. [`extract::extract`] and
+//! [`file::CoefficientFile::open`] also takes addresses, like `https://host/run.wspl`, and
+//! [`file::CoefficientFile::from_storage`] any other storage. [`extract::extract`] and
 //! [`extract::Sink`] write the formats of other programs.
 //!
 //! # Folders
@@ -73,6 +74,7 @@
 //! |---|---|
 //! | `base` | errors, grids, samples, mapped files, output files |
 //! | `colour` | transfer functions, and the colours of pixels |
+//! | `remote` | files behind `https://` and `s3://`: requests, pages that are kept, a cache |
 //! | `source` | input formats behind one trait: frames in order, a window at a time |
 //! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
 //! | `codec` | one block: samples to codes under the error bound, and back |
@@ -91,7 +93,7 @@
 //! 2. `render` (`render/mod.rs`) makes a `ViewSetup` of each view, and calls `project`; or, for modes with slices, a
 //!    `SlicedView`, and calls `composite`. Both loop over batches of frames with `for_each_batch` (`render/driver.rs`).
 //! 3. `Scene::open` (`render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
-//! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/batch.rs`), decodes
+//! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/coefficient_file.rs`), decodes
 //!    it (`codec/decode.rs`) and gives the values of its planes (`render/scenes/coded.rs`).
 //! 5. The values are added to a lattice (`render/splat/lattice/spread.rs`), or to pixels (`render/splat/footprints.rs`).
 //! 6. `PixelReconstructor::tile` (`render/reconstruct.rs`) gathers the planes at pixels from the lattice
@@ -117,7 +119,7 @@
 //!
 //! A test reads the sources and checks these rules.
 //!
-//! - A folder uses only earlier folders of this list: `base`; then `colour`, `wavelet` and `view`; then `source`; then `codec`; then
+//! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `codec`; then
 //!   `file`; then `convert`, `render` and `extract`; then `cli`; then the programs.
 //! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
@@ -143,6 +145,7 @@ pub use wavesplat_format as format;
 
 pub mod base;
 pub mod colour;
+pub mod remote;
 pub mod source;
 mod wavelet;
 mod codec;

@@ -126,6 +126,11 @@ impl LeafEntry {
         Ok(entries)
     }
 
+    /// Where its bytes are in the file.
+    pub fn bytes(&self) -> std::ops::Range<u64> {
+        self.offset..self.extent().end()
+    }
+
     pub(crate) fn extent(&self) -> SectionExtent {
         let Self { offset, stored_len, raw_len, checksum, .. } = *self;
         SectionExtent { offset, stored_len, raw_len, checksum }

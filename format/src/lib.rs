@@ -60,6 +60,6 @@ pub use pyramid::{Axis, Packing, Pass, PassBox, Pyramid, Stencil};
 pub use reader::Reader;
 pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
-pub use storage::{ReadAhead, Storage, read_joined};
+pub use storage::Storage;
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

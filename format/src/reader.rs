@@ -16,14 +16,13 @@ use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::pyramid::check_packing;
 use crate::section::{FRAME, SectionId, decompress, read_section};
-use crate::{Error, ReadAhead, Result, Storage};
-use std::sync::Arc;
+use crate::{Error, Result, Storage};
 
 /// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
 #[derive(Debug)]
 pub struct Reader<S: Storage> {
     storage: S,
-    index: Arc<Index>,
+    index: Index,
 }
 
 /// What is read when a file is opened.
@@ -44,21 +43,14 @@ impl<S: Storage> Reader<S> {
     pub fn open(storage: S) -> Result<Self> {
         let header = read_header(&storage)?;
         let footer = read_footer(&storage, header.id)?;
+        storage.fetch(std::slice::from_ref(&(footer.metadata.offset..footer.total)))?;
         let metadata = read_metadata(&storage, &footer)?;
         let features = header.features();
         let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, features.packing));
         packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
         check_announced(&header, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;
-        Ok(Self { storage, index: Arc::new(Index { features, footer, metadata, leaves }) })
-    }
-
-    /// A reader of the same file that holds the bytes of some parts already: they are read in one call of
-    /// [`Storage::read_many`]. Parts that reach beyond the storage are left out, and are errors when they are asked for.
-    pub fn read_ahead<'a>(&self, parts: impl IntoIterator<Item = &'a PartEntry>) -> Result<Reader<ReadAhead<'_, S>>> {
-        let ranges = parts.into_iter().map(|part| part.offset..part.offset.saturating_add(part.stored_len.into()));
-        let storage = ReadAhead::new(&self.storage, ranges.collect())?;
-        Ok(Reader { storage, index: self.index.clone() })
+        Ok(Self { storage, index: Index { features, footer, metadata, leaves } })
     }
 
     pub(crate) fn footer(&self) -> &Footer {

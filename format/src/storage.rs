@@ -1,4 +1,4 @@
-//! Where a file's bytes are, and how several ranges of them are read at once.
+//! Where a file's bytes are.
 
 use std::io;
 use std::ops::Range;
@@ -21,8 +21,7 @@ pub trait Storage {
 
     /// Copies several ranges, each of which lies within the storage; the bytes of each, in the order of `ranges`.
     ///
-    /// The default reads one range after another. Storages that pay for every request should join ranges
-    /// ([`read_joined`]) or send requests side by side.
+    /// The default reads one range after another. Storages that pay for every request send requests side by side.
     ///
     /// # Errors
     /// The first range that cannot be read.
@@ -34,8 +33,18 @@ pub trait Storage {
         ranges.iter().map(read).collect()
     }
 
-    /// Whether one call of [`Self::read_many`] is cheaper than many of [`Self::read_at`]: true for remote storages.
-    fn prefers_batches(&self) -> bool {
+    /// Prepares to read these ranges next. A storage that keeps what it has read may read them now, in few requests: the
+    /// first ones, as many as it can keep. By default this does nothing.
+    ///
+    /// # Errors
+    /// A range that cannot be read.
+    fn fetch(&self, _ranges: &[Range<u64>]) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Whether every request costs much, however few its bytes are: true for remote storages. [`Self::fetch`] is then worth
+    /// while, and what was read should be kept.
+    fn is_remote(&self) -> bool {
         false
     }
 }
@@ -79,8 +88,12 @@ macro_rules! behind {
                 S::read_many(self, ranges)
             }
 
-            fn prefers_batches(&self) -> bool {
-                S::prefers_batches(self)
+            fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<()> {
+                S::fetch(self, ranges)
+            }
+
+            fn is_remote(&self) -> bool {
+                S::is_remote(self)
             }
         }
     )*};
@@ -88,95 +101,9 @@ macro_rules! behind {
 
 behind!(&S, Box<S>, Arc<S>);
 
-/// Reads ranges with few calls of `read`: those at most `gap` bytes apart come with one. For implementations of
-/// [`Storage::read_many`]; `read` is given a range and returns exactly its bytes.
-///
-/// # Errors
-/// Those of `read`, and one that returned another number of bytes.
-pub fn read_joined(
-    ranges: &[Range<u64>],
-    gap: u64,
-    mut read: impl FnMut(Range<u64>) -> io::Result<Vec<u8>>,
-) -> io::Result<Vec<Vec<u8>>> {
-    let mut found = vec![Vec::new(); ranges.len()];
-    let mut order: Vec<usize> = (0..ranges.len()).collect();
-    order.sort_by_key(|i| ranges[*i].start);
-    let mut rest = order.as_slice();
-    while let Some(first) = rest.first() {
-        let (joined, count) = joined(ranges, rest, gap);
-        let bytes = read(joined.clone())?;
-        if bytes.len() != length(&joined)? {
-            return Err(io::Error::new(
-                io::ErrorKind::UnexpectedEof,
-                format!("bytes {joined:?}: {} read", bytes.len()),
-            ));
-        }
-        let base = ranges[*first].start;
-        for i in &rest[..count] {
-            found[*i] = bytes[(ranges[*i].start - base) as usize..][..length(&ranges[*i])?].to_vec();
-        }
-        rest = &rest[count..];
-    }
-    Ok(found)
-}
-
-/// The first of some ranges, in ascending `order`, with all that follow closely; and how many these are.
-fn joined(ranges: &[Range<u64>], order: &[usize], gap: u64) -> (Range<u64>, usize) {
-    let mut all = ranges[order[0]].clone();
-    let near = |i: &&usize| {
-        let range = &ranges[**i];
-        let near = range.start <= all.end.saturating_add(gap);
-        if near {
-            all.end = all.end.max(range.end);
-        }
-        near
-    };
-    let count = order.iter().take_while(near).count();
-    (all, count)
-}
-
 /// Bytes of a range; an error if no memory holds so many.
 fn length(range: &Range<u64>) -> io::Result<usize> {
     usize::try_from(range.end.saturating_sub(range.start)).map_err(io::Error::other)
-}
-
-/// A storage with some ranges read in advance, in one call of [`Storage::read_many`]. Everything else is read from the
-/// storage itself.
-#[derive(Debug)]
-pub struct ReadAhead<'a, S: Storage + ?Sized> {
-    storage: &'a S,
-    /// Where each range begins, ascending, and its bytes.
-    ranges: Vec<(u64, Vec<u8>)>,
-}
-
-impl<'a, S: Storage + ?Sized> ReadAhead<'a, S> {
-    /// Reads the ranges that lie within the storage.
-    pub(crate) fn new(storage: &'a S, mut ranges: Vec<Range<u64>>) -> io::Result<Self> {
-        ranges.retain(|range| range.start < range.end && range.end <= storage.len());
-        ranges.sort_by_key(|range| range.start);
-        let bytes = storage.read_many(&ranges)?;
-        Ok(Self { storage, ranges: ranges.into_iter().map(|range| range.start).zip(bytes).collect() })
-    }
-
-    /// Bytes from `offset` on, if they were read in advance.
-    fn held(&self, offset: u64, len: usize) -> Option<&[u8]> {
-        let (start, bytes) = self.ranges[..self.ranges.partition_point(|(start, _)| *start <= offset)].last()?;
-        bytes.get(usize::try_from(offset - start).ok()?..)?.get(..len)
-    }
-}
-
-impl<S: Storage + ?Sized> Storage for ReadAhead<'_, S> {
-    fn len(&self) -> u64 {
-        self.storage.len()
-    }
-
-    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
-        match self.held(offset, out.len()) {
-            Some(bytes) => out.copy_from_slice(bytes),
-            None => self.storage.read_at(offset, out)?,
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -184,38 +111,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_ranges_are_read_together() {
+    fn ranges_come_in_the_order_in_which_they_were_asked_for() {
         let bytes: Vec<u8> = (0..100).collect();
         let ranges = [50..60, 0..4, 8..9, 2..6, 90..100, 63..63];
         let expected: Vec<Vec<u8>> = ranges.iter().map(|r| bytes[r.start as usize..r.end as usize].to_vec()).collect();
-        for (gap, calls) in [(0, vec![0..6, 8..9, 50..60, 63..63, 90..100]), (2, vec![0..9, 50..60, 63..63, 90..100])] {
-            let mut asked = Vec::new();
-            let found = read_joined(&ranges, gap, |range| {
-                asked.push(range.clone());
-                Ok(bytes[range.start as usize..range.end as usize].to_vec())
-            });
-            assert_eq!((found.expect("within"), asked), (expected.clone(), calls), "{gap}");
-        }
         assert_eq!(bytes.read_many(&ranges).expect("within"), expected);
     }
 
     #[test]
-    fn a_short_answer_is_an_error() {
-        assert!(read_joined(&[0..4, 6..8], 2, |_| Ok(vec![0; 7])).is_err());
+    fn a_range_beyond_the_end_is_an_error() {
         assert!(vec![0; 3].read_many(&[0..1, 2..4]).is_err());
-    }
-
-    #[test]
-    fn what_was_read_in_advance_is_not_read_again() {
-        let bytes: Vec<u8> = (0..100).collect();
-        let ahead = ReadAhead::new(&bytes, vec![40..50, 10..20, 95..105]).expect("within");
-        assert_eq!(ahead.ranges.len(), 2, "one lies beyond the end");
-        for range in [10..20, 12..15, 45..50, 15..25, 0..100, 99..100] {
-            let mut out = vec![0; range.len()];
-            ahead.read_at(range.start as u64, &mut out).expect("within");
-            assert_eq!(out, bytes[range.clone()], "{range:?}");
-        }
-        assert!(ahead.held(45, 5).is_some() && ahead.held(45, 6).is_none());
-        assert!(ahead.read_at(96, &mut [0; 5]).is_err());
+        assert!(vec![0; 3].read_many(&[0..1, u64::MAX - 1..u64::MAX]).is_err());
     }
 }

@@ -8,6 +8,10 @@ use crate::limits::{ALIGN, align};
 use crate::reader::Reader;
 use crate::section::{FRAME, SectionExtent, SectionId, frame, read};
 use crate::{Error, Result, Storage};
+use std::ops::Range;
+
+/// Windows whose ends are read together.
+const TOGETHER: u32 = 128;
 
 impl<S: Storage> Reader<S> {
     /// Checks start, window sections, window's ends, description and the padding outside leaves. Together with [`Reader::open`], and
@@ -21,6 +25,9 @@ impl<S: Storage> Reader<S> {
         let start = metadata.start().encode()?;
         note(self.check_section(SectionId::Start, HEADER as u64, &start), found)?;
         for window in 0..metadata.windows.len() as u32 {
+            if window % TOGETHER == 0 {
+                self.fetch_ends(window..window.saturating_add(TOGETHER))?;
+            }
             let (begin, end) = (metadata.window_record(window).encode(), metadata.window_end(window).encode());
             let (begin, end) = begin.and_then(|begin| Ok((begin, end?))).map_err(Error::Invalid)?;
             let [Some(first), Some(last)] = [self.leaves(window).first(), self.leaves(window).last()] else { continue };
@@ -34,13 +41,24 @@ impl<S: Storage> Reader<S> {
         note(check_padding(self.storage(), self.footer().last().end()), found)
     }
 
-    /// Checks the headers of a leaf's blocks against the entries `blocks`, and all padding between them. Calls `found` for
-    /// each problem.
+    /// Prepares to read what is before and behind the blocks of some windows.
+    fn fetch_ends(&self, windows: Range<u32>) -> Result<()> {
+        let ends = |window| {
+            let leaves = self.leaves(window);
+            let before = leaves.first().map(|first| first.data_offset.saturating_sub(1)..first.data_offset);
+            let behind = leaves.last().map(|last| last.extent().end()..last.extent().end().saturating_add(1));
+            before.into_iter().chain(behind)
+        };
+        let ends: Vec<Range<u64>> = windows.flat_map(ends).collect();
+        Ok(self.storage().fetch(&ends)?)
+    }
+
+    /// Checks the headers of consecutive blocks, of which the first begins at `at`, against their entries, and the padding
+    /// behind them. Calls `found` for each problem; returns where the next block begins.
     ///
     /// # Errors
     /// The storage fails.
-    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
-        let mut at = leaf.data_offset;
+    pub fn check_blocks(&self, mut at: u64, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<u64> {
         for block in blocks {
             let mut entry = Vec::new();
             block.encode(&mut entry);
@@ -50,6 +68,23 @@ impl<S: Storage> Reader<S> {
             note(check_padding(self.storage(), end), found)?;
             at = align(end);
         }
+        Ok(at)
+    }
+
+    /// Checks all that [`Self::check_blocks`] and [`Self::check_leaf_end`] check.
+    ///
+    /// # Errors
+    /// The storage fails.
+    pub fn check_leaf(&self, leaf: &LeafEntry, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<()> {
+        self.check_blocks(leaf.data_offset, blocks, found)?;
+        self.check_leaf_end(leaf, found)
+    }
+
+    /// Checks the padding behind a leaf. Calls `found` if it is wrong.
+    ///
+    /// # Errors
+    /// The storage fails.
+    pub fn check_leaf_end(&self, leaf: &LeafEntry, found: &mut dyn FnMut(Error)) -> Result<()> {
         note(check_padding(self.storage(), leaf.extent().end()), found)
     }
 

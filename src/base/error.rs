@@ -104,10 +104,10 @@ pub enum Error {
     },
 }
 
-/// A file has fewer bytes than when it was opened. Stored in an [`io::Error`].
-#[derive(Debug, Clone, Copy, thiserror::Error)]
-#[error("became shorter while it was being read")]
-pub(crate) struct BecameShorter;
+/// A file is no longer what it was when it was opened; how that was noticed. Stored in an [`io::Error`].
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct ChangedSince(pub(crate) String);
 
 /// The library's result.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -169,8 +169,11 @@ impl Error {
     /// met or input changed.
     pub fn exit_code(&self) -> u8 {
         if let Some(system) = self.system() {
-            let is_shorter = system.get_ref().is_some_and(|inner| inner.downcast_ref::<BecameShorter>().is_some());
-            return if is_shorter { 4 } else { 1 };
+            return if system.get_ref().is_some_and(<dyn std::error::Error + Send + Sync>::is::<ChangedSince>) {
+                4
+            } else {
+                1
+            };
         }
         match self {
             Self::Io { .. } | Self::Cancelled => 1,

@@ -6,7 +6,7 @@
 //! call [`explain_sigbus`] so that the user reads which file failed instead of "Bus error".
 #![allow(unsafe_code)]
 
-use crate::base::error::{BecameShorter, Error, Result};
+use crate::base::error::{ChangedSince, Error, Result};
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::fs::{File, Metadata};
@@ -138,7 +138,9 @@ impl FileBytes {
         match (&self.map, &self.file) {
             (Some(map), _) => out.copy_from_slice(&map.bytes()[offset as usize..end as usize]),
             (None, Some(file)) => file.read_exact_at(out, offset).map_err(|e| match e.kind() {
-                io::ErrorKind::UnexpectedEof => io::Error::new(e.kind(), BecameShorter),
+                io::ErrorKind::UnexpectedEof => {
+                    io::Error::new(e.kind(), ChangedSince("became shorter while it was being read".into()))
+                }
                 _ => e,
             })?,
             (None, None) => {} // no bytes at all

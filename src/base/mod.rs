@@ -14,6 +14,7 @@ pub(crate) mod half;
 mod calendar;
 pub(crate) mod clock;
 pub(crate) mod decimal;
+pub mod address;
 #[doc(hidden)]
 pub mod time_labels;
 pub mod sample;

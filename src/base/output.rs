@@ -5,6 +5,7 @@ mod names;
 pub(crate) use names::Numbered;
 pub use names::names_of_views;
 
+use crate::base::address::refuse_output;
 use crate::base::error::{Error, Note, Remedy, Result};
 use std::ffi::OsString;
 use std::fs::{self, File, Permissions, TryLockError};
@@ -146,6 +147,7 @@ impl Output {
 
     /// An error if a file clearly cannot be created at `path`. Creates nothing.
     pub fn check(path: &Path, force: bool) -> Result<()> {
+        refuse_output(path)?;
         if path.is_dir() {
             return Err(Error::path(path, "is a folder; name a file"));
         }

@@ -1,7 +1,7 @@
 //! Options for reading an archive.
 
 #[cfg(feature = "cli")]
-use super::{CommonArgs, note_text};
+use super::{CommonArgs, RemoteArgs, note_text, remote::is_coefficient_name};
 use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::Access;
@@ -182,15 +182,15 @@ impl InputArgs {
     }
 
     /// The coefficient file, if that is the only input; none if the inputs are frames.
-    pub fn coefficients(&self, inputs: &[PathBuf]) -> Result<Option<CoefficientFile>> {
+    pub fn coefficients(&self, inputs: &[PathBuf], remote: &RemoteArgs) -> Result<Option<CoefficientFile>> {
         let [only] = inputs else { return Ok(None) };
-        let named_so = only.extension().is_some_and(|ending| ending == "wspl" || ending == "part");
+        let named_so = is_coefficient_name(only) || only.extension().is_some_and(|ending| ending == "part");
         if !named_so && !only.is_file() {
             return Ok(None);
         }
         let foreign =
             |e: &Error| matches!(e, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
-        match CoefficientFile::open_with(only, self.access()) {
+        match remote.open(only, self.access()) {
             Err(e) if !named_so && foreign(&e) => Ok(None),
             file => file.map(Some),
         }

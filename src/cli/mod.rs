@@ -24,6 +24,8 @@ mod optional;
 #[cfg(feature = "cli")]
 mod program;
 #[cfg(feature = "cli")]
+mod remote;
+#[cfg(feature = "cli")]
 pub mod render;
 #[cfg(feature = "cli")]
 mod terminal;
@@ -42,6 +44,8 @@ pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
 pub use messages::{advice, of_error as error_text, of_note as note_text};
 #[cfg(feature = "cli")]
 pub use program::{command, main};
+#[cfg(feature = "cli")]
+pub use remote::RemoteArgs;
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;

@@ -1,6 +1,7 @@
 //! Extracts samples from a coefficient file: any frames and any region, without reading the rest. Writes them in the
 //! formats of other programs.
 
+mod ahead;
 mod contents;
 mod dataset;
 mod encoding;
@@ -30,6 +31,7 @@ use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
+use ahead::Ahead;
 
 use order::Strides;
 use rayon::prelude::*;
@@ -121,8 +123,11 @@ pub fn extract_to(
     let pieces = Pieces::new(file, config)?;
     let all = config.frames.len() * config.region.voxels() * file.sample().size();
     let mut buffers = Vec::new();
-    for together in pieces.list(file, config).chunks(pieces.together(file, config)) {
+    let list = pieces.list(file, config);
+    let mut ahead = Ahead::default();
+    for together in list.chunks(pieces.together(file, config)) {
         progress.check()?;
+        ahead.fetch((file, config.channel), &list, together.len())?;
         buffers.resize_with(together.len(), Vec::new);
         let read = together.par_iter().zip(&mut buffers);
         let read = read.map(|(piece, bytes)| read_piece(file, config, piece, pieces.blocks, bytes));
@@ -267,9 +272,9 @@ fn read_window(
     let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
     for entries in file.entries(window, channel, &target.region) {
         for entries in entries?.chunks(at_once) {
-            let batch = file.batch(&codec, entries, &wanted)?;
+            file.fetch_blocks(&codec, entries, &wanted)?;
             let decode =
-                |entry: &BlockEntry| batch.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+                |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);

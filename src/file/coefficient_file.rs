@@ -1,5 +1,6 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
+use crate::base::address::{is_address, public_name};
 use crate::base::description::Description;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
@@ -12,6 +13,7 @@ use crate::codec::decode::Block;
 use crate::file::counted::Counted;
 use crate::file::detail;
 use crate::file::promise;
+use crate::remote::{self, RemoteOptions};
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,6 +21,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use wavesplat_format::{BlockEntry, BlockId, CompletePrefix, FileId, LeafEntry, Metadata, Reader, Storage};
+
+/// Blocks of a remote file that are fetched together to be checked.
+const TOGETHER: usize = 32;
 
 /// An open coefficient file; several threads may read it.
 #[derive(Debug)]
@@ -77,19 +82,35 @@ impl CoefficientFile {
 
     /// As [`Self::open`], with a choice between a memory map and plain reads.
     pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<Self> {
+        if is_address(path.as_ref()) {
+            return Self::open_remote(path.as_ref(), &RemoteOptions::default());
+        }
         let bytes = FileBytes::open(path.as_ref(), access)?;
         let state = Some(bytes.state());
         Ok(Self { state, ..Self::from_storage(path.as_ref(), bytes)? })
     }
 
-    /// Opens a file in any storage: memory, or an object behind HTTP. `name` stands for it in messages.
+    /// Opens a remote file by its address: `https://HOST/PATH`, `http://HOST/PATH` or `s3://BUCKET/KEY`. As a rule this takes
+    /// two requests. Messages show the address without passwords and signatures.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and all that can be wrong on the way.
+    pub fn open_remote(address: &Path, options: &RemoteOptions) -> Result<Self> {
+        Self::from_storage(public_name(address), remote::open(address, options)?)
+    }
+
+    /// Opens a file in any storage: memory, or bytes far away. `name` stands for it in messages. What is read of a
+    /// [remote](Storage::is_remote) storage is kept, up to 64 MiB.
     ///
     /// # Errors
     /// As [`Self::open`].
     pub fn from_storage(name: impl Into<PathBuf>, storage: impl Storage + Send + Sync + 'static) -> Result<Self> {
         let path = name.into();
         let failed = |source| Error::CoefficientFile { path: path.clone(), source };
-        let reader = Reader::open(Counted::new(Box::new(storage))).map_err(failed)?;
+        let storage = Counted::new(remote::kept(Box::new(storage)));
+        let ends = [0..1, storage.len().saturating_sub(tail(storage.len()))..storage.len()];
+        storage.fetch(&ends).map_err(|e| failed(e.into()))?;
+        let reader = Reader::open(storage).map_err(failed)?;
         let m = reader.metadata();
         let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
@@ -269,11 +290,14 @@ impl CoefficientFile {
             Ok(entries) => entries,
         };
         let mut found = Vec::new();
-        for entry in entries {
-            match self.reader.check_stored(&entry) {
-                Ok(()) => {}
-                Err(failed) if failed.is_io() => return Err(self.failed(failed)),
-                Err(wrong) => found.push((entry.id, wrong.to_string())),
+        for entries in entries.chunks(TOGETHER) {
+            self.fetch_whole(entries)?;
+            for entry in entries {
+                match self.reader.check_stored(entry) {
+                    Ok(()) => {}
+                    Err(failed) if failed.is_io() => return Err(self.failed(failed)),
+                    Err(wrong) => found.push((entry.id, wrong.to_string())),
+                }
             }
         }
         Ok(found)
@@ -318,32 +342,39 @@ impl CoefficientFile {
         channel: usize,
         region: &'a Region,
     ) -> impl Iterator<Item = Result<Vec<BlockEntry>>> + use<'a> {
-        let touches = |block: u32| !self.blocks.region(block as usize).intersect(region).is_empty();
-        let leaves = self.leaves_of(window, channel).iter();
-        let reached = leaves.filter(move |l| (l.first_block..).take(l.count.into()).any(touches));
-        reached.map(move |l| Ok(self.leaf(l)?.into_iter().filter(|entry| touches(entry.id.block)).collect()))
+        let fetched = self.fetch_leaves_of(std::iter::once(window), channel, region);
+        let entries = move |leaf| {
+            let touches = |entry: &BlockEntry| self.touches(entry.id.block, region);
+            Ok(self.leaf(leaf)?.into_iter().filter(touches).collect())
+        };
+        fetched.err().map(Err).into_iter().chain(self.reached(window, channel, region).map(entries))
+    }
+
+    /// The leaves of a channel and window that list blocks of a region.
+    pub(super) fn reached<'a>(
+        &'a self,
+        window: u32,
+        channel: usize,
+        region: &'a Region,
+    ) -> impl Iterator<Item = &'a LeafEntry> + use<'a> {
+        let lists =
+            move |l: &&LeafEntry| (l.first_block..).take(l.count.into()).any(|block| self.touches(block, region));
+        self.leaves_of(window, channel).iter().filter(lists)
+    }
+
+    fn touches(&self, block: u32, region: &Region) -> bool {
+        !self.blocks.region(block as usize).intersect(region).is_empty()
     }
 
     /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
     #[doc(hidden)]
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
-        self.block_from(&self.reader, codec, entry, wanted)
-    }
-
-    /// Reads a block by way of `reader`.
-    pub(super) fn block_from<S: Storage>(
-        &self,
-        reader: &Reader<S>,
-        codec: &WindowCodec,
-        entry: &BlockEntry,
-        wanted: &[bool],
-    ) -> Result<Block> {
         let size = self.all_voxels(entry)?;
         if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::of_missing(codec, size));
         }
-        Block::read(reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
+        Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
 
     /// All voxels of a block, decoded or not.
@@ -382,7 +413,13 @@ impl CoefficientFile {
         blocks: &[BlockEntry],
         found: &mut dyn FnMut(Error),
     ) -> Result<()> {
-        self.reader.check_leaf(leaf, blocks, &mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
+        let mut found = |wrong| found(self.failed(wrong));
+        let mut at = leaf.data_offset;
+        for blocks in blocks.chunks(TOGETHER) {
+            self.fetch_whole(blocks)?;
+            at = self.reader.check_blocks(at, blocks, &mut found).map_err(|e| self.failed(e))?;
+        }
+        self.reader.check_leaf_end(leaf, &mut found).map_err(|e| self.failed(e))
     }
 
     /// Compares the checksums of every byte of the file; the first error. Of blocks that are lost there is nothing to check.
@@ -393,8 +430,11 @@ impl CoefficientFile {
         for leaf in (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window)) {
             let entries = self.leaf(leaf)?;
             self.check_leaf(leaf, &entries, &mut found)?;
-            let present = entries.par_iter().filter(|entry| !entry.lost);
-            present.try_for_each(|entry| self.reader.check_stored(entry)).map_err(|e| self.failed(e))?;
+            for entries in entries.chunks(TOGETHER) {
+                self.fetch_whole(entries)?;
+                let present = entries.par_iter().filter(|entry| !entry.lost);
+                present.try_for_each(|entry| self.reader.check_stored(entry)).map_err(|e| self.failed(e))?;
+            }
         }
         wrong.map_or(Ok(()), Err)
     }
@@ -428,6 +468,11 @@ impl CoefficientFile {
     pub(super) fn failed(&self, source: wavesplat_format::Error) -> Error {
         Error::CoefficientFile { path: self.path.clone(), source }
     }
+}
+
+/// Bytes at the end of a file of `len` bytes that likely hold its metadata and the root of its directory.
+fn tail(len: u64) -> u64 {
+    (len / 512).clamp(64 << 10, 4 << 20)
 }
 
 /// The value of one of a file's settings.

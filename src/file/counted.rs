@@ -46,7 +46,11 @@ impl Storage for Counted {
         Ok(read)
     }
 
-    fn prefers_batches(&self) -> bool {
-        self.storage.prefers_batches()
+    fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<()> {
+        self.storage.fetch(ranges)
+    }
+
+    fn is_remote(&self) -> bool {
+        self.storage.is_remote()
     }
 }

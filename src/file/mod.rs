@@ -5,9 +5,9 @@
 
 mod counted;
 mod detail;
-mod batch;
 pub mod promise;
 mod coefficient_file;
+mod fetch;
 pub mod report;
 pub mod verify;
 pub mod recover;
@@ -15,5 +15,5 @@ pub mod repack;
 pub mod merge;
 pub mod resume;
 
-pub(crate) use batch::BlockBatch;
 pub use coefficient_file::{CoefficientFile, setting, time_labels};
+pub(crate) use fetch::{Gathered, WINDOWS_TOGETHER};

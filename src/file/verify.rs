@@ -150,7 +150,7 @@ pub fn verify(
     let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
     file.check_structure(&mut |wrong| report.damage(&wrong))?;
-    let mut all = Comparison::default();
+    let (mut all, mut fetched) = (Comparison::default(), 0);
     for window in 0..file.metadata().windows.len() as u32 {
         let codec = file.codec(window)?;
         let range = file.window_range(window);
@@ -160,12 +160,16 @@ pub fn verify(
             return Err(Error::input(frames.name(0), what));
         }
         for leaf in file.leaves(window) {
+            if leaf.data_offset >= fetched {
+                fetched = file.fetch_on(leaf.data_offset)?;
+            }
             let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
             let entries = report.whole(file.leaf(leaf))?;
             report.unchecked += if entries.is_none() { u64::from(leaf.count) } else { 0 };
             let entries = entries.unwrap_or_default();
             file.check_leaf(leaf, &entries, &mut |wrong| report.damage(&wrong))?;
             for entries in entries.chunks(at_once) {
+                file.fetch_whole(entries)?;
                 for found in entries.par_iter().map(check).collect::<Vec<_>>() {
                     all = report.whole(found)?.map_or(all, |found| all.join(found));
                 }

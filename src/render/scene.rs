@@ -124,7 +124,8 @@ pub trait FrameBatch: Sync {
     /// The selected blocks.
     fn selection(&self) -> &Selection;
 
-    /// Prepares to read these blocks next. A remote scene reads them in one request; by default this does nothing.
+    /// Prepares to read these blocks next, the first ones first. A remote scene may ask for them at once; by default this does
+    /// nothing.
     ///
     /// # Errors
     /// Any error ends the rendering.

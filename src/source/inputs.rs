@@ -2,6 +2,7 @@
 
 use super::formats::{self, Format, file_series, pvd};
 use super::{OpenOptions, Parsed, numbering};
+use crate::base::address::refuse_frames;
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::STANDARD;
 use std::collections::HashSet;
@@ -34,6 +35,7 @@ impl FrameFiles {
 
 /// The files that the inputs stand for.
 pub(super) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {
+    refuse_frames(inputs)?;
     let files = match inputs {
         [only] => expand_one(only, options)?,
         _ => FrameFiles { paths: listed(inputs)?, ..FrameFiles::default() },

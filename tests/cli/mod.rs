@@ -33,6 +33,8 @@ mod pipes;
 mod probe;
 mod progress;
 mod recover;
+#[cfg(feature = "remote")]
+mod remote;
 pub(crate) mod render;
 mod resume;
 mod several;

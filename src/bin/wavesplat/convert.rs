@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Note, Result};
 use wavesplat::base::output::{Output, STANDARD};
 use wavesplat::cli::{
-    CommonArgs, InputArgs, MaxError, Pair, SelectArgs, advice, note_text, share, spare_inputs, transfer_function,
+    CommonArgs, InputArgs, MaxError, Pair, RemoteArgs, SelectArgs, advice, note_text, share, spare_inputs,
+    transfer_function,
 };
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::shard::{Shard, sharded};
@@ -202,7 +203,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
 }
 
 fn run_one(args: &ConvertArgs) -> Result<()> {
-    if let Some(file) = args.input.coefficients(&args.inputs)? {
+    if let Some(file) = args.input.coefficients(&args.inputs, &RemoteArgs::default())? {
         return args.repack(&file);
     }
     let config = args.config()?;

@@ -7,7 +7,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Region;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::output::STANDARD;
-use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, spare_inputs};
+use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
 use wavesplat::extract::{
     Contents, ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, extract_to,
 };
@@ -69,6 +69,8 @@ pub(crate) struct ExtractArgs {
     #[arg(long)]
     no_mmap: bool,
     #[command(flatten)]
+    remote: RemoteArgs,
+    #[command(flatten)]
     common: CommonArgs,
 }
 
@@ -85,7 +87,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     args.common.start()?;
     let format = args.format.map_or_else(|| format_of(&args.output), Ok)?;
     let access = Access::unless(args.no_mmap);
-    let mut file = CoefficientFile::open_with(&args.file, access)?.with_detail(args.lod)?;
+    let mut file = args.remote.open(&args.file, access)?.with_detail(args.lod)?;
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }

@@ -4,7 +4,7 @@ use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, print, remembered};
+use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::report::{BoundReport, largest_bound};
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
@@ -35,6 +35,8 @@ pub(crate) struct VerifyArgs {
     #[command(flatten)]
     input: InputArgs,
     #[command(flatten)]
+    remote: RemoteArgs,
+    #[command(flatten)]
     common: CommonArgs,
 }
 
@@ -51,7 +53,7 @@ struct Reported<'a> {
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
-    let file = CoefficientFile::open_with(&args.file, args.input.access())?;
+    let file = args.remote.open(&args.file, args.input.access())?;
     let mut source = args.source(&file)?;
     let source: Option<&mut dyn FrameSource> = match &mut source {
         Some(source) => Some(source.as_mut()),

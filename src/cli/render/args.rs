@@ -7,7 +7,7 @@ use super::cuts::CutArgs;
 use super::motion::MotionArgs;
 use super::probes::ProbeArgs;
 use super::view_names::ViewSpec;
-use crate::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, Triple, Whole, share};
+use crate::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, RemoteArgs, Triple, Whole, share};
 use crate::render::Limit;
 use crate::render::sink::{Depth, PictureFormat};
 use clap::{Parser, ValueEnum};
@@ -153,6 +153,8 @@ pub struct Cli {
     pub(crate) skip_damaged: bool,
     #[command(flatten)]
     pub(crate) input: InputArgs,
+    #[command(flatten)]
+    pub(crate) remote: RemoteArgs,
     #[command(flatten)]
     pub(crate) common: CommonArgs,
 }

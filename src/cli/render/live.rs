@@ -7,6 +7,7 @@ use super::scene::Opened;
 use super::work::Work;
 use super::{Prepared, parsed};
 use crate::base::error::{Error, Result};
+use crate::cli::remote::KeptOpen;
 use crate::colour::Distribution;
 use crate::render::annotate::AxisLabels;
 use crate::render::page::{self, Planes};
@@ -24,6 +25,8 @@ pub struct Scenery {
     pub inputs: Vec<OsString>,
     /// Other options of `wavesplat-render`.
     pub options: Vec<OsString>,
+    /// The remote file of the pictures.
+    pub(crate) open: KeptOpen,
 }
 
 /// What a page is told before it asks for pictures.
@@ -82,7 +85,15 @@ impl Scenery {
         words.extend(options.iter().map(OsString::from));
         words.extend(["-o".into(), output.into(), "--".into()]);
         words.extend(self.inputs.iter().cloned());
-        parsed(words)
+        let cli: Cli = parsed(words)?;
+        Ok(Cli { remote: cli.remote.clone().sharing(self.open.clone()), ..cli })
+    }
+
+    /// Opens a remote file that has changed again for the next picture.
+    pub fn reopen_after(&self, error: &Error) {
+        if error.exit_code() == 4 {
+            self.open.forget();
+        }
     }
 
     /// The page that shows a scene of these [`Self::facts`].

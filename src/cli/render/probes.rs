@@ -178,7 +178,7 @@ impl Cli {
             return Err(Error::usage("--probe: takes one coefficient file"));
         };
         self.input.refuse_for_coefficients()?;
-        let file = CoefficientFile::open_with(path, self.input.access())?;
+        let file = self.remote.open(path, self.input.access())?;
         if file.channels() > 1 {
             return Err(Error::usage("--probe: the file holds colours, which have no single value"));
         }

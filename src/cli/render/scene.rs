@@ -7,6 +7,7 @@ use crate::base::description::{coordinates, is_regular};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 use crate::base::output::STANDARD;
+use crate::cli::remote::is_coefficient_name;
 use crate::cli::transfer_function;
 use crate::colour::TransferFunction;
 use crate::file::{CoefficientFile, time_labels};
@@ -49,7 +50,7 @@ impl Cli {
         }
         self.input.refuse_for_coefficients()?;
         self.along.check(false, self.colour.is_asked())?;
-        let file = CoefficientFile::open_with(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
+        let file = self.remote.open(path, self.input.access()).map_err(|e| hint_at_frames(path, e))?;
         let exaggeration = self.exaggeration(&file.whole_grid());
         let file = file.with_exaggeration(exaggeration);
         let lod = self.level_of_detail(&file)?;
@@ -151,10 +152,6 @@ impl Cli {
         }
         Ok(())
     }
-}
-
-fn is_coefficient_name(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "wspl")
 }
 
 const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";

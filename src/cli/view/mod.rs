@@ -5,8 +5,9 @@ mod guard;
 mod server;
 
 use crate::base::error::{Error, Result};
+use crate::cli::remote::{KeptOpen, is_coefficient_name};
 use crate::cli::render::live::Scenery;
-use crate::cli::{self, CommonArgs};
+use crate::cli::{self, CommonArgs, RemoteArgs};
 use clap::Args;
 use server::{Server, Stop};
 use std::ffi::OsString;
@@ -42,6 +43,8 @@ pub struct ViewArgs {
     /// Options of wavesplat-render for all pictures
     #[arg(last = true, value_name = "OPTIONS")]
     options: Vec<OsString>,
+    #[command(flatten)]
+    remote: RemoteArgs,
     #[command(flatten)]
     common: CommonArgs,
 }
@@ -121,16 +124,15 @@ fn failed(at: &str, error: io::Error) -> Error {
 
 impl ViewArgs {
     fn scenery(&self) -> Scenery {
-        let options = self.options.iter().cloned();
+        let options = self.remote.words().into_iter().chain(self.options.iter().cloned());
         scenery(&self.inputs, self.common.memory.0, options)
     }
 }
 
 /// The scene of a coefficient file or of frames, with more options of `wavesplat-render`.
 pub fn scenery(inputs: &[PathBuf], memory: usize, options: impl IntoIterator<Item = OsString>) -> Scenery {
-    let is_file = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "wspl");
-    let method = if inputs.iter().all(is_file) { "coefficients" } else { "direct" };
+    let method = if inputs.iter().all(|path| is_coefficient_name(path)) { "coefficients" } else { "direct" };
     let given = [format!("--method={method}"), format!("--memory={memory}")].map(OsString::from);
     let options = given.into_iter().chain(options).collect();
-    Scenery { inputs: inputs.iter().map(OsString::from).collect(), options }
+    Scenery { inputs: inputs.iter().map(OsString::from).collect(), options, open: KeptOpen::default() }
 }

@@ -119,7 +119,7 @@ impl Server {
         let own = wait.0.clone();
         self.work.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&own);
         let done = tokio::task::spawn_blocking(move || {
-            let done = work(&scenery, &own);
+            let done = work(&scenery, &own).inspect_err(|error| scenery.reopen_after(error));
             drop(turn);
             done
         });

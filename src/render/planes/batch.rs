@@ -33,6 +33,7 @@ impl Cut<'_> {
         self.add_missing(frames, &mut sums);
         let listed = self.batch.selection().blocks.iter().copied();
         let read: Vec<usize> = listed.filter(|block| self.view.needs(&self.blocks.region(*block))).collect();
+        self.batch.fetch(&read)?;
         for blocks in read.chunks(self.at_a_time) {
             let mut clock = Instant::now();
             self.batch.fetch(blocks)?;

@@ -12,7 +12,7 @@ use crate::base::progress::Progress;
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
 use crate::file::promise::share_tolerance;
-use crate::file::{BlockBatch, CoefficientFile};
+use crate::file::{CoefficientFile, Gathered, WINDOWS_TOGETHER};
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::expectation::Expectation;
 use crate::render::layout::Layout;
@@ -29,12 +29,41 @@ use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
 pub struct CoefficientScene {
     file: Arc<CoefficientFile>,
     what: SplatSource,
+    /// The frame of each channel up to which parts of a remote file were fetched.
+    fetched: Vec<usize>,
 }
 
 impl CoefficientScene {
     /// A scene of an open file.
     pub fn new(file: impl Into<Arc<CoefficientFile>>, what: SplatSource) -> Self {
-        Self { file: file.into(), what }
+        let file = file.into();
+        Self { fetched: vec![0; file.channels()], file, what }
+    }
+
+    /// Fetches what a remote file holds of the next frames of a request: at least what is asked for, and of later windows as
+    /// much as fits.
+    fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
+        let (file, channel, config) = (&self.file, request.channel, request.config);
+        if !file.is_remote() || request.frames[0] < self.fetched[channel] {
+            return Ok(());
+        }
+        let later = &config.frames[config.frames.partition_point(|frame| *frame < request.frames[0])..];
+        let windows = later.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)).take(WINDOWS_TOGETHER);
+        let region = config.region.unwrap_or(file.grid.whole());
+        file.fetch_leaves_of(windows.clone().map(|frames| file.window_of(frames[0])), channel, &region)?;
+        if !config.mode.is_projection() {
+            return Ok(()); // which blocks are hidden is known later
+        }
+        let mut gathered = Gathered::default();
+        for frames in windows {
+            let batch = CoefficientBatch::open(file, self.what, &BatchRequest { frames, ..*request })?;
+            gathered.add(batch.parts()?);
+            self.fetched[channel] = frames[frames.len() - 1] + 1;
+            if gathered.is_full() {
+                break;
+            }
+        }
+        self.file.fetch_gathered(&gathered)
     }
 }
 
@@ -93,6 +122,7 @@ impl Scene for CoefficientScene {
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
+        self.fetch_ahead(request)?;
         Ok(Box::new(CoefficientBatch::open(&self.file, self.what, request)?))
     }
 }
@@ -109,8 +139,6 @@ pub(super) struct CoefficientBatch<'a> {
     errors: SampleErrors,
     /// The last leaf of the directory that was read. Blocks come in order, so most reads hit it.
     leaf: Mutex<Arc<Vec<BlockEntry>>>,
-    /// The last blocks that were read together, if the storage prefers that.
-    fetched: Mutex<Option<Arc<BlockBatch<'a>>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
@@ -127,7 +155,6 @@ impl<'a> CoefficientBatch<'a> {
             selection: Selection::default(),
             errors: SampleErrors::default(),
             leaf: Mutex::default(),
-            fetched: Mutex::default(),
         };
         batch.select(request.config)?;
         Ok(batch)
@@ -268,16 +295,20 @@ impl<'a> CoefficientBatch<'a> {
         Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
     }
 
+    /// The parts of all selected blocks.
+    fn parts(&self) -> Result<Vec<PartEntry>> {
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        let mut parts = Vec::new();
+        for block in &self.selection.blocks {
+            parts.extend(Block::parts(codec, &self.kept(*block)?.entry, wanted));
+        }
+        Ok(parts)
+    }
+
     /// Reads a block, and returns it with the errors of its samples.
     fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
         let KeptParts { entry, errors, .. } = self.kept(block)?;
-        let fetched = self.fetched.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let BatchPlan { codec, wanted, .. } = &self.plan;
-        let block = match fetched {
-            Some(fetched) => fetched.block(codec, &entry, wanted)?,
-            None => self.file.block(codec, &entry, wanted)?,
-        };
-        Ok((block, errors))
+        Ok((self.file.block(&self.plan.codec, &entry, &self.plan.wanted)?, errors))
     }
 }
 
@@ -291,13 +322,12 @@ impl FrameBatch for CoefficientBatch<'_> {
     }
 
     fn fetch(&self, blocks: &[usize]) -> Result<()> {
-        if self.file.prefers_batches() {
-            let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
-            let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
-            let batch = Arc::new(self.file.batch(&self.plan.codec, &entries, &self.plan.wanted)?);
-            *self.fetched.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+        if !self.file.is_remote() {
+            return Ok(());
         }
-        Ok(())
+        let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
+        let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
+        self.file.fetch_blocks(&self.plan.codec, &entries, &self.plan.wanted)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

@@ -4,9 +4,12 @@ use crate::base::error::Result;
 use crate::base::grid::Region;
 use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, is_missing};
-use crate::file::CoefficientFile;
+use crate::codec::WindowCodec;
+use crate::codec::decode::Block;
+use crate::file::{CoefficientFile, Gathered};
 use crate::render::overview::OverviewRequest;
 use crate::source::FrameWindow;
+use crate::wavelet;
 use rayon::prelude::*;
 use wavesplat_format::BlockEntry;
 
@@ -21,6 +24,7 @@ pub(super) fn of_file(
     progress.start(Some((file.channels() * windows.len() * blocks) as u64));
     let mut samples = vec![f32::NAN; file.channels() * request.samples()];
     let of_frame = request.samples() / request.frames.len();
+    fetch(file, request, &windows)?;
     let mut rest = samples.as_mut_slice();
     for channel in 0..file.channels() {
         for frames in &windows {
@@ -34,6 +38,36 @@ pub(super) fn of_file(
     Ok(samples)
 }
 
+/// Fetches what the overview needs of a remote file, as much as it keeps.
+fn fetch(file: &CoefficientFile, request: &OverviewRequest<'_>, windows: &[&[usize]]) -> Result<()> {
+    if !file.is_remote() {
+        return Ok(());
+    }
+    let mut gathered = Gathered::default();
+    for channel in 0..file.channels() {
+        file.fetch_leaves_of(windows.iter().map(|frames| file.window_of(frames[0])), channel, &request.region)?;
+        for frames in windows {
+            let (window, codec, frames) = coarse(file, request, frames)?;
+            let wanted = wavelet::needed(&codec.synthesis, &frames);
+            for entries in file.entries(window, channel, &request.region) {
+                gathered.add(entries?.iter().flat_map(|entry| Block::parts(&codec, entry, &wanted)).copied());
+            }
+        }
+    }
+    file.fetch_gathered(&gathered)
+}
+
+/// The window of some frames, the codec for their overview, and their numbers in the window.
+fn coarse(
+    file: &CoefficientFile,
+    request: &OverviewRequest<'_>,
+    frames: &[usize],
+) -> Result<(u32, WindowCodec, Vec<usize>)> {
+    let window = file.window_of(frames[0]);
+    let (codec, first) = (file.coarse_codec(window, request.thinning.stride)?, file.window_range(window).start);
+    Ok((window, codec, frames.iter().map(|f| f - first).collect()))
+}
+
 /// The overview of some frames of one window, in one channel.
 fn of_window_and_channel(
     file: &CoefficientFile,
@@ -41,9 +75,7 @@ fn of_window_and_channel(
     samples: &mut [f32],
     progress: &dyn Progress,
 ) -> Result<()> {
-    let window = file.window_of(frames[0]);
-    let (codec, first) = (file.coarse_codec(window, request.thinning.stride)?, file.window_range(window).start);
-    let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
+    let (window, codec, frames) = coarse(file, request, frames)?;
     let decode = |entry: &BlockEntry| file.coarse(&codec, entry, (request.thinning.stride, &frames));
     for entries in file.entries(window, channel, &request.region) {
         let entries = entries?;

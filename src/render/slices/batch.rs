@@ -186,6 +186,7 @@ impl<B: Blend> Batch<'_, B> {
             frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));
         }
         let read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
+        self.batch.fetch(&read)?;
         for blocks in read.chunks(self.together.max(1)) {
             self.batch.fetch(blocks)?;
             let all = blocks.par_iter().map(|block| self.decode(*block, units)).collect::<Result<Vec<_>>>()?;

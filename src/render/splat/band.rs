@@ -71,6 +71,7 @@ pub(super) fn splat_in_batches(
     let is_visible = |block: &usize| group.bands().iter().any(|band| band.sees(*block));
     let visible: Vec<usize> = blocks.iter().copied().filter(is_visible).collect();
     let mut stats = SplatStats { blocks: visible.len() as u64, ..SplatStats::default() };
+    source.fetch(&visible)?;
     for blocks in visible.chunks(batch) {
         let clock = Instant::now();
         source.fetch(blocks)?;

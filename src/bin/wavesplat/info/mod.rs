@@ -8,7 +8,7 @@ mod variables;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, share};
+use wavesplat::cli::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
 use wavesplat::file::CoefficientFile;
 
 /// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
@@ -33,6 +33,8 @@ pub(crate) struct InfoArgs {
     #[command(flatten)]
     input: InputArgs,
     #[command(flatten)]
+    remote: RemoteArgs,
+    #[command(flatten)]
     common: CommonArgs,
 }
 
@@ -50,7 +52,7 @@ pub(crate) fn run(args: &InfoArgs) -> Result<()> {
 impl InfoArgs {
     /// The coefficient file, or none if the inputs are frames.
     fn coefficients(&self) -> Result<Option<CoefficientFile>> {
-        let Some(file) = self.input.coefficients(&self.inputs)? else { return Ok(None) };
+        let Some(file) = self.input.coefficients(&self.inputs, &self.remote)? else { return Ok(None) };
         self.refuse_for_coefficients(file.path())?;
         Ok(Some(file))
     }

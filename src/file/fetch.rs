@@ -1,0 +1,133 @@
+//! Parts of a file that are read together: a remote file is told beforehand what will be read, and asks for it at once.
+
+use super::CoefficientFile;
+use crate::base::error::Result;
+use crate::base::grid::Region;
+use crate::codec::WindowCodec;
+use crate::codec::decode::Block;
+use crate::remote::FETCHED;
+use rayon::prelude::*;
+use std::ops::Range;
+use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
+
+/// Windows whose leaves are fetched together.
+pub(crate) const WINDOWS_TOGETHER: usize = 256;
+
+/// Parts of many blocks, to be fetched in few requests.
+#[derive(Debug, Default)]
+pub(crate) struct Gathered {
+    parts: Vec<PartEntry>,
+    bytes: u64,
+}
+
+impl Gathered {
+    pub(crate) fn add(&mut self, parts: impl IntoIterator<Item = PartEntry>) {
+        for part in parts {
+            self.bytes += u64::from(part.stored_len);
+            self.parts.push(part);
+        }
+    }
+
+    /// Whether there are as many as a remote file keeps.
+    pub(crate) fn is_full(&self) -> bool {
+        self.bytes >= FETCHED
+    }
+}
+
+impl CoefficientFile {
+    /// Whether the file is remote: what is read soon should be fetched first.
+    pub(crate) fn is_remote(&self) -> bool {
+        self.reader.storage().is_remote()
+    }
+
+    /// Fetches bytes of a remote file that will be read soon: the first ones, as many as it keeps.
+    fn fetch(&self, ranges: impl Iterator<Item = Range<u64>>) -> Result<()> {
+        if !self.is_remote() {
+            return Ok(());
+        }
+        let ranges: Vec<Range<u64>> = ranges.collect();
+        self.reader.storage().fetch(&ranges).map_err(|e| self.failed(e.into()))
+    }
+
+    /// Fetches leaves of the directory that will be read soon.
+    pub(crate) fn fetch_leaves<'a>(&self, leaves: impl Iterator<Item = &'a LeafEntry>) -> Result<()> {
+        self.fetch(leaves.map(LeafEntry::bytes))
+    }
+
+    /// Fetches the leaves of a channel of some windows that list blocks of a region.
+    pub(crate) fn fetch_leaves_of(
+        &self,
+        windows: impl Iterator<Item = u32>,
+        channel: usize,
+        region: &Region,
+    ) -> Result<()> {
+        if !self.is_remote() {
+            return Ok(());
+        }
+        self.fetch_leaves(windows.flat_map(|window| self.reached(window, channel, region)))
+    }
+
+    /// Fetches the bytes of a remote file from `offset` on, as many as it keeps; returns where they end.
+    pub(crate) fn fetch_on(&self, offset: u64) -> Result<u64> {
+        let end = if self.is_remote() { self.bytes().min(offset.saturating_add(FETCHED)) } else { u64::MAX };
+        self.fetch(std::iter::once(offset..end))?;
+        Ok(end)
+    }
+
+    /// Fetches parts that were gathered.
+    pub(crate) fn fetch_gathered(&self, gathered: &Gathered) -> Result<()> {
+        self.fetch_parts(gathered.parts.iter())
+    }
+
+    /// Fetches parts that will be read soon.
+    fn fetch_parts<'a>(&self, parts: impl Iterator<Item = &'a PartEntry>) -> Result<()> {
+        self.fetch(parts.map(|part| part.offset..part.offset.saturating_add(part.stored_len.into())))
+    }
+
+    /// Fetches what of some blocks is needed for the coefficients that `wanted` marks.
+    pub(crate) fn fetch_blocks(&self, codec: &WindowCodec, entries: &[BlockEntry], wanted: &[bool]) -> Result<()> {
+        self.fetch_parts(entries.iter().flat_map(|entry| Block::parts(codec, entry, wanted)))
+    }
+
+    /// Fetches all of some blocks.
+    pub(crate) fn fetch_whole(&self, entries: &[BlockEntry]) -> Result<()> {
+        self.fetch_parts(entries.iter().flat_map(|entry| &entry.parts))
+    }
+
+    /// The samples of whole blocks, decoded side by side: of each block all frames of its window, little-endian in the
+    /// file's [type](Self::sample), x fastest, then y, z, and time slowest. [`Self::blocks`] says which voxels a block has.
+    ///
+    /// A remote file is asked for all blocks of a window at once. The result is held in memory: ask for as many blocks as
+    /// fit.
+    ///
+    /// # Errors
+    /// [`Error::CoefficientFile`](crate::Error::CoefficientFile) for a block that is damaged or that the file lacks.
+    pub fn read_blocks(&self, ids: &[BlockId]) -> Result<Vec<Vec<u8>>> {
+        let mut blocks = Vec::with_capacity(ids.len());
+        for ids in ids.chunk_by(|a, b| a.window == b.window) {
+            let entries = self.entries_of(ids)?;
+            let codec = self.codec(ids[0].window)?;
+            let all = vec![true; codec.basis.coefficients()];
+            self.fetch_blocks(&codec, &entries, &all)?;
+            let decode =
+                |entry: &BlockEntry| self.block(&codec, entry, &all).map(|block| block.samples(&codec).to_vec());
+            blocks.extend(entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?);
+        }
+        Ok(blocks)
+    }
+
+    /// The entries of some blocks; a leaf of the directory is read once for neighbours.
+    fn entries_of(&self, ids: &[BlockId]) -> Result<Vec<BlockEntry>> {
+        let mut leaf = Vec::new();
+        let find = |leaf: &[BlockEntry], id| leaf.iter().find(|entry| entry.id == id).cloned();
+        let mut entry = |id: BlockId| {
+            if let Some(found) = find(&leaf, id) {
+                return Ok(found);
+            }
+            let holds = |l: &&_| LeafEntry::ids(l).any(|held| held == id);
+            leaf = self.leaves(id.window).iter().find(holds).map_or(Ok(Vec::new()), |l| self.leaf(l))?;
+            find(&leaf, id).ok_or_else(|| self.contradiction(format!("{id}: the archive has no such block")))
+        };
+        ids.iter().map(|id| entry(*id)).collect()
+    }
+}

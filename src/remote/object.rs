@@ -1,0 +1,231 @@
+//! An object behind HTTP: requests for ranges, side by side, asked again where that may help.
+
+use super::address::Address;
+use super::answer::{About, Failure, check};
+use super::{Paged, RemoteOptions};
+use crate::base::address::public_name;
+use crate::base::error::{self, Error};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::io::{self, Read};
+use std::ops::Range;
+use std::panic::resume_unwind;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::thread;
+use std::time::Duration;
+use ureq::tls::{RootCerts, TlsConfig};
+use ureq::{Agent, Body};
+use wavesplat_format::Storage;
+
+/// Bytes that are read when an object is opened. Small files are then complete.
+const FIRST: u64 = 64 << 10;
+
+/// Requests that are under way at once.
+const SIDE_BY_SIDE: usize = 8;
+
+/// How often a request is made before it fails.
+const TRIES: u32 = 5;
+
+/// The wait before the second request; it doubles with every further one.
+const FIRST_WAIT: Duration = Duration::from_millis(250);
+
+/// The longest wait that a server may ask for.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
+/// How many times longer than its silence an answer of at most 4 MiB may take.
+const SLOWEST: u32 = 20;
+
+/// Bytes of a refusal that are looked at.
+const MOST_WORDS: u64 = 4096;
+
+/// Opens an object: asks for its first bytes, and finds the pages that a cache has of it.
+pub(super) fn open(address: &Path, options: &RemoteOptions) -> error::Result<Paged<Object>> {
+    let name = public_name(address);
+    let of = Address::parse(&address.to_string_lossy()).map_err(|what| Error::path(&name, what))?;
+    let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, "opening", e))?;
+    let version = options.cache.as_ref().zip(object.about.version());
+    let on_disk = version.map(|(cache, version)| cache.object(&first, version, object.about.len));
+    Ok(Paged::new(object, on_disk).begun(&first))
+}
+
+/// An object of a server.
+#[derive(Debug)]
+pub(super) struct Object {
+    address: Address,
+    agent: Agent,
+    about: About,
+}
+
+impl Object {
+    /// Opens an object, and returns its first bytes with it.
+    fn open(address: Address, timeout: Duration) -> io::Result<(Self, Vec<u8>)> {
+        let agent = agent(&address, timeout);
+        let opening = Self { address, agent, about: About::default() };
+        let (about, first) = patiently(|| opening.ask(&(0..FIRST), None))?;
+        Ok((Self { about, ..opening }, first))
+    }
+
+    /// Reads a range within the object.
+    fn read(&self, range: &Range<u64>) -> io::Result<Vec<u8>> {
+        patiently(|| self.ask(range, Some(&self.about))).map(|(_, bytes)| bytes)
+    }
+
+    /// Asks once for a range. `known` is what is known of the object.
+    fn ask(&self, range: &Range<u64>, known: Option<&About>) -> Result<(About, Vec<u8>), Failure> {
+        let mut request = self.agent.get(self.address.url());
+        request = request.header("Range", format!("bytes={}-{}", range.start, range.end - 1));
+        if let Some(etag) = known.and_then(About::strong_etag) {
+            request = request.header("If-Match", etag);
+        }
+        if let Some(authorization) = self.address.authorization() {
+            request = request.header("Authorization", authorization);
+        }
+        let (head, body) = request.call().map_err(failure)?.into_parts();
+        let status = head.status.as_u16();
+        match check((status, &head.headers), range, known) {
+            Ok(about) => body_of(body, range.end.min(about.len) - range.start).map(|bytes| (about, bytes)),
+            Err(Failure::Refused(error)) => Err(self.explained(&error, status, body)),
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// A refusal with the server's own words, and what helps.
+    fn explained(&self, error: &io::Error, status: u16, body: Body) -> Failure {
+        let mut words = String::new();
+        let _ = body.into_reader().take(MOST_WORDS).read_to_string(&mut words); // without them, the status must do
+        let message = words.split_once("<Message>").and_then(|(_, rest)| rest.split_once("</Message>"));
+        let message = message.map_or(String::new(), |(message, _)| {
+            let plain: String = message.chars().filter(|letter| !letter.is_control()).take(200).collect();
+            format!(": {plain}")
+        });
+        let advice = if matches!(status, 301 | 400..404) { self.address.advice() } else { "" };
+        Failure::Final(io::Error::new(error.kind(), format!("{error}{message}{advice}")))
+    }
+}
+
+impl Storage for Object {
+    fn len(&self) -> u64 {
+        self.about.len
+    }
+
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        let bytes = self.read(&(offset..offset + out.len() as u64))?;
+        out.copy_from_slice(&bytes);
+        Ok(())
+    }
+
+    fn read_many(&self, ranges: &[Range<u64>]) -> io::Result<Vec<Vec<u8>>> {
+        side_by_side(ranges, |range| self.read(range))
+    }
+
+    fn is_remote(&self) -> bool {
+        true
+    }
+}
+
+/// Reads ranges by several threads; the first error ends it.
+fn side_by_side(
+    ranges: &[Range<u64>],
+    read: impl Fn(&Range<u64>) -> io::Result<Vec<u8>> + Sync,
+) -> io::Result<Vec<Vec<u8>>> {
+    if let [only] = ranges {
+        return Ok(vec![read(only)?]);
+    }
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut found = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Relaxed);
+            let Some(range) = ranges.get(at) else { return Ok(found) };
+            found.push((at, read(range).inspect_err(|_| next.store(ranges.len(), Relaxed))?));
+        }
+    };
+    let found = thread::scope(|scope| {
+        let threads: Vec<_> = (0..ranges.len().min(SIDE_BY_SIDE)).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    let found: io::Result<Vec<Vec<_>>> = found;
+    let mut all: Vec<(usize, Vec<u8>)> = found?.into_iter().flatten().collect();
+    all.sort_by_key(|(at, _)| *at);
+    Ok(all.into_iter().map(|(_, bytes)| bytes).collect())
+}
+
+/// Makes a request until it succeeds, or waiting helps no more.
+fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
+    let mut wait = FIRST_WAIT;
+    for _ in 1..TRIES {
+        match request() {
+            Ok(answer) => return Ok(answer),
+            Err(Failure::Final(error) | Failure::Refused(error)) => return Err(error),
+            Err(Failure::Passing(_, asked)) => {
+                thread::sleep(asked.map_or(wait, |asked| asked.min(LONGEST_WAIT)).mul_f64(spread()));
+            }
+        }
+        wait *= 2;
+    }
+    request().map_err(|failure| match failure {
+        Failure::Final(error) | Failure::Refused(error) => error,
+        Failure::Passing(error, _) => io::Error::new(error.kind(), format!("{error}; it was asked {TRIES} times")),
+    })
+}
+
+/// A number between 1 and 1.5, another one every time: many clients that were refused together do not come back together.
+fn spread() -> f64 {
+    1.0 + RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64 / 2.0
+}
+
+/// What makes requests: connections that stay open, proxies from the environment, the certificates of the system.
+fn agent(address: &Address, timeout: Duration) -> Agent {
+    let tls = TlsConfig::builder().root_certs(RootCerts::PlatformVerifier).build();
+    let config = Agent::config_builder()
+        .http_status_as_error(false)
+        .https_only(address.is_encrypted())
+        .tls_config(tls)
+        .user_agent(concat!("wavesplat/", env!("CARGO_PKG_VERSION")))
+        .accept_encoding("identity")
+        .max_idle_connections_per_host(SIDE_BY_SIDE)
+        .timeout_connect(Some(timeout))
+        .timeout_recv_response(Some(timeout))
+        .timeout_per_read(Some(timeout))
+        .timeout_recv_body(Some(timeout * SLOWEST));
+    config.build().into()
+}
+
+/// The bytes of an answer, of which there must be this many.
+fn body_of(body: Body, length: u64) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::with_capacity(length as usize);
+    let read = body.into_reader().take(length + 1).read_to_end(&mut bytes);
+    let cut = |what: String| Failure::Passing(io::Error::new(io::ErrorKind::UnexpectedEof, what), None);
+    match (read, bytes.len() as u64) {
+        (Err(error), _) => Err(failure(error.into())),
+        (Ok(_), found) if found == length => Ok(bytes),
+        (Ok(_), found) if found < length => {
+            Err(cut(format!("the server's answer ends after {found} of {length} bytes")))
+        }
+        (Ok(_), _) => Err(Failure::last(format!("the server sends more than the {length} bytes that it announced"))),
+    }
+}
+
+/// What a request without an answer means.
+fn failure(error: ureq::Error) -> Failure {
+    match error {
+        ureq::Error::Timeout(_) => {
+            Failure::Passing(io::Error::new(io::ErrorKind::TimedOut, "the server does not answer in time"), None)
+        }
+        ureq::Error::HostNotFound => Failure::last("there is no host of this name, or no network"),
+        ureq::Error::TooManyRedirects | ureq::Error::RedirectFailed => {
+            Failure::last("the server sends elsewhere again and again")
+        }
+        ureq::Error::RequireHttpsOnly(_) => {
+            Failure::last("the server sends to an address that is not encrypted, which is not followed")
+        }
+        ureq::Error::Rustls(_) | ureq::Error::Tls(_) => Failure::last(format!("no encrypted connection: {error}")),
+        // Bad certificates and answers that are no HTTP.
+        ureq::Error::Io(error) if error.kind() == io::ErrorKind::InvalidData => {
+            Failure::last(format!("no encrypted connection: {error}"))
+        }
+        ureq::Error::Io(error) => Failure::Passing(error, None),
+        ureq::Error::ConnectionFailed => Failure::Passing(io::Error::other("no connection to the server"), None),
+        other => Failure::last(other.to_string()),
+    }
+}

@@ -1,0 +1,265 @@
+//! Files on servers: the same results, few requests, and clear messages whatever the server does.
+
+use super::{Archive, Run, Work};
+use crate::common::http::{Fate, Server};
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// A file of several windows, whose ends hold a small part of it.
+fn bytes() -> &'static Vec<u8> {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let work = Work::new();
+        let noise = |n: usize| ((n as u32).wrapping_mul(2_654_435_761) >> 16) as f32 / 65536.0;
+        let archive = Archive::of([48, 32, 32], 80, |x, y, z, t| {
+            (0.2 * x as f32 + 0.1 * t as f32).sin() + 0.1 * noise(x + 64 * (y + 64 * (z + 64 * t)))
+        });
+        work.write("a.npy", archive.npy());
+        work.wavesplat("convert a.npy -o a.wspl --tolerance 1e-3 --window 16 --block 16").ok();
+        let bytes = work.read("a.wspl");
+        assert!(bytes.len() > 1 << 20, "{} bytes", bytes.len());
+        bytes
+    })
+}
+
+/// A folder with the file.
+fn work() -> Work {
+    let work = Work::new();
+    work.write("run.wspl", bytes());
+    work
+}
+
+impl Work {
+    /// Runs a program with the address of a server's file, without any proxy.
+    fn remote(&self, server: &Server, line: &str) -> Run {
+        let address = server.address();
+        self.shell(&format!("export NO_PROXY=127.0.0.1; {}", line.replace("URL", &address)))
+    }
+}
+
+#[test]
+fn results_are_those_of_a_local_file() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let text = |run: Run| run.ok().text().replace(&server.address(), "run.wspl");
+    for line in ["$WAVESPLAT info URL", "$WAVESPLAT info URL --json", "$WAVESPLAT verify URL"] {
+        assert_eq!(text(work.remote(&server, line)), text(work.shell(&line.replace("URL", "run.wspl"))), "{line}");
+    }
+    for (line, output) in [
+        ("$WAVESPLAT extract URL -o OUT", "all.npy"),
+        ("$WAVESPLAT extract URL --region 3:9,:,5:6 --frames 7:40 -o OUT", "some.raw"),
+        ("$WAVESPLAT extract URL --lod 1 -o OUT", "coarse.npy"),
+        ("$RENDER URL --size 64x48 -o OUT", "picture.npy"),
+        ("$RENDER URL --size 64x48 --mode composite --frames 20 -o OUT", "composite.npy"),
+        ("$RENDER URL --probe 3,4,5 -o OUT", "series.csv"),
+    ] {
+        work.remote(&server, &line.replace("OUT", &format!("far_{output}"))).ok();
+        work.shell(&line.replace("URL", "run.wspl").replace("OUT", output)).ok();
+        assert!(work.read(output) == work.read(&format!("far_{output}")), "{line}");
+    }
+}
+
+#[test]
+fn few_requests_bring_little_more_than_is_needed() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    work.remote(&server, "$WAVESPLAT info URL").ok();
+    let (requests, sent) = server.traffic();
+    assert!(requests <= 2 && sent <= 192 << 10, "opening: {requests} requests, {sent} bytes");
+
+    work.remote(&server, "$WAVESPLAT extract URL --region 20:21,9:10,7:8 --frames 20 -o voxel.npy").ok();
+    let (requests, sent) = server.traffic();
+    assert!(requests <= 4 && sent <= 384 << 10, "one voxel: {requests} requests, {sent} bytes");
+
+    work.remote(&server, "$WAVESPLAT extract URL --region 20:21,9:10,7:8 -o series.npy").ok();
+    let (requests, sent) = server.traffic();
+    assert!(requests <= 10 && sent <= 768 << 10, "a series: {requests} requests, {sent} bytes");
+
+    work.remote(&server, "$RENDER URL --size 64x48 --range 0,1 -o f_%02d.png").ok();
+    let (requests, sent) = server.traffic();
+    assert!(requests <= 12 && sent <= bytes().len() + (128 << 10), "a view: {requests} requests, {sent} bytes");
+}
+
+#[test]
+fn a_cache_saves_requests_and_is_not_taken_for_another_file() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let line = "$WAVESPLAT extract URL --cache kept -o OUT.npy --force";
+    work.remote(&server, &line.replace("OUT", "first")).ok();
+    assert!(server.traffic().0 > 2);
+    work.remote(&server, &line.replace("OUT", "again")).ok();
+    assert_eq!(server.traffic().0, 1, "one request finds out whether the file is the same");
+    assert!(work.read("first.npy") == work.read("again.npy"));
+
+    let mut other = bytes().clone();
+    let middle = other.len() / 2;
+    other[middle] ^= 1;
+    let changed = Server::with(other.clone(), move |_| Fate::Replaced(other.clone(), "\"two\"".into()));
+    work.remote(&changed, &line.replace("OUT", "bad")).fails(3, &["damaged at byte"]);
+
+    work.shell("for page in kept/*/*.page; do printf x | dd of=$page bs=1 seek=100 conv=notrunc 2>/dev/null; done")
+        .ok();
+    work.remote(&server, &line.replace("OUT", "mended")).ok();
+    assert!(work.read("first.npy") == work.read("mended.npy"), "damaged pages are read again");
+
+    work.remote(&server, "$WAVESPLAT extract URL --cache kept --cache-size 1MiB -o small.npy").ok();
+    work.shell("test $(du -sk kept | cut -f1) -le 1200").ok();
+    work.remote(&server, "$WAVESPLAT info URL --cache run.wspl/x").fails(1, &["run.wspl/x"]);
+}
+
+#[test]
+fn several_programs_share_a_cache() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let each = "$WAVESPLAT extract URL --cache kept --cache-size 1MiB -o $n.npy || echo failed $n";
+    let found = work.remote(&server, &format!("for n in 1 2 3 4; do ({each}) & done; wait"));
+    assert_eq!(found.ok().text(), "");
+    let all: BTreeSet<Vec<u8>> = (1..=4).map(|n| work.read(&format!("{n}.npy"))).collect();
+    assert_eq!(all.len(), 1);
+}
+
+#[test]
+fn passing_faults_are_outlived() {
+    let work = work();
+    work.wavesplat("extract run.wspl -o right.npy").ok();
+    let busy = || Fate::Refuse(503, "Retry-After: 0\r\n".into(), String::new());
+    let rules: [fn(usize) -> Fate; 5] = [
+        |n| if n % 3 == 1 { Fate::Refuse(429, "Retry-After: 0\r\n".into(), String::new()) } else { Fate::Answer },
+        |n| if n % 4 == 2 { Fate::Cut(1000) } else { Fate::Answer },
+        |n| if n == 0 || n == 3 { Fate::Cut(0) } else { Fate::Answer },
+        |n| if n % 5 == 4 { Fate::Silent } else { Fate::Answer },
+        |_| Fate::Nameless,
+    ];
+    for (number, rule) in rules.into_iter().enumerate() {
+        let server = Server::with(bytes().clone(), move |asked| rule(asked.number));
+        let line = format!("$WAVESPLAT extract URL -o {number}.npy --timeout 0.5");
+        work.remote(&server, &line).ok();
+        assert!(work.read("right.npy") == work.read(&format!("{number}.npy")), "rule {number}");
+    }
+    let server = Server::with(bytes().clone(), move |asked| if asked.number < 4 { busy() } else { Fate::Answer });
+    work.remote(&server, "$WAVESPLAT info URL").ok();
+}
+
+#[test]
+fn lasting_faults_are_explained() {
+    let work = work();
+    let refuse = |status, body: &str| Fate::Refuse(status, "Retry-After: 0\r\n".into(), body.into());
+    let s3 = "<?xml version=\"1.0\"?><Error><Code>NoSuchKey</Code><Message>The key\nis not there.</Message></Error>";
+    for (fate, words) in [
+        (Fate::Whole, vec!["cannot send parts of a file"]),
+        (refuse(404, s3), vec!["no such file (404)", "The keyis not there."]),
+        (refuse(403, ""), vec!["does not allow reading it (403)"]),
+        (refuse(401, ""), vec!["a name and a password (401)"]),
+        (refuse(416, ""), vec!["empty (416)"]),
+        (refuse(503, ""), vec!["cannot answer now (503)", "asked 5 times"]),
+        (refuse(302, ""), vec!["location"]),
+        (Fate::Refuse(302, "Location: /run.wspl\r\n".into(), String::new()), vec!["again and again"]),
+        (Fate::Cut(100), vec!["asked 5 times"]),
+        (Fate::Shifted, vec!["sends bytes 1.."]),
+        (Fate::Silent, vec!["does not answer in time", "asked 5 times"]),
+        (Fate::Drip, vec!["does not answer in time"]),
+        (Fate::Nonsense, vec!["error: http://127.0.0.1"]),
+        (Fate::Endless, vec!["sends more than"]),
+    ] {
+        let (shown, begin) = (format!("{fate:?}"), Instant::now());
+        let server = Server::with(bytes().clone(), move |_| fate.clone());
+        let run = work.remote(&server, "$WAVESPLAT info URL --timeout 0.1");
+        assert!(begin.elapsed().as_secs() < 30, "{shown}");
+        run.fails(1, &[&words[..], &["/run.wspl: opening: "]].concat());
+    }
+    let closed = "http://127.0.0.1:9/run.wspl";
+    work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info {closed}")).fails(1, &[closed, "asked 5 times"]);
+}
+
+#[test]
+fn a_file_that_changes_is_noticed() {
+    let work = work();
+    for (others, etag) in [
+        (bytes().clone(), "\"two\""),
+        ([bytes().as_slice(), &[0; 64]].concat(), "\"one\""),
+        (bytes()[..bytes().len() - 64].to_vec(), "\"one\""),
+    ] {
+        let later = Fate::Replaced(others, etag.into());
+        let server =
+            Server::with(bytes().clone(), move |asked| if asked.number < 3 { Fate::Answer } else { later.clone() });
+        work.remote(&server, "$WAVESPLAT extract URL -o a.npy").fails(4, &["changed while it was being read"]);
+    }
+    let gone = |number| if number < 3 { Fate::Answer } else { Fate::Refuse(412, String::new(), String::new()) };
+    let server = Server::with(bytes().clone(), move |asked| gone(asked.number));
+    work.remote(&server, "$RENDER URL --size 64x48 -o a_%02d.png").fails(4, &["another version"]);
+    assert!(server.asked().iter().skip(1).all(|asked| asked.if_match.as_deref() == Some("\"one\"")));
+    assert_eq!(work.names(), ["run.wspl"]);
+}
+
+#[test]
+fn wrong_bits_are_noticed() {
+    let work = work();
+    for seed in 0..40_usize {
+        let bit = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+        let server =
+            Server::with(
+                bytes().clone(),
+                move |asked| {
+                    if asked.number % 4 == seed % 4 { Fate::Flipped(bit) } else { Fate::Answer }
+                },
+            );
+        work.remote(&server, "$WAVESPLAT verify URL").fails_or_finds(3, &["/run.wspl: "]);
+    }
+}
+
+#[test]
+fn passwords_and_signatures_are_not_shown() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let address = format!("http://me:hidden@127.0.0.1:{}/a/run.wspl?sig=hidden", server.port());
+    let shown = work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info '{address}' --json")).ok();
+    assert!(!shown.text().contains("hidden"));
+    let asked = server.asked();
+    assert_eq!(asked[0].authorization.as_deref(), Some("Basic bWU6aGlkZGVu"));
+    assert_eq!(asked[0].path, "/a/run.wspl?sig=hidden");
+    let refused = Server::with(bytes().clone(), |_| Fate::Refuse(403, String::new(), String::new()));
+    let address = address.replace(&server.port().to_string(), &refused.port().to_string());
+    let message = work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info '{address}'")).fails(1, &["403"]);
+    assert!(!message.message().contains("hidden"), "{}", message.message());
+}
+
+#[test]
+fn objects_of_s3_are_asked_for_with_a_signature() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let endpoint = format!("export NO_PROXY=127.0.0.1 HOME=/ AWS_ENDPOINT_URL=http://127.0.0.1:{};", server.port());
+    let keys = "AWS_ACCESS_KEY_ID=KEY AWS_SECRET_ACCESS_KEY=secret AWS_REGION=eu-west-3";
+    work.shell(&format!("{endpoint} {keys} $WAVESPLAT verify 's3://lab/my runs/run.wspl'")).ok();
+    let asked = server.asked();
+    for part in ["/lab/my%20runs/run.wspl?", "X-Amz-Credential=KEY", "eu-west-3", "X-Amz-Signature="] {
+        assert!(asked.iter().all(|asked| asked.path.contains(part)), "{part}: {:?}", asked[0].path);
+    }
+    work.shell(&format!("{endpoint} $WAVESPLAT info s3://lab/run.wspl")).ok();
+    assert!(server.asked().iter().all(|asked| asked.path == "/lab/run.wspl"), "without credentials, it must be public");
+
+    let refused = Server::with(bytes().clone(), |_| Fate::Refuse(403, String::new(), String::new()));
+    let endpoint = endpoint.replace(&server.port().to_string(), &refused.port().to_string());
+    let public = format!("{endpoint} $WAVESPLAT info s3://lab/run.wspl");
+    work.shell(&public).fails(1, &["s3://lab/run.wspl", "no credentials were found"]);
+    for (line, words) in [
+        ("$WAVESPLAT info s3://lab", "s3://BUCKET/KEY"),
+        ("AWS_PROFILE=gone $WAVESPLAT info s3://lab/run.wspl", "AWS_PROFILE names"),
+        ("AWS_ACCESS_KEY_ID=K $WAVESPLAT info s3://lab/run.wspl", "no secret"),
+    ] {
+        work.shell(&format!("{endpoint} {line}")).fails(2, &[words]);
+    }
+}
+
+#[test]
+fn an_unencrypted_answer_is_not_taken_for_an_encrypted_one() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let address = server.address().replace("http:", "https:");
+    work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info {address}")).fails(1, &["no encrypted connection"]);
+}
+
+#[test]
+fn what_is_not_done_on_servers_is_said() {
+    let work = work();
+    for (line, words) in [
+        ("convert https://127.0.0.1:9/a.npy -o a.wspl", vec!["frames are not read from servers"]),
+        ("convert run.wspl -o s3://lab/run.wspl", vec!["s3://lab/run.wspl", "aws s3 cp -"]),
+        ("extract run.wspl -o https://127.0.0.1/a.npy", vec!["not written to servers"]),
+    ] {
+        work.wavesplat(line).fails(2, &words);
+    }
+}
