@@ -36,6 +36,9 @@ pub struct Cache {
 }
 
 impl Cache {
+    /// Bytes that a cache takes where nobody says how many: 4 GiB.
+    pub const ROOM: u64 = 4 << 30;
+
     /// A cache in a folder, which is made if it does not exist; of at most `most` bytes.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 //! The commands of a page run in its order, in a folder of its own.
 
 use super::{Archive, CONVERT, Run, Work};
+use crate::common::http::Server;
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -136,6 +137,7 @@ fn damaged(work: &Work) {
 fn stand_ins(work: &Work) {
     work.write("simulation.raw", Archive::smooth([64, 64, 64], 2).bytes());
     program(work, "simulation", "exec cat simulation.raw");
+    program(work, "aws", "exec cat > /dev/null");
     program(work, "ssh", "shift; exec sh -c \"$*\"");
     if let Some(python) = python() {
         program(work, "python", &format!("exec '{python}' \"$@\""));
@@ -160,28 +162,42 @@ fn is_run(command: &str) -> bool {
     NOT_RUN.iter().all(|(start, _)| !command.starts_with(start)) && (!command.contains(PYTHON) || python().is_some())
 }
 
-/// Runs a command with the programs on the path.
-fn run(work: &Work, command: &str) -> Run {
+/// The server of the pages; its only file is a small archive.
+const SERVER: &str = "https://data.example.org";
+
+fn server() -> Server {
+    let work = Work::new();
+    work.write("long.npy", Archive::smooth([12, 10, 8], 64).npy());
+    work.wavesplat("convert long.npy -o run.wspl").ok();
+    Server::of(work.read("run.wspl"))
+}
+
+/// Runs a command with the programs on the path, and with another server.
+fn run(work: &Work, server: &Server, command: &str) -> Run {
+    let address = format!("http://127.0.0.1:{}", server.port());
+    let command = command.replace(SERVER, &address);
     let programs = Path::new(CONVERT).parent().unwrap().to_path_buf();
     let others = env::var_os("PATH").unwrap();
     let path = env::join_paths([work.path("bin"), programs].into_iter().chain(env::split_paths(&others))).unwrap();
-    Run::of(command, work.command("sh").env("PATH", path).args(["-c", command]).output().unwrap())
+    let mut shell = work.command("sh");
+    shell.env("PATH", path).env("NO_PROXY", "127.0.0.1").env("AWS_ENDPOINT_URL", address);
+    Run::of(&command, shell.args(["-c", &command]).output().unwrap())
 }
 
 #[test]
 fn every_command_runs() {
-    let pages = pages();
+    let (pages, server) = (pages(), server());
     thread::scope(|scope| {
         for page in &pages {
-            scope.spawn(|| run_page(page));
+            scope.spawn(|| run_page(page, &server));
         }
     });
 }
 
-fn run_page(page: &Page) {
+fn run_page(page: &Page, server: &Server) {
     let work = prepared();
     for command in page.commands().into_iter().filter(|command| is_run(command)) {
-        let run = run(&work, command).ok(); // in a pipeline, the last program
+        let run = run(&work, server, command).ok(); // in a pipeline, the last program
         assert!(!run.err.contains("error:"), "{}: {command}: {}", page.path.display(), run.err);
     }
 }

@@ -7,15 +7,26 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wavesplat::Region;
+use wavesplat::base::address::is_address;
 use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract_to};
 use wavesplat::file::report::BoundReport;
 use wavesplat::file::{CoefficientFile, setting};
+use wavesplat::remote::{Cache, RemoteOptions};
 
 /// Reads of fewer bytes end soon: nobody needs to interrupt them.
 const SHORT: usize = 16 << 20;
+
+/// Opens a file by its path or address.
+fn opened(path: &Path, cache_dir: Option<PathBuf>) -> wavesplat::Result<CoefficientFile> {
+    if !is_address(path) {
+        return CoefficientFile::open(path);
+    }
+    let cache = cache_dir.map(|folder| Cache::new(folder, Cache::ROOM)).transpose()?;
+    CoefficientFile::open_remote(path, &RemoteOptions { cache, ..RemoteOptions::default() })
+}
 
 /// An open coefficient file; several threads may read it. Triples are in the order x, y, z.
 #[pyclass(frozen, module = "wavesplat._wavesplat")]
@@ -26,9 +37,9 @@ pub(crate) struct File {
 #[pymethods]
 impl File {
     #[new]
-    #[pyo3(signature = (path, lod = 0))]
-    fn new(py: Python<'_>, path: PathBuf, lod: u32) -> PyResult<Self> {
-        let file = py.detach(|| CoefficientFile::open(path)?.with_detail(lod)).map_err(raised)?;
+    #[pyo3(signature = (path, lod = 0, cache_dir = None))]
+    fn new(py: Python<'_>, path: PathBuf, lod: u32, cache_dir: Option<PathBuf>) -> PyResult<Self> {
+        let file = py.detach(|| opened(&path, cache_dir)?.with_detail(lod)).map_err(raised)?;
         Ok(Self { file })
     }
 

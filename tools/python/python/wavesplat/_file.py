@@ -25,12 +25,13 @@ MEMORY = 512 << 20
 """Bytes that reading, converting and rendering may take beside their results."""
 
 
-def open(path: str | PathLike[str], *, lod: int = 0) -> File:
+def open(path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None) -> File:
     """Opens a coefficient file. Samples are read when they are asked for.
 
     Args:
-        path: A ``.wspl`` file.
+        path: A ``.wspl`` file, or the address of one: ``https://host/run.wspl`` or ``s3://bucket/run.wspl``, as a string.
         lod: Level of detail: every 2**lod-th voxel along each axis, read from the coarse levels alone.
+        cache_dir: A folder that keeps what was read of remote files, up to 4 GiB. Several processes may share it.
 
     Raises:
         FileNotFoundError: There is no such file.
@@ -38,7 +39,7 @@ def open(path: str | PathLike[str], *, lod: int = 0) -> File:
         ValueError: It has no such level of detail.
 
     """
-    return File(path, lod=lod)
+    return File(path, lod=lod, cache_dir=cache_dir)
 
 
 class File:
@@ -49,20 +50,22 @@ class File:
     the file's own order: along each axis, coordinates ascend. ``xarray.open_dataset`` gives the order of the source.
     """
 
-    def __init__(self, path: str | PathLike[str], *, lod: int = 0) -> None:
+    def __init__(
+        self, path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None
+    ) -> None:
         """As `wavesplat.open`."""
         if lod < 0:
             raise ValueError(f"lod: takes 0 or more, not {lod}")
-        self._path, self._lod = os.fspath(path), lod
-        self._file = _wavesplat.File(self._path, lod)
+        self._path, self._lod, self._cache_dir = os.fspath(path), lod, cache_dir
+        self._file = _wavesplat.File(self._path, lod, cache_dir)
 
     def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
-        return _reopened, (os.path.abspath(self._path), self._lod, self.id)
+        return _reopened, (anywhere(self._path), self._lod, self.id, self._cache_dir)
 
     def __repr__(self) -> str:  # noqa: D105
         sizes = ", ".join(f"{name}: {length}" for name, length in zip(self.dims, self.shape, strict=True))
         name = self.variable or "samples"
-        return f"<wavesplat.File {self._path!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
+        return f"<wavesplat.File {str(self._file.path)!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
 
     def __len__(self) -> int:  # noqa: D105
         return self.shape[0]
@@ -339,6 +342,8 @@ class File:
     def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
         if self._lod:
             options = {"lod": self._lod, **options}
+        if self._cache_dir:
+            options = {"cache": self._cache_dir, **options}
         with reporting(progress, "render") as report:
             try:
                 _wavesplat.render([*words(options), "-o", output, "--", self._path], report)
@@ -403,9 +408,14 @@ class Viewer:
         return f'<a href="{self.address}" target="_blank">{self.address}</a>'
 
 
-def _reopened(path: str, lod: int, id: str) -> File:
+def anywhere(path: str) -> str:
+    """A path that other processes understand: absolute, unless it is an address."""
+    return path if "://" in path else os.path.abspath(path)
+
+
+def _reopened(path: str, lod: int, id: str, cache_dir: str | PathLike[str] | None) -> File:
     """A file that was pickled, if it is still the same."""
-    file = File(path, lod=lod)
+    file = File(path, lod=lod, cache_dir=cache_dir)
     if file.id != id:
         raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled")
     return file

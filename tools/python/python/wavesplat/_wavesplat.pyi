@@ -20,7 +20,9 @@ _Report = Callable[[int, int], object]
 _Bytes = npt.NDArray[np.uint8]
 
 class File:
-    def __init__(self, path: str | PathLike[str], lod: int = 0) -> None: ...
+    def __init__(
+        self, path: str | PathLike[str], lod: int = 0, cache_dir: str | PathLike[str] | None = None
+    ) -> None: ...
     path: str
     id: str
     dims: list[int]

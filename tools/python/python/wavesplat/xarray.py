@@ -14,7 +14,7 @@ from xarray.core import indexing
 
 from ._convert import convert
 from ._description import ROLES, along_axis, array, attributes, kept
-from ._file import File, open
+from ._file import File, anywhere, open
 
 _COLOURS = ("red", "green", "blue")
 
@@ -62,6 +62,7 @@ class WavesplatBackend(BackendEntrypoint):
         "decode_timedelta",
         "decode_coords",
         "lod",
+        "cache_dir",
     )
 
     def open_dataset(  # type: ignore[override]
@@ -74,9 +75,10 @@ class WavesplatBackend(BackendEntrypoint):
         decode_timedelta: Any = None,
         decode_coords: Any = True,
         lod: int = 0,
+        cache_dir: str | os.PathLike[str] | None = None,
     ) -> xr.Dataset:
-        """The dataset of a file; with ``lod``, every 2**lod-th voxel along each axis."""
-        file = open(filename_or_obj, lod=lod)
+        """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis."""
+        file = open(filename_or_obj, lod=lod, cache_dir=cache_dir)
         variables, attrs = _variables(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
@@ -87,12 +89,12 @@ class WavesplatBackend(BackendEntrypoint):
             decode_timedelta=decode_timedelta,
             decode_coords=decode_coords,
         )
-        dataset.encoding["source"] = os.path.abspath(file.path)
+        dataset.encoding["source"] = anywhere(file.path)
         return dataset
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Whether a name ends like one of a coefficient file."""
-        return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).endswith(".wspl")
+        return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).split("?")[0].endswith(".wspl")
 
 
 def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
