@@ -82,12 +82,17 @@ impl RemoteArgs {
         Self { open, ..self }
     }
 
-    /// These options as words for another program.
+    /// These options as words for another program, as far as they are not the defaults.
     pub(crate) fn words(&self) -> Vec<OsString> {
-        let cache =
-            self.cache.iter().map(|folder| [&OsString::from("--cache="), folder.as_os_str()].into_iter().collect());
-        let others = [format!("--cache-size={}", self.cache_size.0), format!("--timeout={}", self.timeout)];
-        cache.chain(others.map(OsString::from)).collect()
+        let mut words = Vec::new();
+        if let Some(folder) = &self.cache {
+            words.push([OsStr::new("--cache="), folder.as_os_str()].into_iter().collect());
+            words.push(format!("--cache-size={}", self.cache_size.0).into());
+        }
+        if self.timeout != Self::default().timeout {
+            words.push(format!("--timeout={}", self.timeout).into());
+        }
+        words
     }
 
     fn options(&self) -> Result<RemoteOptions> {
