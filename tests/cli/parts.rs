@@ -55,16 +55,17 @@ fn a_part_of_everything_is_the_picture() {
     for (archive, convert, options) in [
         (Archive::smooth([20, 14, 10], 16), "", "--view 30,30 --view 0,0"),
         (with_gaps(), "", "--view 17,-40 --roll 12 --tau 0.05"),
-        (with_gaps(), "", "--quantity emission --splat-error 0 --annotate"),
+        (with_gaps(), "", "--quantity emission --splat-error 0"),
+        (with_gaps(), "", "--tolerance 0.05"),
+        (Archive::smooth([20, 14, 10], 16), "", "--lod 1 --exaggerate 2 --sigma 1.4"),
         (Archive::smooth([20, 14, 10], 16), "--transfer-function rainbow --range -1,1.5", "--method direct"),
         (Archive::smooth([20, 14, 10], 16), "", "--orbit 3 --over-time --fast"),
     ] {
         let work = converted(&archive, convert);
         let options = format!("{options} --size 60x44 --frames 2:12:3");
-        work.render(&format!("a.wspl -o whole_%v.npy {options}").replace(" --annotate", "")).ok();
+        work.render(&format!("a.wspl -o whole_%v.npy {options}")).ok();
         for threads in [1, 3] {
-            let part = format!("a.wspl --partial -o {threads}.wpart --threads {threads} {options}");
-            work.render(&part.replace(" --annotate", "")).ok();
+            work.render(&format!("a.wspl --partial -o {threads}.wpart --threads {threads} {options}")).ok();
         }
         assert!(work.read("1.wpart") == work.read("3.wpart"), "{options}: threads");
         work.render("--sum 1.wpart -o sum_%v.npy --threads 2").ok();
@@ -81,9 +82,9 @@ fn a_part_of_everything_is_the_picture() {
 #[test]
 fn parts_of_regions_add_up_to_the_picture_within_the_stated_error() {
     let (smooth, gaps) = (Archive::smooth([20, 14, 10], 16), with_gaps());
-    let rainbow = "--transfer-function rainbow --range -1,1.5";
-    for (archive, convert, channels) in [(&smooth, "", 1), (&gaps, "", 1), (&smooth, rainbow, 3)] {
-        let work = converted(archive, &format!("--max-error 1e-4 {convert}"));
+    let (values, colours) = ("--max-error 1e-4", "--tolerance 1e-4 --transfer-function rainbow --range -1,1.5");
+    for (archive, convert, channels) in [(&smooth, values, 1), (&gaps, values, 1), (&smooth, colours, 3)] {
+        let work = converted(archive, convert);
         let range = if channels == 3 { (0.0, 1.0) } else { range_of(archive) };
         for options in
             ["--view 0,0", "--view 33,21 --roll 7", "--view 0,90 --splat-error 0.01", "--view 120,-35 --tau 0.04"]
@@ -202,7 +203,9 @@ fn trees(work: &Work) {
         work.shell(&format!("$RENDER --sum r-1{n}.wpart r-2{n}.wpart --partial -o space-{n}.wpart")).ok();
         work.shell(&format!("$RENDER --sum r-{n}1.wpart r-{n}2.wpart --partial -o time-{n}.wpart")).ok();
     }
-    ["r", "space", "time"].map(|name| sum(work, name, &format!("{name}.npy")));
+    for name in ["r", "space", "time"] {
+        sum(work, name, &format!("{name}.npy"));
+    }
     assert!(work.read("r.npy") == work.read("time.npy") && work.read("r.npy") == work.read("space.npy"));
     work.render("a.wspl -o whole.npy --size 40x30 --frames ::20 --force").ok();
     let off = numbers(work, "r.npy").into_iter().zip(numbers(work, "whole.npy")).filter(|(a, _)| !a.is_nan());
@@ -215,7 +218,8 @@ fn trees(work: &Work) {
 fn what_is_no_part_of_the_same_pictures_is_refused() {
     let work = converted(&with_gaps(), "");
     let part = |options: &str, name: &str| {
-        work.render(&format!("a.wspl --partial -o {name}.wpart --size 32x24 {options}")).ok()
+        let size = if options.contains("--size") { "" } else { "--size 32x24" };
+        work.render(&format!("a.wspl --partial -o {name}.wpart {size} {options}")).ok()
     };
     part("--region 0:7,:,:", "a");
     part("--region 7:,:,:", "b");
@@ -231,10 +235,10 @@ fn what_is_no_part_of_the_same_pictures_is_refused() {
     for (parts, words) in [
         ("a b a", ["a.wpart", "has the same voxels and frames as a.wpart"]),
         ("a over", ["over.wpart", "shares voxels with a.wpart: 5:7,0:14,0:10"]),
-        ("a view", ["view.wpart", "the views differs"]),
-        ("a size", ["size.wpart", "the views differs"]),
-        ("a splat", ["splat.wpart", "the splat error differs"]),
-        ("a quantity", ["quantity.wpart", "the quantity differs"]),
+        ("a view", ["view.wpart", "they differ in views"]),
+        ("a size", ["size.wpart", "they differ in views"]),
+        ("a splat", ["splat.wpart", "they differ in splat error"]),
+        ("a quantity", ["quantity.wpart", "they differ in quantity"]),
         ("a frames", ["a.wpart", "lacks the voxels 7:20,0:14,0:10"]),
         ("a other", ["other.wpart", "was made of another file than a.wpart"]),
     ] {

@@ -168,7 +168,7 @@ impl Look {
         let (own, other) = (object(self)?, object(other)?);
         let named = |key: &String| match key.as_str() {
             "archive" | "frames" | "channels" | "block" | "values" | "axes" | "time_unit" | "calendar" => {
-                "archive".into()
+                "their archive".into()
             }
             "whole" | "grid" => "lattice".into(),
             "kernel" => "sigma or tau".into(),
@@ -210,11 +210,6 @@ impl Look {
 }
 
 impl Head {
-    /// The voxels of all its boxes.
-    pub fn voxels(&self) -> u64 {
-        self.boxes.iter().map(|of| of.voxels() as u64).sum()
-    }
-
     /// An error unless all numbers are sound. Records end before `end`.
     pub(super) fn check(&self, end: u64) -> Result<(), String> {
         self.look.check()?;

@@ -325,7 +325,7 @@ fn picture(config: &RenderConfig, weights: &Weights, (planes, missing): (&[Vec<f
 fn check_alike(first: &PartFile, part: &PartFile) -> Result<()> {
     let Some(what) = first.head.look.difference(&part.head.look) else { return Ok(()) };
     let first = first.path().display();
-    Err(Error::path(part.path(), format!("is not of the same pictures as {first}: the {what} differs")))
+    Err(Error::path(part.path(), format!("is not of the same pictures as {first}: they differ in {what}")))
 }
 
 /// An error unless files with the same frames are the same.

@@ -137,7 +137,7 @@ def test_many_workers_render_the_pictures_of_one_call(client, rendered, options)
 def rendered(tmp_path_factory):
     """A file, and its two shards."""
     folder = tmp_path_factory.mktemp("rendered")
-    samples, settings = smooth((32, 20, 22, 24)), {"window": 8, "chain": 1, "range": (-4, 4), "block": 8}
+    samples, settings = samples_of(smooth((32, 20, 22, 24))), {"window": 8, "chain": 1, "range": (-4, 4), "block": 8}
     wavesplat.convert(samples, folder / "a.wspl", **settings)
     shards = [folder / f"{n}.wspl" for n in (1, 2)]
     for n, shard in enumerate(shards, 1):
