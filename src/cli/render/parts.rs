@@ -103,9 +103,22 @@ struct PartReport<'a> {
 struct SumReport<'a> {
     #[serde(flatten)]
     pictures: &'a Reported<'a>,
+    #[serde(flatten)]
+    of: Summed,
+}
+
+/// What a sum is of.
+#[derive(Serialize)]
+struct Summed {
     parts: usize,
     /// The share of the lattice whose voxels the parts have.
     covered: f64,
+}
+
+impl Summed {
+    fn of(total: &Total) -> Self {
+        Self { parts: total.parts(), covered: total.covered() }
+    }
 }
 
 /// A part before its first sums.
@@ -254,7 +267,8 @@ impl Cli {
         let terminal = self.common.progress("sum", "pictures");
         let progress = progress.unwrap_or(&terminal);
         if self.parts.partial {
-            return total.join(&frames, (&self.output, self.part_output()?), progress)?.commit();
+            total.join(&frames, (&self.output, self.part_output()?), progress)?.commit()?;
+            return self.common.report(&Summed::of(&total), false);
         }
         self.write_pictures(&total, &frames, progress)
     }
@@ -308,7 +322,7 @@ impl Cli {
         (picture, coloured): (&Provenance, ColouredPictures),
     ) -> Result<()> {
         let pictures = &Reported { report, picture, coloured, file_bytes_read: None, file_bytes: None };
-        self.report(&SumReport { pictures, parts: total.parts(), covered: total.covered() })
+        self.report(&SumReport { pictures, of: Summed::of(total) })
     }
 
     fn check_memory_of_sum(&self, total: &Total, targets: &Targets, config: &RenderConfig) -> Result<()> {

@@ -164,6 +164,9 @@ impl Look {
 
     /// The first setting that differs from another look.
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
+        if self == other {
+            return None;
+        }
         let object = |look: &Self| serde_json::to_value(look).ok().and_then(|value| value.as_object().cloned());
         let (own, other) = (object(self)?, object(other)?);
         let named = |key: &String| match key.as_str() {

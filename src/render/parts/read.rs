@@ -21,6 +21,8 @@ pub struct PartFile {
     path: PathBuf,
     /// What it says of itself.
     pub head: Head,
+    /// Bytes of its head, unpacked.
+    pub(super) head_bytes: usize,
 }
 
 /// Whether a file begins as a part.
@@ -68,7 +70,7 @@ impl PartFile {
             return Err(Error::input(path, format!("is a part of version {}, which is not known", head.schema)));
         }
         head.check(offset).map_err(|what| damaged(path, &format!("it {what}")))?;
-        Ok(Self { path: path.into(), head })
+        Ok(Self { path: path.into(), head, head_bytes: json.len() })
     }
 
     /// The name for messages.

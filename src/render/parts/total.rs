@@ -26,7 +26,8 @@ type Holders = Vec<(usize, usize)>;
 /// Parts that make up pictures.
 #[derive(Debug)]
 pub struct Total {
-    /// In the order of their voxels.
+    look: Look,
+    /// In the order of their voxels. Only `look` has the axes.
     parts: Vec<PartFile>,
     /// For each view and frame, the parts that add to the picture, and the numbers of their records.
     pictures: BTreeMap<(usize, usize), Holders>,
@@ -43,11 +44,16 @@ impl Total {
     /// others have; each is named.
     pub fn open(paths: &[PathBuf], memory: usize, progress: &dyn Progress) -> Result<Self> {
         progress.start(Some(paths.len() as u64));
-        let mut parts: Vec<PartFile> = Vec::new();
+        let (mut parts, mut look, mut left): (Vec<PartFile>, Option<Look>, _) = (Vec::new(), None, memory);
         for path in paths {
             progress.check()?;
-            let part = PartFile::open(path, memory)?;
-            parts.first().map_or(Ok(()), |first| check_alike(first, &part))?;
+            let mut part = PartFile::open(path, left)?;
+            left -= part.head_bytes;
+            match (&look, parts.first()) {
+                (Some(look), Some(first)) => check_alike((look, first.path()), &part)?,
+                _ => look = Some(part.head.look.clone()),
+            }
+            part.head.look.axes = Default::default();
             parts.push(part);
             progress.advance(1);
         }
@@ -57,10 +63,10 @@ impl Total {
         });
         check_sources(&parts)?;
         let pictures = pictures(&parts)?;
-        let Some(first) = pictures.values().next() else {
+        let (Some(first), Some(look)) = (pictures.values().next(), look) else {
             return Err(Error::setting("inputs", "none of the parts has a picture"));
         };
-        let total = Self { boxes: boxes(&parts, first), pictures, parts, memory };
+        let total = Self { look, boxes: boxes(&parts, first), pictures, parts, memory: left };
         total.check_voxels()?;
         total.check_frames()?;
         Ok(total)
@@ -68,7 +74,7 @@ impl Total {
 
     /// What all parts share.
     pub fn look(&self) -> &Look {
-        &self.parts[0].head.look
+        &self.look
     }
 
     /// The number of parts.
@@ -322,9 +328,9 @@ fn picture(config: &RenderConfig, weights: &Weights, (planes, missing): (&[Vec<f
 }
 
 /// An error unless two parts are of the same pictures.
-fn check_alike(first: &PartFile, part: &PartFile) -> Result<()> {
-    let Some(what) = first.head.look.difference(&part.head.look) else { return Ok(()) };
-    let first = first.path().display();
+fn check_alike((look, first): (&Look, &Path), part: &PartFile) -> Result<()> {
+    let Some(what) = look.difference(&part.head.look) else { return Ok(()) };
+    let first = first.display();
     Err(Error::path(part.path(), format!("is not of the same pictures as {first}: they differ in {what}")))
 }
 
