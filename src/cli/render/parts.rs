@@ -254,7 +254,6 @@ impl Cli {
         config.views = views.iter().map(|view| config.views[*view]).collect();
         config.frames.retain(held);
         config.frames.iter_mut().for_each(|frame| *frame -= frames[0]);
-        config.memory = config.memory.saturating_sub(packing(&look));
         Ok(Planned { look, source, config, views, voxels })
     }
 
@@ -310,7 +309,8 @@ impl Cli {
         let mut sinks = self.sinks(&config, (pictures, None), &colouring, (&provenance, annotation))?;
         let report = total.render(frames, progress, &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
-        self.common.detail(summary(&report));
+        let (parts, shown, seconds) = (total.parts(), config.shown().len(), report.seconds);
+        self.common.detail(format_args!("{parts} parts added to {shown} pictures in {seconds:.3} s"));
         self.note_errors(&report);
         self.report_sum(total, &report, (&provenance, colouring.coloured()))
     }
@@ -355,13 +355,6 @@ fn numbered<'a>(sums: Sums<'a>, views: &[usize], first: usize) -> Sums<'a> {
             Sums::Picture { view: views[view], frame: frame + first, planes, missing }
         }
     }
-}
-
-/// Bytes that the numbers of a picture take while they are packed.
-fn packing(look: &Look) -> usize {
-    let [width, height] = look.views[0].size;
-    let numbers = 2 * look.channels * width.saturating_mul(height);
-    2 * numbers.saturating_mul(size_of::<f64>())
 }
 
 /// The voxels of a sum, on the lattice of all voxels.

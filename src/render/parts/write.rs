@@ -7,10 +7,13 @@ use crate::base::grid::Region;
 use crate::render::sums::Sums;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// Sums are noise for the most part, so more work packs hardly better.
 const LEVEL: i32 = 1;
+
+/// Numbers that are packed at a time.
+const TOGETHER: usize = 1 << 14;
 
 /// A part that is being written.
 pub struct PartWriter<W> {
@@ -68,12 +71,41 @@ impl<W: Write> PartWriter<W> {
     }
 
     fn record(&mut self, planes: &[&[f64]]) -> Result<Place> {
-        let failed = |e: io::Error| Error::io(&self.name, "writing", e);
-        let bytes: Vec<u8> = planes.iter().flat_map(|plane| plane.iter().flat_map(|v| v.to_le_bytes())).collect();
-        let packed = zstd::bulk::compress(&bytes, LEVEL).map_err(failed)?;
-        self.out.write_all(&packed).map_err(failed)?;
-        let place = Place { offset: self.at, bytes: packed.len() as u64, checksum: xxh3_64(&packed) };
+        let mut counted = Counted { out: &mut self.out, bytes: 0, digest: Xxh3::new() };
+        pack(planes, &mut counted).map_err(|e| Error::io(&self.name, "writing", e))?;
+        let place = Place { offset: self.at, bytes: counted.bytes, checksum: counted.digest.digest() };
         self.at += place.bytes;
         Ok(place)
+    }
+}
+
+/// Packs numbers a few at a time, since those of all planes may be as large as the rest of the work.
+fn pack(planes: &[&[f64]], out: impl Write) -> io::Result<()> {
+    let (mut packer, mut bytes) = (zstd::stream::Encoder::new(out, LEVEL)?, Vec::new());
+    for numbers in planes.iter().flat_map(|plane| plane.chunks(TOGETHER)) {
+        bytes.clear();
+        bytes.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
+        packer.write_all(&bytes)?;
+    }
+    packer.finish().map(drop)
+}
+
+/// Counts and digests what passes.
+struct Counted<W> {
+    out: W,
+    bytes: u64,
+    digest: Xxh3,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.bytes += written as u64;
+        self.digest.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
     }
 }
