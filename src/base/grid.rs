@@ -2,8 +2,10 @@
 //!
 //! Triples are in the order x, y, z; arrays have x fastest, then y, z, and time slowest.
 
+use serde::{Deserialize, Serialize};
+
 /// A regular grid of voxels in the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Number of voxels along x, y, z; none is 0.
     pub dims: [usize; 3],
@@ -67,7 +69,7 @@ impl Grid {
 }
 
 /// A box of voxels, `start` included and `end` excluded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Region {
     /// First voxel along x, y, z.
     pub start: [usize; 3],

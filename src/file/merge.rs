@@ -186,6 +186,44 @@ impl Opened {
     }
 }
 
+/// Where a file stands in its archive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Standing {
+    /// The same for all shards of an archive, and for the merged file.
+    pub archive: String,
+    /// The frames of the archive that the file holds.
+    pub frames: Range<usize>,
+    /// Frames of the archive.
+    pub all: usize,
+}
+
+impl Standing {
+    /// Of a shard, or of a file that is a whole archive.
+    ///
+    /// # Errors
+    /// A shard that contradicts itself.
+    pub fn of(file: &CoefficientFile) -> Result<Self> {
+        let metadata = file.metadata();
+        let id = without_shard(metadata).file_id(0, file.reader.features()).map_err(|e| file.failed(e))?;
+        let (frames, all) = match super::setting(metadata, SHARD) {
+            Some(_) => {
+                let Place { frames, all, .. } = Place::of(file)?;
+                (frames.start as usize..frames.end as usize, all as usize)
+            }
+            None => (0..file.frames(), file.frames()),
+        };
+        if frames.end > all {
+            return Err(Error::input(file.path(), format!("ends at frame {} of {all}", frames.end)));
+        }
+        Ok(Self { archive: id.to_string(), frames, all })
+    }
+
+    /// Whether the file is a shard of a longer archive.
+    pub fn is_part(&self) -> bool {
+        self.frames != (0..self.all)
+    }
+}
+
 /// The metadata that shards share: what one conversion would begin with.
 fn without_shard(of: &Metadata) -> Metadata {
     let mut start = of.start();

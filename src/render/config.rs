@@ -6,6 +6,7 @@ use crate::base::grid::{Grid, Region};
 use crate::colour::TransferFunction;
 use crate::view::camera::View;
 use crate::view::footprint::{Kernel, Method};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// A pixel is background if its weights sum to less than this share of the view's largest sum.
@@ -31,7 +32,7 @@ pub(super) fn most_splat_error(quantity: Quantity, error: f64) -> f64 {
 }
 
 /// The quantity that a pixel of a projection shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Quantity {
     /// g, the weighted mean along the ray (eq 12); NaN is background (eq 16).
     Mean,

@@ -28,10 +28,11 @@
 //! plan              how much fits in memory
 //! certificate       the error bound of a pixel; weigh: the weights of a view
 //! reconstruct       planes to pixels: inverse transform, division, certificate
-//! driver            the loop over frame batches
+//! driver            the loop over frame batches; bands: rows of all pictures of a batch
 //! project           the pictures of a batch as projections; composite: slice by slice; cut: planes through the volume
 //! annotate/, sink/  text in pictures, and output files, with page/ for web pages; pictures: a rendering into files
 //! setups            the setups of all views, and which mode renders them
+//! sums              what a part of the voxels adds to pictures; parts/: files of such sums, and pictures of them
 //! ```
 //!
 //! ```text
@@ -67,6 +68,7 @@ mod certificate;
 mod weigh;
 mod reconstruct;
 mod driver;
+mod bands;
 mod project;
 mod composite;
 mod cut;
@@ -75,6 +77,8 @@ pub(crate) mod page;
 pub mod sink;
 mod pictures;
 mod setups;
+mod sums;
+pub mod parts;
 
 pub use crate::wavelet::{LANES, Lane};
 pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
@@ -89,6 +93,7 @@ pub use scene::{
     BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
 };
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
+pub use sums::{SumSink, Sums, render_sums};
 
 use crate::base::error::Result;
 use crate::base::progress::Progress;

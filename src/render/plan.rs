@@ -31,16 +31,36 @@ pub(super) struct Budget<'a> {
     block_bytes: usize,
 }
 
+/// What is kept of every pixel until the sink takes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Its value, and perhaps its error.
+    Value,
+    /// The sums that make its value: emission and missing weights.
+    Sums,
+}
+
+impl Kept {
+    /// Bytes of a pixel and frame of a view, and bytes of its copy that interleaves channels.
+    fn bytes(self, channels: usize, config: &RenderConfig) -> [usize; 2] {
+        let values = channels * (1 + usize::from(config.certify)) * size_of::<f32>();
+        match self {
+            Self::Value => [values, if channels > 1 { values } else { 0 }],
+            Self::Sums => [2 * channels * size_of::<f64>(), 0],
+        }
+    }
+}
+
 /// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
 const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
     /// The least memory in bytes with which each view can be rendered alone.
-    pub(super) fn least(config: &RenderConfig, scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
+    pub(super) fn least((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
         let planes = scene.most_planes(1, config);
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
-            fixed(config, setups) + Budget::new(config, scene, setups).bytes(1, planes, TILE)
+            fixed(config, setups) + Budget::new((config, kept), scene, setups).bytes(1, planes, TILE)
         };
         setups.iter().map(least).max().unwrap_or(0)
     }
@@ -60,11 +80,9 @@ impl<'a> Budget<'a> {
     }
 
     /// The budget for pictures from these views.
-    fn new(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
-        let channels = scene.channels();
-        let of_a_view = channels * (1 + usize::from(config.certify));
-        let together = if channels > 1 { of_a_view * size_of::<f32>() } else { 0 };
-        let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view * size_of::<f32>());
+    fn new((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
+        let [of_a_view, together] = kept.bytes(scene.channels(), config);
+        let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view);
         let available = config.memory.saturating_sub(fixed(config, setups));
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
         Self { setups, available, size, pixel_bytes, together, block, block_bytes }
@@ -72,18 +90,23 @@ impl<'a> Budget<'a> {
 
     /// The budget for as many of the first views as fit together: whole pictures of all views, and as many frames at a
     /// time as the first view has alone. One view if the selection of blocks depends on the view.
-    pub(super) fn of_most(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
+    pub(super) fn of_most((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let most = if config.chooses_by_view() { 1 } else { setups.len() };
-        Self::of_first(config, scene, &setups[..most], config.size()[1])
+        Self::of_first((config, kept), scene, &setups[..most], config.size()[1])
     }
 
     /// The budget for as many of the first views as fit together with `rows` rows of all pictures.
-    fn of_first(config: &RenderConfig, scene: &dyn Scene, setups: &'a [ViewSetup], rows: usize) -> Self {
-        let alone = Self::new(config, scene, &setups[..1]);
+    fn of_first(
+        (config, kept): (&RenderConfig, Kept),
+        scene: &dyn Scene,
+        setups: &'a [ViewSetup],
+        rows: usize,
+    ) -> Self {
+        let alone = Self::new((config, kept), scene, &setups[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
         let fits = |budget: &Self| budget.bytes(frames, planes, rows) <= budget.available;
-        let several = |count: usize| Some(Self::new(config, scene, &setups[..count])).filter(fits);
+        let several = |count: usize| Some(Self::new((config, kept), scene, &setups[..count])).filter(fits);
         let (mut best, mut least, mut most) = (alone, 1, setups.len());
         while least < most {
             let middle = least.midpoint(most + 1);

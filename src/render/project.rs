@@ -1,13 +1,14 @@
 //! Projections: splats every frame batch into all views, and inverts the pixels.
 
+use super::bands::splat_bands;
 use super::config::RenderConfig;
 use super::driver::{Job, RenderedBatch, for_each_batch};
 use super::expectation::Expectation;
-use super::plan::Budget;
+use super::plan::{Budget, Kept};
 use super::reconstruct::PixelReconstructor;
 use super::report::{RenderReport, Rendered, lap};
 use super::scene::{FrameBatch, Scene};
-use super::splat::{BandAccumulator, ViewSetup, splat};
+use super::splat::{Pixels, ResolvedTile, ViewSetup};
 use super::weigh::weigh;
 use super::weights::WeightedView;
 use crate::base::error::Result;
@@ -32,7 +33,7 @@ pub(super) fn project(
     };
     let mut first = which.start;
     while first < which.end {
-        let budget = Budget::of_most(config, scene, &setups[first..which.end]);
+        let budget = Budget::of_most((config, Kept::Value), scene, &setups[first..which.end]);
         render_views((scene, progress), config, (&budget, first), report, &mut sink)?;
         first += budget.setups().len();
     }
@@ -79,7 +80,6 @@ fn render_batch(
     report: &mut RenderReport,
 ) -> Result<Vec<Pictures>> {
     let layout = batch.layout();
-    let blocks = visible_blocks(batch, weighted, report);
     let reconstructors: Vec<_> = weighted.iter().map(|view| PixelReconstructor::new(batch, view, config)).collect();
     let empty = |pixels: &PixelReconstructor<'_>| {
         let mut pictures = Zeroed::new(pixels.pictures() * budget.pixels());
@@ -87,37 +87,15 @@ fn render_batch(
         pictures
     };
     let mut pictures: Vec<Zeroed<f32>> = reconstructors.iter().map(empty).collect();
-    for rows in budget.bands(&layout) {
-        let mut bands: Vec<_> = weighted
-            .iter()
-            .map(|view| BandAccumulator::new(view.setup, rows.clone(), &layout).relative_to(view.weights.ones()))
-            .collect();
-        report.add_splatted(&splat(&mut bands, (&blocks, budget.batch(&layout, rows.len())), &batch)?);
-        let mut clock = Instant::now();
-        for ((band, pixels), pictures) in bands.into_iter().zip(&reconstructors).zip(&mut pictures) {
-            band.finish(pictures, |tile, rows| pixels.tile(tile, rows));
-        }
-        lap(&mut clock, &mut report.inverse_seconds);
-    }
+    let finish =
+        |view: usize, tile: ResolvedTile<'_>, rows: &mut Pixels<'_, f32>| reconstructors[view].tile(tile, rows);
+    splat_bands(batch, weighted, budget, report, (&mut pictures, &finish))?;
     if config.certify {
         let of_errors = pictures.iter().flat_map(|all| &all[layout.frames * budget.pixels()..]);
         let largest = of_errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
         report.certified_error = Some(largest);
     }
     Ok(pictures.into_iter().map(|all| Pictures { pixels: budget.pixels(), all }).collect())
-}
-
-/// The selected blocks that reach a pixel of any view. Counts the others in the report.
-fn visible_blocks(batch: &dyn FrameBatch, weighted: &[WeightedView<'_>], report: &mut RenderReport) -> Vec<usize> {
-    let all_rows = 0..weighted[0].setup.camera.size[1];
-    let mut blocks = batch.selection().blocks.clone();
-    let selected = blocks.len();
-    blocks.retain(|b| weighted.iter().any(|view| view.setup.reaches(*b, &all_rows)));
-    let reached = blocks.len();
-    blocks.retain(|b| weighted.iter().any(|view| view.setup.sees(*b, &all_rows)));
-    report.blocks_outside += (selected - reached) as u64;
-    report.blocks_dimmed += (reached - blocks.len()) as u64;
-    blocks
 }
 
 /// The pictures of one channel of a batch from one view.

@@ -70,10 +70,7 @@ impl<'a> PixelReconstructor<'a> {
         for (f, emission) in frames.iter().enumerate() {
             let (absent, errors) = sums.get(f).copied().unwrap_or_default();
             let present = if self.layout.absent { weights.present(&absent) } else { all };
-            let values = match self.quantity {
-                Quantity::Mean => std::array::from_fn(|l| emission[l] / present[l]),
-                Quantity::Emission => *emission,
-            };
+            let values = std::array::from_fn(|l| self.quantity.of(emission[l], present[l]));
             put(f, values);
             if let Some(certificate) = self.certificate {
                 let bounds = &self.batch.errors().frames[f];
@@ -85,17 +82,78 @@ impl<'a> PixelReconstructor<'a> {
 
     /// The missing weights of a frame, and the weighted sums of errors.
     fn absent_and_errors(&self, planes: &[Lane], frame: usize) -> (Lane, Lane) {
-        let (mut absent, mut errors) = (Lane::default(), Lane::default());
-        if self.layout.absent {
-            let (one, all) = (planes[self.layout.absent(frame)], planes[self.layout.absent_in_all()]);
-            absent = std::array::from_fn(|l| one[l] + all[l]);
-        }
+        let (absent, mut errors) = (self.layout.absent_sums(planes, frame), Lane::default());
         let sums = &planes[self.layout.first_error()..self.layout.planes()];
         for (sum, factors) in sums.iter().zip(&self.batch.errors().factors) {
             (0..LANES).for_each(|l| errors[l] += sum[l] * factors[frame]);
         }
         (absent, errors)
     }
+}
+
+impl Quantity {
+    /// The value of a pixel: its emission, or its mean (eq 12) with the weights that are present.
+    fn of(self, emission: f64, present: f64) -> f64 {
+        match self {
+            Self::Mean => emission / present,
+            Self::Emission => emission,
+        }
+    }
+}
+
+impl Layout {
+    /// The missing weights of a frame.
+    fn absent_sums(&self, planes: &[Lane], frame: usize) -> Lane {
+        if !self.absent {
+            return Lane::default();
+        }
+        let (one, all) = (planes[self.absent(frame)], planes[self.absent_in_all()]);
+        std::array::from_fn(|l| one[l] + all[l])
+    }
+}
+
+/// Keeps the sums of pixels as they are, so that those of other voxels can be added.
+pub(super) struct SumKeeper<'a> {
+    pub(super) batch: &'a dyn FrameBatch,
+}
+
+impl SumKeeper<'_> {
+    /// Stores the emissions of all frames, then their missing weights if there are any. Leaves tiles without sums unchanged.
+    pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
+        let (used, layout) = (tile.used(), self.batch.layout());
+        if used.is_empty() {
+            return;
+        }
+        let mut inverse = self.batch.inverse(&used);
+        let mut planes = vec![Lane::default(); layout.planes()];
+        let mut frames = vec![Lane::default(); layout.frames];
+        let width = tile.rect.x.len();
+        for (y, at) in tile.rect.y.clone().zip((0..).step_by(width)) {
+            for first in (0..width).step_by(LANES) {
+                let (count, x) = (LANES.min(width - first), tile.rect.x.start + first);
+                tile.load(at + first, count, &mut planes);
+                for frame in (0..layout.frames).filter(|_| layout.absent) {
+                    pixels.put(layout.frames + frame, [x, y], &layout.absent_sums(&planes, frame)[..count]);
+                }
+                inverse(&mut planes, &mut frames);
+                frames.iter().enumerate().for_each(|(f, sums)| pixels.put(f, [x, y], &sums[..count]));
+            }
+        }
+    }
+}
+
+/// The pixels of a picture whose sums are complete: emissions, and missing weights unless all samples are there.
+pub(super) fn finished(
+    quantity: Quantity,
+    weights: &Weights,
+    (emission, absent): (&[f64], Option<&[f64]>),
+) -> Vec<f32> {
+    let width = weights.size[0];
+    let pixel = |(at, emission): (usize, &f64)| {
+        let present = weights.at([at % width, at / width]).present(absent.map_or(0.0, |absent| absent[at]));
+        quantity.of(*emission, present) as f32
+    };
+    emission.iter().enumerate().map(pixel).collect()
 }
 
 /// The weights of neighbouring pixels of a row, padded with the weights of the last pixel.

@@ -1,7 +1,7 @@
 //! The setups of all views of a rendering, and the mode that renders them.
 
 use super::config::{Mode, RenderConfig};
-use super::plan::Budget;
+use super::plan::{Budget, Kept};
 use super::planes::PlanesView;
 use super::project::project;
 use super::report::{RenderReport, Rendered, ViewReport};
@@ -11,6 +11,7 @@ use super::splat::ViewSetup;
 use super::splat::reference_weights::{with_backend, without_dim_voxels};
 use super::{composite, cut};
 use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::grid::{BlockGrid, Grid};
 use crate::base::progress::Progress;
 use crate::view::camera::View;
 use std::ops::Range;
@@ -30,12 +31,7 @@ impl Setups {
         config.check(scene.frames())?;
         let (grid, views) = (scene.grid(), config.views.iter());
         if config.mode.is_projection() {
-            let volume = (*grid, scene.blocks());
-            let setup = |view: &View| {
-                let setup = with_backend(ViewSetup::new(volume, config, view)?, config)?;
-                without_dim_voxels(setup, config)
-            };
-            return views.map(setup).collect::<Result<_>>().map(Self::Splatted);
+            return splatted((*grid, scene.blocks()), config).map(Self::Splatted);
         }
         if scene.channels() > 1 {
             let what = "the samples are colours already, and colours are rendered as projections only";
@@ -54,7 +50,7 @@ impl Setups {
     /// The least memory with which any view can be rendered alone.
     pub(super) fn least(&self, scene: &dyn Scene, config: &RenderConfig) -> usize {
         match self {
-            Self::Splatted(setups) => Budget::least(config, scene, setups),
+            Self::Splatted(setups) => Budget::least((config, Kept::Value), scene, setups),
             Self::Sliced(views) => composite::least(scene, config, views),
             Self::Planes(views) => cut::least(scene, config, views),
         }
@@ -64,13 +60,7 @@ impl Setups {
     pub(super) fn reports(&self, config: &RenderConfig) -> Vec<ViewReport> {
         let views = config.views.iter();
         match self {
-            Self::Splatted(setups) => {
-                let of = |(view, setup): (&View, &ViewSetup)| ViewReport {
-                    splat_error_is_estimate: config.quick && setup.backend.is_lattice(),
-                    ..ViewReport::new(view, setup)
-                };
-                views.zip(setups).map(of).collect()
-            }
+            Self::Splatted(setups) => reports_of_splatted(setups, config),
             Self::Sliced(all) => {
                 let of = |(view, sliced): (&View, &SlicedView)| {
                     ViewReport::of_slices(view, &sliced.camera, sliced.slices(), sliced.cells)
@@ -106,4 +96,22 @@ impl Setups {
             Self::Planes(views) => cut::cut(scene, config, (views, which), progress, report, sink),
         }
     }
+}
+
+/// The setups of projections of a grid that is cut into blocks.
+pub(super) fn splatted(volume: (Grid, BlockGrid), config: &RenderConfig) -> Result<Vec<ViewSetup>> {
+    let setup = |view: &View| {
+        let setup = with_backend(ViewSetup::new(volume, config, view)?, config)?;
+        without_dim_voxels(setup, config)
+    };
+    config.views.iter().map(setup).collect()
+}
+
+/// The reports of projections, before anything is rendered.
+pub(super) fn reports_of_splatted(setups: &[ViewSetup], config: &RenderConfig) -> Vec<ViewReport> {
+    let of = |(view, setup): (&View, &ViewSetup)| ViewReport {
+        splat_error_is_estimate: config.quick && setup.backend.is_lattice(),
+        ..ViewReport::new(view, setup)
+    };
+    config.views.iter().zip(setups).map(of).collect()
 }

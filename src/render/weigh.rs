@@ -9,7 +9,7 @@ use super::splat::reference_weights::ReferenceWeights;
 use super::splat::{BandAccumulator, FilteredCells, Pixels, ResolvedTile, ViewSetup, splat};
 use super::weights::{WeightedView, Weights};
 use crate::base::error::Result;
-use crate::base::grid::BlockGrid;
+use crate::base::grid::{BlockGrid, Region};
 use crate::view::footprint::{Footprint, Method};
 use crate::wavelet::{LANES, Lane};
 use rayon::prelude::*;
@@ -22,7 +22,9 @@ pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Bu
     let mut weights =
         Weights { size: setup.camera.size, threshold: BACKGROUND * largest, sums, cells, ..Weights::default() };
     if config.quantity == Quantity::Mean && setup.method != Method::EXACT {
-        judge_background(&mut weights, &ReferenceWeights::new(setup, &by(Method::EXACT)?), setup.stated_error);
+        let exact = by(Method::EXACT)?;
+        let reference = ReferenceWeights::new(setup, &exact);
+        judge_background(&mut weights, &|pixel| reference.at(pixel), setup.stated_error * reference.most());
     }
     if config.certify {
         let whole = ViewSetup { footprint: by(certificate::WHOLE)?, ..setup.clone() };
@@ -32,20 +34,45 @@ pub(super) fn weigh<'a>(setup: &'a ViewSetup, config: &RenderConfig, budget: &Bu
     Ok(WeightedView { setup, weights })
 }
 
+/// Computes the sums of weights of a part of the voxels, without a background: that depends on all parts.
+pub(super) fn weigh_part<'a>(setup: &'a ViewSetup, budget: &Budget<'_>) -> Result<WeightedView<'a>> {
+    let (sums, cells) = sums(setup, budget)?;
+    Ok(WeightedView { setup, weights: Weights { size: setup.camera.size, sums, cells, ..Weights::default() } })
+}
+
+/// The weights of a view whose `sums` were added from parts that hold the voxels of `boxes`.
+pub(super) fn weights_of_parts(
+    setup: &ViewSetup,
+    config: &RenderConfig,
+    (sums, boxes): (Vec<f64>, &[Region]),
+) -> Result<Weights> {
+    let largest = sums.iter().copied().fold(0.0, f64::max);
+    let mut weights = Weights { size: setup.camera.size, threshold: BACKGROUND * largest, sums, ..Weights::default() };
+    if config.quantity == Quantity::Mean && setup.method != Method::EXACT {
+        let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
+        let clipped: Vec<ViewSetup> = boxes.iter().map(|clip| ViewSetup { clip: *clip, ..setup.clone() }).collect();
+        let of_boxes: Vec<_> = clipped.iter().map(|setup| ReferenceWeights::new(setup, &exact)).collect();
+        let uncut = |pixel: [usize; 2]| of_boxes.iter().map(|of_box| of_box.at(pixel)).sum();
+        let most = ReferenceWeights::new(setup, &exact).most();
+        judge_background(&mut weights, &uncut, setup.stated_error * most);
+    }
+    Ok(weights)
+}
+
 /// Makes the background the same for every splat method: replaces sums by uncut sums wherever the difference may decide
 /// whether a pixel is background.
 ///
-/// The error of a sum is at most `off` times the largest sum anywhere. So this computes the largest sum of the view
-/// again, without a cut, and then all sums near the threshold that follows from it.
-fn judge_background(weights: &mut Weights, reference: &ReferenceWeights<'_>, off: f64) {
+/// The error of a sum is at most `near`. So this computes the largest sum of the view again, without a cut, and then all
+/// sums near the threshold that follows from it. `uncut` gives the sum of a pixel without a cut.
+fn judge_background(weights: &mut Weights, uncut: &(dyn Fn([usize; 2]) -> f64 + Sync), near: f64) {
     let pixel = |at: usize| [at % weights.size[0], at / weights.size[0]];
     let brighter = |best: usize, at: usize| if weights.sums[at] > weights.sums[best] { at } else { best };
-    let largest = reference.at(pixel((0..weights.sums.len()).fold(0, brighter)));
-    let (threshold, near) = (BACKGROUND * largest, off * reference.most());
+    let largest = uncut(pixel((0..weights.sums.len()).fold(0, brighter)));
+    let threshold = BACKGROUND * largest;
     let mut sums = weights.sums.clone();
     sums.par_iter_mut().enumerate().for_each(|(at, sum)| {
         if (*sum - threshold).abs() <= near {
-            *sum = reference.at(pixel(at));
+            *sum = uncut(pixel(at));
         }
     });
     (weights.threshold, weights.reference) = (threshold, sums);

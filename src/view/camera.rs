@@ -22,9 +22,10 @@
 
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
+use serde::{Deserialize, Serialize};
 
 /// The settings of a view.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct View {
     /// Degrees about z, counter-clockwise seen from +z; 0 looks along -y.
     pub azimuth: f64,

@@ -23,10 +23,11 @@
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The settings of the kernel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Kernel {
     /// Standard deviation in world units.
     pub sigma: f64,

@@ -28,6 +28,7 @@ mod modes;
 mod motion;
 mod movies;
 mod mutated;
+mod parts;
 mod pictures;
 mod pipes;
 mod probe;

@@ -3,12 +3,12 @@
 use super::args::Cli;
 use super::places::{self, Axes};
 use crate::base::error::Result;
-use crate::base::grid::Grid;
+use crate::base::grid::{Grid, Region};
 use crate::base::time_labels::TimeLabels;
 use crate::colour::Rgb;
 use crate::file::CoefficientFile;
 use crate::file::setting;
-use crate::render::annotate::{Annotation, Margins, Parts, VolumeAxes, margins};
+use crate::render::annotate::{Annotation, AxisLabels, Margins, Parts, VolumeAxes, margins};
 use crate::render::{Mode, RenderConfig};
 use crate::view::camera::{Camera, View};
 use clap::{Args, ValueEnum};
@@ -154,13 +154,23 @@ impl Cli {
     /// The axes of the volume as it is drawn, with their true coordinates.
     pub(crate) fn volume_axes(&self, axes: &Axes, whole: &Grid, config: &RenderConfig) -> Result<VolumeAxes> {
         let region = self.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
+        Ok(self.axes_in(axes.labels(), whole, (config, region)))
+    }
+
+    /// The axes of the voxels that are drawn.
+    pub(crate) fn axes_in(
+        &self,
+        labels: [AxisLabels; 3],
+        whole: &Grid,
+        (config, region): (&RenderConfig, Region),
+    ) -> VolumeAxes {
         let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
         let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
-        let volume = VolumeAxes { grid: *whole, region, rim, labels: axes.labels() };
+        let volume = VolumeAxes { grid: *whole, region, rim, labels };
         if self.parts().scale && volume.length_unit().is_none() {
             self.common.note("no scale is drawn, since lengths differ from axis to axis");
         }
-        Ok(volume)
+        volume
     }
 }
 

@@ -5,6 +5,7 @@ use super::annotations::AnnotationArgs;
 use super::colours::ColourArgs;
 use super::cuts::CutArgs;
 use super::motion::MotionArgs;
+use super::parts::PartArgs;
 use super::probes::ProbeArgs;
 use super::view_names::ViewSpec;
 use crate::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, RemoteArgs, Triple, Whole, share};
@@ -33,7 +34,9 @@ Examples:
   wavesplat-render run.wspl --tolerance 0.05 --error-image error.npy -o values.npy
   wavesplat-render run.wspl --slice x=0.5,z=0.25 --frames 10 -o slices.png
   wavesplat-render run.wspl --probe 0.5,0.5,0.5 -o series.svg
-  wavesplat-render frames/ --method direct -o frame_%04d.png",
+  wavesplat-render frames/ --method direct -o frame_%04d.png
+  wavesplat-render run.wspl --region 0:32,:,: --partial -o part-1.wpart
+  wavesplat-render --sum part-1.wpart part-2.wpart -o picture.png",
     after_help = "\
 An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; with --colormap it \
 holds uint8 colours. A PNG stores its render settings as text, an .exr as comments. \
@@ -41,7 +44,7 @@ View 0,0 looks along -y with z up. Azimuth turns the camera about z, counter-clo
 along x. A tau of about 1 / the volume's depth makes the near side stand out."
 )]
 pub struct Cli {
-    /// Coefficient file; --method direct also takes frames
+    /// Coefficient file; --method direct also takes frames, --sum takes parts
     #[arg(required = true)]
     pub(crate) inputs: Vec<PathBuf>,
     /// File to write, a pattern like frame_%04d.png, or - for standard output. %v or %03v becomes the number of the
@@ -130,6 +133,8 @@ pub struct Cli {
     pub(crate) cuts: CutArgs,
     #[command(flatten)]
     pub(crate) probes: ProbeArgs,
+    #[command(flatten)]
+    pub(crate) parts: PartArgs,
     /// Render from coefficients, or frame by frame (the conventional method)
     #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
     pub(crate) method: MethodName,

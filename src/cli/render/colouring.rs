@@ -41,21 +41,22 @@ impl Colouring {
 }
 
 impl Cli {
-    /// The colours, over given ranges or those of small pictures.
+    /// The colours, over given ranges or those that `ranges` finds: of pictures, and of their errors, if they are needed.
     pub(crate) fn colouring(
         &self,
-        scene: &mut dyn Scene,
+        channels: usize,
         config: &RenderConfig,
         (pictures, errors): (&Targets, Option<&Targets>),
         colours: Option<&TransferFunction>,
+        ranges: impl FnOnce((bool, bool)) -> Result<Ranges>,
     ) -> Result<Colouring> {
-        let pixel = self.pixel(scene, config, [Some(pictures), errors])?;
+        let pixel = self.pixel(channels, config, [Some(pictures), errors])?;
         let in_colours = !pictures.format.is_of_numbers() || self.colour.is_asked();
         let of_errors = errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel, colours);
         let is_clear = self.may_be_clear(pixel) && self.colour.finds_clear();
         let needed = (in_colours && (fixed.is_none() || is_clear), of_errors);
-        let ranges = Ranges::small(scene, config, needed, &self.common)?;
+        let ranges = ranges(needed)?;
         let map = colours.filter(|_| pixel != Pixel::Value).map_or_else(|| self.colour.map(), |c| Ok(c.clone()))?;
         let (range, norm) = match pixel {
             Pixel::Value => self.colour.spread(&map, &ranges, in_colours, &self.common)?,
@@ -89,8 +90,8 @@ impl Cli {
     }
 
     /// The meaning of a pixel's numbers. An error if options or formats cannot be used with colours.
-    fn pixel(&self, scene: &dyn Scene, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
-        let pixel = if scene.channels() == 1 { config.mode.pixel() } else { Pixel::Channels };
+    fn pixel(&self, channels: usize, config: &RenderConfig, targets: [Option<&Targets>; 2]) -> Result<Pixel> {
+        let pixel = if channels == 1 { config.mode.pixel() } else { Pixel::Channels };
         if pixel == Pixel::Value {
             return Ok(pixel);
         }

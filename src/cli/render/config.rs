@@ -38,13 +38,24 @@ impl Cli {
         file: Option<&CoefficientFile>,
         colours: Option<&TransferFunction>,
     ) -> Result<RenderConfig> {
+        self.config_of(scene, file, colours, scene.frames().unwrap_or(0))
+    }
+
+    /// The settings of pictures of some of `all` frames, which may be more than the scene has.
+    pub(crate) fn config_of(
+        &self,
+        scene: &dyn Scene,
+        file: Option<&CoefficientFile>,
+        colours: Option<&TransferFunction>,
+        all: usize,
+    ) -> Result<RenderConfig> {
         let grid = scene.grid();
         let (whole, lod) = file.map_or((*grid, 0), |file| (file.whole_grid(), file.lod()));
         let file = file.map(CoefficientFile::metadata);
         let allowed = self.tolerance.map(|t| self.allowed(t, file)).transpose()?;
         let tolerance = self.tolerance.or(file.map(share_tolerance));
         let splat_error = self.splat_error.unwrap_or(default_splat_error(tolerance));
-        let frames = self.frames_of(scene.frames().unwrap_or(0))?;
+        let frames = self.frames_of(all)?;
         let views = self.views(&whole, &frames)?;
         Ok(RenderConfig {
             frames: self.frames_of_views(frames, views.len())?,

@@ -17,6 +17,7 @@ impl Program {
         match self {
             Self::Render(mut cli) => {
                 cli.imply_mode()?;
+                cli.imply_look()?;
                 cli.run()
             }
             Self::Generate(what) => what.run(cli::command::<Self>()),

@@ -15,6 +15,7 @@ pub mod live;
 #[cfg(feature = "view")]
 mod look;
 mod motion;
+mod parts;
 mod places;
 mod probes;
 mod provenance;
@@ -39,6 +40,7 @@ use args::Cli;
 use clap::Parser;
 use colouring::Colouring;
 pub use generate::Program;
+use ranges::Ranges;
 use report::{Reported, summary, unit};
 use scene::Opened;
 use std::ffi::OsString;
@@ -75,6 +77,7 @@ fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli> {
     let program = Program::try_parse_from(words).map_err(|e| Error::usage(first_line(&e.to_string())))?;
     let Program::Render(mut cli) = program else { return Err(Error::usage("--generate: shows no pictures")) };
     cli.imply_mode()?;
+    cli.imply_look()?;
     Ok(*cli)
 }
 
@@ -88,6 +91,9 @@ impl Cli {
     fn work(&self, progress: Option<&dyn Progress>) -> Result<()> {
         if self.probes.is_asked() {
             return self.probe();
+        }
+        if self.is_of_parts() {
+            return self.work_on_parts(progress);
         }
         let Prepared { mut scene, file, config, targets, colouring, provenance, annotation } = self.prepared()?;
         let targets = (&targets.0, targets.1.as_ref());
@@ -118,14 +124,16 @@ impl Cli {
         config.memory = self.memory_besides_sinks(scene.as_ref(), &targets, &config)?;
         let colours = self.automatic_colours(scene.as_mut(), &mut config, colours)?;
         self.note_surfaces(&config, file.as_deref());
-        let colouring = self.colouring(scene.as_mut(), &config, (&targets.0, targets.1.as_ref()), colours.as_ref())?;
+        let (channels, targeted) = (scene.channels(), (&targets.0, targets.1.as_ref()));
+        let ranges = |needed| Ranges::small(scene.as_mut(), &config, needed, &self.common);
+        let colouring = self.colouring(channels, &config, targeted, colours.as_ref(), ranges)?;
         let provenance = Provenance {
             slice: self.slice_texts(&axes)?,
             annotate: self.around.words(),
             title: Some(annotation.title.clone()).filter(|title| !title.is_empty()),
             bar_title: self.around.bar_title(),
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
-            ..self.provenance(scene.as_ref(), &config, (file.as_deref(), &annotation.times), &colouring)
+            ..self.provenance(scene.grid(), &config, (file.as_deref(), &annotation.times), &colouring)
         };
         let annotation = Annotation { axes: Some(self.volume_axes(&axes, &whole, &config)?), ..annotation };
         self.note_title(&annotation, &config);

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 /// Options of pictures, which time series do not have.
-const OF_PICTURES: [&str; 34] = [
+const OF_PICTURES: [&str; 36] = [
     "planes",
     "slices",
     "views",
@@ -55,6 +55,8 @@ const OF_PICTURES: [&str; 34] = [
     "depth",
     "fps",
     "sidecar",
+    "partial",
+    "sum",
 ];
 
 /// Options for time series.

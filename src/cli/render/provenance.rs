@@ -3,18 +3,19 @@
 use super::along::ModeName;
 use super::args::{Cli, ErrorName, MethodName, QuantityName};
 use super::colouring::Colouring;
+use crate::base::grid::Grid;
 use crate::base::time_labels::TimeLabels;
 use crate::colour::{Norm, Scale};
 use crate::file::CoefficientFile;
 use crate::file::report::BoundReport;
 use crate::render::sink::{Provenance, Shows};
-use crate::render::{Limit, Mode, Pixel, RenderConfig, Scene, Surface};
+use crate::render::{Limit, Mode, Pixel, RenderConfig, Surface};
 
 impl Cli {
     /// The settings that pictures are rendered with.
     pub(crate) fn provenance(
         &self,
-        scene: &dyn Scene,
+        grid: &Grid,
         config: &RenderConfig,
         (file, times): (Option<&CoefficientFile>, &TimeLabels),
         colouring: &Colouring,
@@ -37,7 +38,7 @@ impl Cli {
             dates: config.frames.iter().filter_map(|frame| times.date(*frame)).collect(),
             ..self.of_modes()
         };
-        let provenance = of_transfer(provenance, scene, (config, file), colouring);
+        let provenance = of_transfer(provenance, grid, (config, file), colouring);
         let provenance = file.map_or(provenance.clone(), |file| self.of_file(provenance, file, config));
         match colouring.coloured().range {
             Some(_) => in_colours(provenance, colouring, &colouring.of_pictures),
@@ -80,7 +81,7 @@ impl Cli {
 /// Adds the colours of samples, applied before the transform or along the ray.
 fn of_transfer(
     provenance: Provenance,
-    scene: &dyn Scene,
+    grid: &Grid,
     (config, file): (&RenderConfig, Option<&CoefficientFile>),
     colouring: &Colouring,
 ) -> Provenance {
@@ -90,7 +91,7 @@ fn of_transfer(
     match &config.mode {
         Mode::Composite { transfer, unit, light, .. } => Provenance {
             opacity: Some(transfer.opacity_words()),
-            opacity_unit: Some(unit.unwrap_or_else(|| scene.grid().largest_spacing())),
+            opacity_unit: Some(unit.unwrap_or_else(|| grid.largest_spacing())),
             light: light.map(|light| [light.azimuth, light.elevation]),
             ..provenance
         },

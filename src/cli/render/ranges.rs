@@ -261,6 +261,21 @@ impl Ranges {
         Ok(ranges)
     }
 
+    /// The ranges of pictures of a few of some frames. `render` gives them, row by row.
+    pub(crate) fn of_pictures(
+        frames: &[usize],
+        render: impl FnOnce(&[usize], &mut dyn FnMut(&[f32])) -> Result<()>,
+    ) -> Result<Self> {
+        let some: Vec<usize> = spread_over(frames.len(), MOST_FRAMES).into_iter().map(|n| frames[n]).collect();
+        let (mut ranges, mut values) = (Self::default(), Vec::new());
+        render(&some, &mut |picture| {
+            let step = (picture.len() * some.len()).div_ceil(MOST_PIXELS).max(1);
+            values.extend(picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        })?;
+        ranges.set_values(values);
+        Ok(ranges)
+    }
+
     fn set_values(&mut self, values: Vec<f32>) {
         self.all = Distribution::new(values);
         let values = self.all.values();

@@ -61,7 +61,7 @@ impl Cli {
     }
 
     /// Writes the report of `--sidecar`, and prints that of `--json`.
-    pub(crate) fn report(&self, reported: &Reported<'_>) -> Result<()> {
+    pub(crate) fn report(&self, reported: &impl Serialize) -> Result<()> {
         if let Some(path) = &self.sidecar {
             let mut out = Output::create(path, self.force || is_ours(path))?;
             out.write_all(cli::report_text(reported)?.as_bytes()).map_err(|e| Error::io(path, "writing", e))?;

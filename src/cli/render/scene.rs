@@ -12,6 +12,7 @@ use crate::cli::transfer_function;
 use crate::colour::TransferFunction;
 use crate::file::{CoefficientFile, time_labels};
 use crate::render::annotate::Annotation;
+use crate::render::parts::is_part;
 use crate::render::{CoefficientScene, FrameScene, Scene, SplatSource};
 use crate::view::camera::Camera;
 use std::path::{Path, PathBuf};
@@ -158,6 +159,9 @@ const FRAMES_HINT: &str = "convert frames first, or render them with --method di
 
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
+    if is_part(path) {
+        return Error::usage(format!("{}: is a part of a picture; --sum makes pictures of parts", path.display()));
+    }
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
     if !is_coefficient_name(path) && (foreign || path.is_dir()) {
         return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));

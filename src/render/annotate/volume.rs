@@ -9,7 +9,7 @@ use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
 
 /// What an axis means.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AxisLabels {
     /// Its name.
     pub name: String,

@@ -110,3 +110,72 @@ def test_wrong_shards(tmp_path):
     wavesplat.convert(array, tmp_path / "a.wspl", shard=(1, 2), range=(-4, 4), chain=1)
     with pytest.raises(ValueError, match="shard 2 of 2 is missing"):
         wavesplat.merge([tmp_path / "a.wspl"], tmp_path / "b.wspl")
+
+
+VIEWS = {"view": [(30, 30), (75.5, -20)], "size": (48, 40)}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"frames": slice(2, 30, 5), **VIEWS},
+        {"frames": slice(2, 30, 5), "colormap": "turbo", **VIEWS},
+        {"mode": "composite", "frames": [3, 20], **VIEWS},
+        {"orbit": 3, "frames": slice(0, 20, 6), "size": (40, 30)},
+        {"orbit": 8, "over_time": True, "size": (40, 30)},
+        {"frames": 9, "quantity": "emission", "size": (40, 30)},
+    ],
+)
+def test_many_workers_render_the_pictures_of_one_call(client, rendered, options):
+    path, _ = rendered
+    np.testing.assert_array_equal(
+        wavesplat.dask.render(path, client=client, **options), wavesplat.open(path).render(**options)
+    )
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """A file, and its two shards."""
+    folder = tmp_path_factory.mktemp("rendered")
+    samples, settings = samples_of(smooth((32, 20, 22, 24))), {"window": 8, "chain": 1, "range": (-4, 4), "block": 8}
+    wavesplat.convert(samples, folder / "a.wspl", **settings)
+    shards = [folder / f"{n}.wspl" for n in (1, 2)]
+    for n, shard in enumerate(shards, 1):
+        wavesplat.convert(samples, shard, shard=(n, 2), **settings)
+    return folder / "a.wspl", shards
+
+
+def test_parts_by_many_workers_add_up(client, rendered):
+    """Slabs of a file differ by rounding from one rendering; shards do not."""
+    path, shards = rendered
+    options = {"frames": [1, 9, 30], **VIEWS}
+    one = wavesplat.open(path).render(**options)
+    np.testing.assert_array_equal(wavesplat.dask.render(shards[::-1], client=client, **options), one)
+    for source, regions in [(path, 3), (path, ["0:11,:,:", "11:,:,:"]), (shards, 3), (shards, [":,:,:"])]:
+        parts = wavesplat.dask.render(source, client=client, regions=regions, **options)
+        np.testing.assert_allclose(parts, one, rtol=0, atol=2e-6 * np.nanmax(abs(one)))
+    deep = [f"{x}:{x + 2},:,:" for x in range(0, 24, 2)]  # more than one task adds
+    parts = wavesplat.dask.render(path, client=client, regions=deep, quantity="emission", **options)
+    whole = wavesplat.open(path).render(quantity="emission", **options)
+    np.testing.assert_allclose(parts, whole, rtol=0, atol=2e-6 * np.nanmax(abs(whole)))
+    coloured = {"colormap": "turbo", "range": (-1, 1), **options}
+    np.testing.assert_array_equal(
+        wavesplat.dask.render(shards, client=client, **coloured), wavesplat.open(path).render(**coloured)
+    )
+    assert sorted(each.name for each in path.parent.iterdir()) == ["1.wspl", "2.wspl", "a.wspl"]
+
+
+def test_pictures_that_are_no_sums_are_refused(client, rendered):
+    path, shards = rendered
+    for options, words in [
+        ({"mode": "mip", "regions": 2}, "largest values along rays are no sums"),
+        ({"regions": 99}, "regions: takes 1 to 3"),
+        ({"regions": 2, "region": "0:2,:,:"}, "region: cannot be given"),
+        ({"regions": ["0:5,:,:", "4:,:,:"]}, "shares voxels"),
+        ({"frames": []}, "frames: none"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            wavesplat.dask.render(path, client=client, **options)
+    with pytest.raises(ValueError, match="source"):
+        wavesplat.dask.render([], client=client)
+    assert not [each for each in path.parent.iterdir() if each.suffix == ".parts"]

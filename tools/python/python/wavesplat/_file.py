@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -305,13 +305,7 @@ class File:
             ValueError: An option is wrong.
 
         """
-        is_several = isinstance(options.get("view"), list) or options.get("orbit", 1) != 1
-        is_several = is_several and not (options.get("over_time") or options.get("key_frames"))
-        with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
-            self._render(os.path.join(folder, "%05v.npy" if is_several else "pictures.npy"), options, progress)
-            views = [np.load(path) for path in sorted(Path(folder).glob("*.npy"))]
-        pictures: npt.NDArray[Any] = np.stack(views) if is_several else views[0]
-        return pictures
+        return pictures(options, lambda output: self._render(output, options, progress))
 
     def figure(self, format: str = "html", *, height: int = 700, progress: Progress = False, **options: Any) -> Figure:
         """A picture that a notebook shows.
@@ -344,11 +338,7 @@ class File:
             options = {"lod": self._lod, **options}
         if self._cache_dir:
             options = {"cache": self._cache_dir, **options}
-        with reporting(progress, "render") as report:
-            try:
-                _wavesplat.render([*words(options), "-o", output, "--", self._path], report)
-            except ValueError as error:
-                raise ValueError(in_python(str(error))) from None
+        run(options, output, [self._path], progress)
 
     def view(self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Any) -> Viewer:
         """Opens the interactive viewer in the browser.
@@ -361,6 +351,26 @@ class File:
 
         """
         return Viewer(self._path, words(options), port=port, memory=memory, browser=browser)
+
+
+def pictures(options: dict[str, Any], make: Callable[[str], object]) -> npt.NDArray[Any]:
+    """The arrays that ``make`` writes to a file, or to one for each view; several views add an axis."""
+    is_several = isinstance(options.get("view"), list) or options.get("orbit", 1) != 1
+    is_several = is_several and not (options.get("over_time") or options.get("key_frames"))
+    with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
+        make(os.path.join(folder, "%05v.npy" if is_several else "pictures.npy"))
+        views = [np.load(path) for path in sorted(Path(folder).glob("*.npy"))]
+    together: npt.NDArray[Any] = np.stack(views) if is_several else views[0]
+    return together
+
+
+def run(options: dict[str, Any], output: str, inputs: Sequence[str], progress: Progress = False) -> None:
+    """Does what options of ``wavesplat-render`` ask for; errors have the names of Python."""
+    with reporting(progress, "render") as report:
+        try:
+            _wavesplat.render([*words(options), "-o", output, "--", *inputs], report)
+        except ValueError as error:
+            raise ValueError(in_python(str(error))) from None
 
 
 class Outer:

@@ -1,0 +1,28 @@
+//! Files of sums: what a part of the voxels, or of the frames, adds to pictures; and pictures of such files.
+//!
+//! A part is small, however large its archive is: a number or two for each pixel and frame. Numbers are little-endian.
+//!
+//! ```text
+//! 8 bytes      89 57 50 41 52 54 0d 0a, the magic
+//! records      zstd frames one after another: 64-bit floats, plane after plane, row by row
+//! head         a zstd frame of JSON: Head. It says where the records lie, and the XXH3-64 of each
+//! 40 bytes     offset of the head, its packed bytes, its bytes, the XXH3-64 of its packed bytes; the magic again
+//! ```
+//!
+//! A record holds the weights of a view; or of a picture the emissions of each channel, each followed by the weights of its
+//! missing samples if there are any. Parts are added in the order of their voxels, in whatever order they are given.
+
+mod look;
+mod write;
+mod read;
+mod total;
+
+pub use look::{Head, Look, Source};
+pub use read::{PartFile, is_part};
+pub use total::Total;
+pub use write::PartWriter;
+
+const MAGIC: [u8; 8] = *b"\x89WPART\r\n";
+
+/// Bytes behind the head.
+const END: usize = 40;
