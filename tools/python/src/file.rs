@@ -7,6 +7,7 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use wavesplat::Region;
 use wavesplat::base::address::is_address;
@@ -44,7 +45,7 @@ impl File {
     }
 
     #[getter]
-    fn path(&self) -> PathBuf {
+    fn path(&self) -> OsString {
         self.file.path().into()
     }
 

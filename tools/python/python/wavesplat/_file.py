@@ -65,7 +65,7 @@ class File:
     def __repr__(self) -> str:  # noqa: D105
         sizes = ", ".join(f"{name}: {length}" for name, length in zip(self.dims, self.shape, strict=True))
         name = self.variable or "samples"
-        return f"<wavesplat.File {str(self._file.path)!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
+        return f"<wavesplat.File {self._file.path!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
 
     def __len__(self) -> int:  # noqa: D105
         return self.shape[0]

@@ -94,7 +94,9 @@ class WavesplatBackend(BackendEntrypoint):
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Whether a name ends like one of a coefficient file."""
-        return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).split("?")[0].endswith(".wspl")
+        return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).split("?")[0].endswith(
+            ".wspl"
+        )
 
 
 def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
