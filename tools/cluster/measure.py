@@ -89,28 +89,37 @@ def tail(path):
 
 
 def large(gigabytes):
-    edge, shards = 128, 4
-    frames = max(round(gigabytes * 1e9 / (4 * edge**3 * 128)), 1) * 128  # a window for each shard, or more
+    edge, shards = 80, 4
+    chain = 4 * 32 * shards  # frames of four windows for each shard
+    frames = max(round(gigabytes * 1e9 / (4 * edge**3 * chain)), 1) * chain
     write_frames("all.raw", edge, frames)
     size = os.path.getsize("all.raw")
     dims = ["--dims", f"{edge}x{edge}x{edge}x{frames}", "--dtype", "f32", "--quiet"]
-    rate = lambda seconds, size=size: f"{seconds:.1f} s, {size / seconds / 1e6:.0f} MB/s"
     print(f"{frames} frames, {size / 1e9:.2f} GB, {os.cpu_count()} processors")
-    print("read (cp to nothing):", rate(run("dd", "if=all.raw", "of=/dev/null", "bs=4M", "status=none")[0]))
-    print("scan:", rate(run("wavesplat", "scan", "all.raw", *dims, "-o", "scan.json")[0]))
-    common = ["wavesplat", "convert", "all.raw", *dims, "--scan", "scan.json", "--chain", "1", "--tolerance", "0.001"]
+    print("read, from memory:", rate(run("dd", "if=all.raw", "of=/dev/null", "bs=4M", "status=none")[0], size))
+    print("scan:", rate(run("wavesplat", "scan", "all.raw", *dims, "-o", "scan.json")[0], size))
+    for tolerance in ("0.001", "0"):
+        compare([*dims, "--scan", "scan.json", "--chain", "4", "--tolerance", tolerance], shards, size)
+
+
+def rate(seconds, size):
+    return f"{seconds:.1f} s, {size / seconds / 1e6:.0f} MB/s"
+
+
+def compare(options, shards, size):
+    common = ["wavesplat", "convert", "all.raw", *options, "--force"]
     whole = run(*common, "-o", "whole.wspl")[0]
-    print("one conversion:", rate(whole))
+    print(f"{' '.join(options[-2:])}: one conversion:", rate(whole, size))
     each = [run(*common, "--shard", f"{n}/{shards}", "-o", f"part-{n}.wspl")[0] for n in range(1, shards + 1)]
-    print(f"{shards} shards, one after another:", rate(sum(each)), f"({sum(each) / whole - 1:+.0%})")
+    print(f"  {shards} shards, one after another:", rate(sum(each), size), f"({sum(each) / whole - 1:+.0%})")
     parts = [f"part-{n}.wspl" for n in range(1, shards + 1)]
     stored = sum(map(os.path.getsize, parts))
-    for n in range(3):
-        seconds, memory, _, _ = run("wavesplat", "merge", *parts, "-o", f"merged-{n}.wspl", "--quiet")
-        print("merge:", rate(seconds, stored), f"peak {memory:.0f} MB; ratio {size / stored:.1f}")
-        copied = run("sh", "-c", f"cat {' '.join(parts)} > copy-{n} && sync copy-{n}")[0]
-        print("copy of the same bytes:", rate(copied, stored))
-    subprocess.run(["cmp", "merged-0.wspl", "whole.wspl"], check=True)
+    for _ in range(3):
+        seconds, memory, _, _ = run("wavesplat", "merge", *parts, "-o", "merged.wspl", "--force", "--quiet")
+        print(f"  merge of {stored / 1e6:.0f} MB:", rate(seconds, stored), f"peak {memory:.0f} MB")
+        copied = run("sh", "-c", f"cat {' '.join(parts)} > copy && sync copy && rm copy")[0]
+        print("  copy of the same bytes, to the disk:", rate(copied, stored))
+    subprocess.run(["cmp", "merged.wspl", "whole.wspl"], check=True)
 
 
 if __name__ == "__main__":
